@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-LONGEST_SHOWN = 80
+_LONGEST_SHOWN = 80
 """Most characters of a user's value that a message repeats."""
 
 
@@ -135,8 +135,8 @@ def shown(value: object) -> str:
     if "\n" in text:
         # Arrays are written in several lines.
         text = " ".join(text.split())
-    half = LONGEST_SHOWN // 2
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"
+    half = _LONGEST_SHOWN // 2
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"
 
 
 def printable(text: str, *, in_one_line: bool = False) -> str:

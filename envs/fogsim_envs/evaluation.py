@@ -16,10 +16,10 @@ from fogsim.errors import InputError
 from fogsim_envs.baselines import Info, Policy, baseline
 from fogsim_envs.infos import reward_terms_of, word_of
 
-RESAMPLES = 2000
-CONFIDENCE = 0.95
+_RESAMPLES = 2000
+_CONFIDENCE = 0.95
 
-CORRIDOR = "fogsim/FogCorridor-v1"
+_CORRIDOR = "fogsim/FogCorridor-v1"
 """The id that is PettingZoo's, not Gymnasium's."""
 
 
@@ -158,7 +158,7 @@ def evaluate(
 
 
 def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
-    if env_id.rpartition(":")[2] != CORRIDOR:
+    if env_id.rpartition(":")[2] != _CORRIDOR:
         return gymnasium.make(env_id, **{"split": "test", "metrics": True, **arguments})
     # It needs PettingZoo, an extra.
     from fogsim_envs.corridor import parallel_env  # noqa: PLC0415
@@ -199,8 +199,8 @@ def _metrics_over(episodes: Sequence[EpisodeResult]) -> dict[str, tuple[float, f
 def bootstrap_interval(values: NDArray[np.float64]) -> tuple[float, float]:
     """95 % interval of a mean, by percentiles of resampled means (`values` (n,))."""
     rng = np.random.default_rng(0)
-    means = values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1)
-    low, high = np.quantile(means, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0]).tolist()
+    means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, [(1.0 - _CONFIDENCE) / 2.0, (1.0 + _CONFIDENCE) / 2.0]).tolist()
     return low, high
 
 

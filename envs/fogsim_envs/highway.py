@@ -19,13 +19,13 @@ from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.spaces import ImageSize
 
-CAMERA_PERIOD, DECISION_PERIOD = 0.1, 0.5
+_CAMERA_PERIOD, _DECISION_PERIOD = 0.1, 0.5
 """Time between frames and between decisions, as far as highway-env's step allows [s]."""
 
 Visibility = Annotated[float, Range(1.0, math.inf, "m")]
 """Meteorological visibility [m]."""
 
-END_MARGIN = 5.0
+_END_MARGIN = 5.0
 """The ego has arrived when it is this near to the end of its last lane [m]."""
 
 
@@ -168,7 +168,7 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
     """
     duration = [f"duration_s={float(config['duration'])!r}"] if "duration" in config else []
     fog = f"fog.visibility_m={visibility!r}"
-    margin = f"traffic.stop_before_end_m={END_MARGIN!r}"
+    margin = f"traffic.stop_before_end_m={_END_MARGIN!r}"
     scenario = attached_scenario(EGO, [*duration, fog, margin, *_clocks(config), *overrides])
     if scenario.road is not None:
         raise InputError("road: roads and vehicles are highway-env's own here; leave this key out")
@@ -191,14 +191,14 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
 
 def _clocks(config: Mapping[str, Any]) -> list[str]:
     step = 1.0 / config["simulation_frequency"]
-    camera = step * max(1, round(CAMERA_PERIOD / step))
-    return clock_settings(step, camera, camera * max(1, round(DECISION_PERIOD / camera)))
+    camera = step * max(1, round(_CAMERA_PERIOD / step))
+    return clock_settings(step, camera, camera * max(1, round(_DECISION_PERIOD / camera)))
 
 
 def one_frame_clocks(config: Mapping[str, Any]) -> list[str]:
     """Overrides by which there is one frame a decision."""
     step = 1.0 / config["simulation_frequency"]
-    decision = step * max(1, round(DECISION_PERIOD / step))
+    decision = step * max(1, round(_DECISION_PERIOD / step))
     return clock_settings(step, decision, decision)
 
 

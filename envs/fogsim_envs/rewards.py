@@ -6,10 +6,10 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
 from fogsim.values import Lamp, Step
 
-COMFORTABLE_DECELERATION = 2.0
+_COMFORTABLE_DECELERATION = 2.0
 """Decelerations up to this are comfortable [m/s²] (ISO 15622: 2–3.5)."""
 
-REAR_FOG_LAMP_VISIBILITY = 50.0
+_REAR_FOG_LAMP_VISIBILITY = 50.0
 """Rear fog lamps are lit below this visibility and not above [m] (German StVO § 17(3))."""
 
 
@@ -46,9 +46,9 @@ def reward_terms(
         "visibility_margin": -weights.visibility_margin * max(0.0, 1.0 - sight / needed) if needed > 0 else 0.0,
         "conflict": -weights.conflict * _conflict(after, speed, standard.time_to_collision),
         "discomfort": -weights.discomfort
-        * max(0.0, -float(after.traffic.acceleration[after.ego]) - COMFORTABLE_DECELERATION),
+        * max(0.0, -float(after.traffic.acceleration[after.ego]) - _COMFORTABLE_DECELERATION),
         "collision": -weights.collision * float(hit),
-        "lamps": -weights.lamps * float(rear_fog != (after.truth.visibility < REAR_FOG_LAMP_VISIBILITY)),
+        "lamps": -weights.lamps * float(rear_fog != (after.truth.visibility < _REAR_FOG_LAMP_VISIBILITY)),
     }
 
 

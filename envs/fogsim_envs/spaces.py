@@ -17,7 +17,7 @@ ImageSize = tuple[_Side, _Side]
 
 SIGN_SLOTS = 8
 SIGN_FEATURES = ("distance", "lateral", "value", "diameter")
-SIGN_SCALE = np.array([250.0, 25.0, 50.0, 2.0], dtype=np.float32)
+_SIGN_SCALE = np.array([250.0, 25.0, 50.0, 2.0], dtype=np.float32)
 """What the features of a sign are divided by [m, m, m/s, m]."""
 
 STATE_FEATURES = (
@@ -36,8 +36,8 @@ STATE_FEATURES = (
 """Meaning of the entries of ``state``; docs/reference/environments.md and the class docstring give their scales."""
 
 SPEED_SCALE = 50.0
-LEAD_SCALE = 200.0
-LOG_VISIBILITY_SCALE = math.log(10_000.0)
+_LEAD_SCALE = 200.0
+_LOG_VISIBILITY_SCALE = math.log(10_000.0)
 
 ADVISED_SPEEDS = tuple(kmh / KMH_PER_MPS for kmh in range(20, 140, 10))
 """Advised speed of each level [m/s]; one more level means "no advice"."""
@@ -102,7 +102,7 @@ def observed_signs(step: Step) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
     for slot, sign in enumerate(step.observation.signs[:SIGN_SLOTS]):
         features[slot] = (sign.distance, sign.lateral, sign.value, sign.diameter)
         mask[slot] = 1
-    return np.clip(features / SIGN_SCALE, -1.0, 1.0), mask
+    return np.clip(features / _SIGN_SCALE, -1.0, 1.0), mask
 
 
 def _state(step: Step) -> NDArray[np.float32]:
@@ -111,7 +111,7 @@ def _state(step: Step) -> NDArray[np.float32]:
     values = (
         step.observation.speed / SPEED_SCALE,
         float(lead is not None),
-        lead.distance / LEAD_SCALE if lead else 1.0,
+        lead.distance / _LEAD_SCALE if lead else 1.0,
         lead.relative_speed / SPEED_SCALE if lead else 0.0,
         float(estimate.valid),
         scaled_visibility(estimate.visibility) if estimate.valid else 1.0,
@@ -126,7 +126,7 @@ def _state(step: Step) -> NDArray[np.float32]:
 
 def scaled_visibility(visibility: float) -> float:
     """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1 (`visibility` [m])."""
-    return min(math.log(max(visibility, 1.0)) / LOG_VISIBILITY_SCALE, 1.0)
+    return min(math.log(max(visibility, 1.0)) / _LOG_VISIBILITY_SCALE, 1.0)
 
 
 def command_of(action: Any, continuous: bool) -> Command:

@@ -21,7 +21,7 @@ from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import SimulationError
 from fogsim_envs.hosting import Timeout, checked_timeout
 
-TIMEOUT = 600.0
+_TIMEOUT = 600.0
 """How long one step or reset of all may take unless something else is asked for [s]; the first may compile kernels."""
 
 _CLOSE_TIMEOUT = 10.0
@@ -31,7 +31,7 @@ _CLOSE_TIMEOUT = 10.0
 def make_vector(
     id: str = "fogsim/FogAdvisory-v0",  # noqa: A002 - as of `gymnasium.make_vec`
     num_envs: Annotated[int, Range(1, 10_000)] = 1,
-    timeout: Timeout = TIMEOUT,
+    timeout: Timeout = _TIMEOUT,
     *,
     wrappers: Sequence[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]] = (),
     context: Literal["fork", "spawn", "forkserver"] | None = None,

@@ -85,7 +85,7 @@ class PresentedAdviser(ABC):
         if target > previous.speed and self.hysteresis > 0.0:
             careful = self._speed_for(math.exp(smoothed) / (1.0 + self.hysteresis), belief.profile, speed_limit)
             target = max(previous.speed, careful)
-        advice = hold_rises(target, time, previous, self.hold)
+        advice = _hold_rises(target, time, previous, self.hold)
         return replace(advice, smoothed=(time, smoothed)) if self.smoothing > 0.0 else advice
 
     def _here(self, belief: Belief) -> float | None:
@@ -129,7 +129,7 @@ class PresentedAdviser(ABC):
         return whole * self.rounding
 
 
-def hold_rises(target: float, time: float, previous: SpeedAdvice, hold: float) -> SpeedAdvice:
+def _hold_rises(target: float, time: float, previous: SpeedAdvice, hold: float) -> SpeedAdvice:
     """Advice that goes to a target speed, upwards only after a hold time (`target` [m/s], `time` [s], `hold` [s])."""
     if target <= previous.speed:
         return SpeedAdvice(target)

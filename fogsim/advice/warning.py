@@ -17,7 +17,7 @@ class Delay(NamedTuple):
     hold: float
 
 
-DELAYS: Mapping[DriverWarning, Delay] = {
+_DELAYS: Mapping[DriverWarning, Delay] = {
     DriverWarning.CAMERA_DEGRADED: Delay(onset=0.8, hold=2.0),
     DriverWarning.FOG_AHEAD: Delay(onset=0.0, hold=5.0),
     DriverWarning.CANNOT_SEE: Delay(onset=3.0, hold=2.0),
@@ -29,20 +29,20 @@ that little is known of it, and at the edge of a bank both hold."""
 TAKE_OVER_TIME = 10.0
 """Time before a place at which its fog is warned of [s]: about what drivers need to take over from a system."""
 
-LIKELY, CAUTIOUS = 0.5, 0.25
+_LIKELY, _CAUTIOUS = 0.5, 0.25
 """Quantile of the believed visibility that must suffice to stop, and of the one that is watched for a fall [-]. Advice
 is careful with the lower one; drivers do not heed warnings that are often wrong."""
 
-EDGE = 3.0
+_EDGE = 3.0
 """Visibility of announced denser fog below which it is warned of, over the distance to stop [-]: what is seen of a bank
 is its thin edge. This and the next three were chosen by drives of `motorway_fog_bank` with seeds 101 … 106 and 20 km of
 visibility outside the bank, and 80 min in even fog."""
 
-FALL, LITTLE = 0.5, 2.0
+_FALL, _LITTLE = 0.5, 2.0
 """Part of its value of late to which the cautious visibility falls where fog begins, if it is also less than so many
 times the distance to stop [-]."""
 
-FADING = 10.0
+_FADING = 10.0
 """Time constant with which the visibility of late falls [s]."""
 
 
@@ -54,21 +54,21 @@ def choose_warning(
     Returns the warning, and what to remember. Takes `time` [s].
     """
     before = previous.warning_memory
-    cautious = belief.known_visibility(CAUTIOUS)
-    late = before.visibility * math.exp(-max(time - before.time, 0.0) / FADING)
+    cautious = belief.known_visibility(_CAUTIOUS)
+    late = before.visibility * math.exp(-max(time - before.time, 0.0) / _FADING)
     needed = stopping_sight_distance(observation.speed, REACTION_TIME, DECELERATION)
     reasons = {
         DriverWarning.CAMERA_DEGRADED: bool(observation.camera_trouble),
         DriverWarning.FOG_AHEAD: is_fog_in_the_way(belief, observation.speed)
-        or (cautious is not None and cautious < min(FALL * late, LITTLE * needed)),
+        or (cautious is not None and cautious < min(_FALL * late, _LITTLE * needed)),
         DriverWarning.CANNOT_SEE: cautious is None,
     }
     since = {one: before.since.get(one, time) for one, is_reason in reasons.items() if is_reason}
     # Clocks round: 0.8 s may be a hair less.
-    lasting = {one: time + DELAYS[one].hold for one in since if time - since[one] >= DELAYS[one].onset - 1e-9}
+    lasting = {one: time + _DELAYS[one].hold for one in since if time - since[one] >= _DELAYS[one].onset - 1e-9}
     until = {**before.until, **lasting}
     # What a graver warning covered is over with its reason.
-    given = (one for one in DELAYS if until.get(one, time) > time and (one in since or one is previous.warning))
+    given = (one for one in _DELAYS if until.get(one, time) > time and (one in since or one is previous.warning))
     return next(given, None), WarningMemory(time, since, until, max(late, min(cautious or 0.0, NO_FOG)))
 
 
@@ -83,17 +83,17 @@ def is_fog_in_the_way(belief: Belief, speed: float) -> bool:
     Takes `speed` [m/s].
     """
     needed = stopping_sight_distance(speed, REACTION_TIME, DECELERATION)
-    if belief.denser is not None and visibility_from_extinction(belief.denser.extinction) < EDGE * needed:
+    if belief.denser is not None and visibility_from_extinction(belief.denser.extinction) < _EDGE * needed:
         return True
     return any(seen < needed for seen in _likely_visibilities(belief, speed * TAKE_OVER_TIME))
 
 
 def _likely_visibilities(belief: Belief, reach: float) -> Iterator[float]:
     """Visibilities to act on [m]: of the fog that is seen, and at the places up to a distance ahead [m]."""
-    if (seen := belief.known_visibility(LIKELY)) is not None:
+    if (seen := belief.known_visibility(_LIKELY)) is not None:
         yield seen
     if belief.profile is None or belief.age > OLDEST:
         return
     for distance in belief.profile.distance.tolist():
-        if 0.0 <= distance <= reach and (there := belief.profile.known_visibility(distance, LIKELY)) is not None:
+        if 0.0 <= distance <= reach and (there := belief.profile.known_visibility(distance, _LIKELY)) is not None:
             yield there

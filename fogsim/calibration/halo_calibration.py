@@ -12,10 +12,10 @@ from fogsim.values import Camera, Lamp
 from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
 
-FOGS = (200.0, 100.0, 50.0)
+_FOGS = (200.0, 100.0, 50.0)
 """Visibilities of the fogs that must be distinguished from clear nights [m]."""
 
-EXPOSURES, STRENGTHS = (0.6, 1.6), (0.6, 1.6)
+_EXPOSURES, _STRENGTHS = (0.6, 1.6), (0.6, 1.6)
 """Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""
 
 Watch = Callable[[int, int], None]
@@ -26,7 +26,7 @@ _LIT = Lamp.POSITION | Lamp.LOW_BEAM
 _Values = tuple[float, float]  # mean Br50 and largest sharpness of a picture
 
 
-def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRENGTHS) -> NightScene:
+def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = _STRENGTHS) -> NightScene:
     """A night road on which at least one lamp is seen; `strengths` is the range of factors on intensities [-]."""
     vehicles = []
     if rng.random() < 0.6:
@@ -50,8 +50,8 @@ def measure_halo_threshold(
     with NightRoad(camera, glare=glare, seed=seed) as road:
         for number in range(scenes):
             rng = np.random.default_rng((seed, number))
-            scene, exposure = random_scene(rng), _between(rng, *EXPOSURES)
-            for visibility, radiance in zip((math.inf, *FOGS), road.radiances(scene, (math.inf, *FOGS)), strict=True):
+            scene, exposure = random_scene(rng), _between(rng, *_EXPOSURES)
+            for visibility, radiance in zip((math.inf, *_FOGS), road.radiances(scene, (math.inf, *_FOGS)), strict=True):
                 picture = road.photograph(radiance, exposure, rng)
                 halos = halos_of(source_tree(picture, camera.bits))
                 mean, largest = mean_steepness(halos), largest_sharpness(halos)

@@ -27,28 +27,28 @@ from fogsim.values.luminous_intensity import luminous_intensity
 Floats = NDArray[np.float64]
 Watch = Callable[[int, int], None]
 
-DRAWS, PATTERNS = 150, {True: 30, False: 150}
+_DRAWS, _PATTERNS = 150, {True: 30, False: 150}
 """How many draws are made, and how many different beams are among them, by whether the beam is known."""
 
-PITCH_DEVIATION, AIM_DEVIATION, APART_DEVIATION = np.radians((0.1, 0.2, 0.1))
+_PITCH_DEVIATION, _AIM_DEVIATION, _APART_DEVIATION = np.radians((0.1, 0.2, 0.1))
 """Standard deviations of the camera's pitch, of the aim of all lamps and of each lamp's own [rad]."""
 
-PATTERN_DEVIATION, HEIGHT_DEVIATION = 0.15, 0.04
+_PATTERN_DEVIATION, _HEIGHT_DEVIATION = 0.15, 0.04
 """Standard deviations of ln of a known beam's intensity, over some degrees [-], and of the height of lamps [m]."""
 
-RETROREFLECTION, AT = 0.015, 20.0
+_RETROREFLECTION, _AT = 0.015, 20.0
 """Luminance of dry asphalt over its illuminance across the beam [cd/m² per lx] (gallen2014), at this distance [m]."""
 
-EXPONENTS, STARTS = (0.0, 1.1), (0.3, 2.0)
+_EXPONENTS, _STARTS = (0.0, 1.1), (0.3, 2.0)
 """Powers of the distance by which that falls, and distances within which the bonnet hides the veil [m]."""
 
-LOSSES, KEPT_FORWARD = (0.2, 0.4), (0.7, 1.0)
+_LOSSES, _KEPT_FORWARD = (0.2, 0.4), (0.7, 1.0)
 """Parts of the extinction that spread light suffers (0.3 fits photons), and that light on its way to the road does."""
 
-CURVED, CURVATURE_DEVIATION = 0.5, 2.5e-4
+_CURVED, _CURVATURE_DEVIATION = 0.5, 2.5e-4
 """Share of the draws whose road curves upward or downward [-], and the standard deviation of that curvature [1/m]."""
 
-SPREAD_DEVIATION, GLOW_DEVIATION = 0.3, 0.5
+_SPREAD_DEVIATION, _GLOW_DEVIATION = 0.3, 0.5
 """Standard deviations of ln of how much light is spread, and of how much the lit road returns into the fog [-]."""
 
 
@@ -81,20 +81,20 @@ def lit_fog(
     cells, rng = cells_of(camera), np.random.default_rng(47)
     where = mount or LampMount()
     lit = own_head_lamps(lamps, camera.mount_height, setback, where)
-    veil = np.zeros((DRAWS, len(VISIBILITIES), len(cells.box)), np.float32)
-    road, depth = np.zeros_like(veil), np.zeros((DRAWS, len(cells.box)), np.float32)
+    veil = np.zeros((_DRAWS, len(VISIBILITIES), len(cells.box)), np.float32)
+    road, depth = np.zeros_like(veil), np.zeros((_DRAWS, len(cells.box)), np.float32)
     returned, low_beam = _road_glow(camera, cells, lit), where.beams.get(Lamp.LOW_BEAM)
     shown: list[HeadLamp] = []
     # A Latin hypercube: of as many independent draws the posterior would depend by a seventh on chance.
-    places = (rng.permuted(np.tile(np.arange(DRAWS), (len(_Draw._fields) + 1, 1)), axis=1) + 0.5) / DRAWS
-    for number in range(DRAWS):
-        if number % (DRAWS // PATTERNS[known]) == 0:
+    places = (rng.permuted(np.tile(np.arange(_DRAWS), (len(_Draw._fields) + 1, 1)), axis=1) + 0.5) / _DRAWS
+    for number in range(_DRAWS):
+        if number % (_DRAWS // _PATTERNS[known]) == 0:
             shown = _redrawn(lit, rng, None if known else low_beam)
         draw = _draw(rng, iter(places[:, number].tolist()), len(lit))
         veil[number], road[number], depth[number] = _light(camera, cells, shown, draw)
         veil[number] += draw.glow * returned
         if watch is not None:
-            watch(number + 1, DRAWS)
+            watch(number + 1, _DRAWS)
     return OwnLight(veil, road, depth)
 
 
@@ -113,16 +113,16 @@ def _draw(rng: np.random.Generator, place: Iterator[float], lamps: int) -> _Draw
     mixed = PhaseFunction(kinds[0].angle, np.asarray(value))
     phase = ScatteringPhase(phase_table(mixed), phase_table(blurred(mixed, PHASE_SPREAD)), SPREAD)
     return _Draw(
-        pitch=PITCH_DEVIATION * normal(),
-        aims=AIM_DEVIATION * np.array((normal(), normal())) + APART_DEVIATION * rng.standard_normal((lamps, 2)),
-        raised=HEIGHT_DEVIATION * normal(),
-        exponent=between(*EXPONENTS),
-        start=math.exp(between(*np.log(STARTS).tolist())),
-        loss=between(*LOSSES),
-        to_road=between(*KEPT_FORWARD),
-        spread=math.exp(SPREAD_DEVIATION * normal()),
-        glow=math.exp(GLOW_DEVIATION * normal()),
-        curvature=CURVATURE_DEVIATION * normal() * (next(place) < CURVED),
+        pitch=_PITCH_DEVIATION * normal(),
+        aims=_AIM_DEVIATION * np.array((normal(), normal())) + _APART_DEVIATION * rng.standard_normal((lamps, 2)),
+        raised=_HEIGHT_DEVIATION * normal(),
+        exponent=between(*_EXPONENTS),
+        start=math.exp(between(*np.log(_STARTS).tolist())),
+        loss=between(*_LOSSES),
+        to_road=between(*_KEPT_FORWARD),
+        spread=math.exp(_SPREAD_DEVIATION * normal()),
+        glow=math.exp(_GLOW_DEVIATION * normal()),
+        curvature=_CURVATURE_DEVIATION * normal() * (next(place) < _CURVED),
         phase=phase,
     )
 
@@ -144,7 +144,7 @@ def _changed(beam: Beam, rng: np.random.Generator) -> Beam:
     for _ in range(waves):
         across, along = rng.normal(0.0, 1.0 / math.radians(6.0)), rng.normal(0.0, 1.0 / math.radians(2.5))
         log += math.sqrt(2.0 / waves) * np.cos(across * right + along * up + rng.uniform(0.0, 2.0 * math.pi))
-    return Beam(beam.azimuth, beam.elevation, beam.intensity * np.exp(PATTERN_DEVIATION * log))
+    return Beam(beam.azimuth, beam.elevation, beam.intensity * np.exp(_PATTERN_DEVIATION * log))
 
 
 def _any_low_beam(rng: np.random.Generator) -> Beam:
@@ -220,7 +220,7 @@ def _lit_road(
     away = np.sqrt((there**2).sum(axis=1))
     intensity = luminous_intensity(beam, np.arctan2(-there[:, 1], there[:, 0]), np.arcsin(there[:, 2] / away))
     lights, distance = np.zeros(len(rays)), np.zeros(len(rays))
-    lights[on_road] = RETROREFLECTION * intensity / away**2 * (AT / away) ** exponent
+    lights[on_road] = _RETROREFLECTION * intensity / away**2 * (_AT / away) ** exponent
     distance[on_road] = away
     return lights, distance
 

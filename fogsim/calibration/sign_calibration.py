@@ -18,7 +18,7 @@ from fogsim.values import Camera, Observation
 VISIBILITIES = (50.0, 75.0, 100.0, 130.0, 170.0, 220.0, 280.0, 350.0, 430.0, 550.0, 800.0)
 """Visibilities at which the range is measured by default [m]."""
 
-KINDS = ("speed_limit", "stop", "pedestrian_crossing", "no_overtaking", "no_entry", "priority_road")
+_KINDS = ("speed_limit", "stop", "pedestrian_crossing", "no_overtaking", "no_entry", "priority_road")
 """Kinds of the signs, one after the other; none is a triangle, which the detector's authors exclude."""
 
 SHARE = 0.8
@@ -58,7 +58,7 @@ def measure_operating_range(
     watch(0, approaches)
     for number in range(approaches):
         rng = np.random.default_rng((seed, number))
-        sign = sign_beside("s", KINDS[number % len(KINDS)], reach, diameter, rng)
+        sign = sign_beside("s", _KINDS[number % len(_KINDS)], reach, diameter, rng)
         places = np.arange(rng.uniform(0.0, step), reach - _NEAREST, step)
         drive = SignDrive(part, (sign,), tuple(places.tolist()), noise, float(rng.choice(_LEVELS)), reach + 5.0)
         known = PoseDeviation(noise.position, heading=noise.heading, pitch=noise.pitch)

@@ -24,7 +24,7 @@ from fogsim.values import (
 SETBACK = 1.7
 """Distance of the camera behind the front bumper [m]."""
 
-SPEED = 20.0
+_SPEED = 20.0
 """Speed of the vehicle [m/s]."""
 
 
@@ -76,7 +76,7 @@ def observed(
             for visibility in visibilities:
                 light = foggy_radiance(view, pose, true, extinction_from_visibility(visibility))
                 image = expose(light, sensor, stated.response, rng).astype(np.uint8)
-                seen[visibility] = Observation(Frame(x / SPEED, image, stated), SPEED, None, signs, SETBACK)
+                seen[visibility] = Observation(Frame(x / _SPEED, image, stated), _SPEED, None, signs, SETBACK)
             yield seen
     finally:
         renderer.close()

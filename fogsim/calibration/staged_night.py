@@ -27,10 +27,10 @@ SETBACK = 1.7
 DARK = 1e-4
 """Horizontal illuminance of the sky: an overcast night without a moon [lx]."""
 
-CLEAR = 1e-6
+_CLEAR = 1e-6
 """Extinction coefficient of a clear night [1/m]."""
 
-AUTOMATIC = AutoExposure(Metering.HIGHLIGHTS, 0.6, 0.0, 1e5, 100.0, 4.0)
+_AUTOMATIC = AutoExposure(Metering.HIGHLIGHTS, 0.6, 0.0, 1e5, 100.0, 4.0)
 """As scenarios have it, but that it follows at once."""
 
 GLARE = 0.01
@@ -79,7 +79,7 @@ class NightRoad:
         self.camera, self._glare = camera, LensGlare(camera, glare) if glare > 0 else None
         self._signs, self._seed = signs, seed
         self._drawn: dict[bool, tuple[Renderer, NDArray[np.float64]]] = {}
-        self._air = Air(FogField(CLEAR, (0.0, 0.0, 0.0)), droplets)
+        self._air = Air(FogField(_CLEAR, (0.0, 0.0, 0.0)), droplets)
 
     def __enter__(self) -> Self:
         return self
@@ -114,15 +114,15 @@ class NightRoad:
         lights = Lights(own, _scaled(others, scene.strength), streets)
         out = []
         for visibility in visibilities:
-            self._air.field = FogField(max(extinction_from_visibility(visibility), CLEAR), (1e-5, 1e-5, 1e-5))
+            self._air.field = FogField(max(extinction_from_visibility(visibility), _CLEAR), (1e-5, 1e-5, 1e-5))
             out.append(self._air.radiance(view, camera, pose, lights))
         return out
 
     def photograph(self, radiance: NDArray[np.float32], exposure: float, rng: np.random.Generator) -> Pixels:
         """Take a picture of a radiance [cd/m²] at an exposure relative to the automatic one [-]."""
-        saturation = saturation_for(metered_luminance(radiance, AUTOMATIC.metering), AUTOMATIC) / exposure
+        saturation = saturation_for(metered_luminance(radiance, _AUTOMATIC.metering), _AUTOMATIC) / exposure
         sensor = Sensor(saturation, bits=self.camera.bits, black_level=self.camera.black_level)
-        sensor = sensor_at(sensor, saturation, AUTOMATIC)
+        sensor = sensor_at(sensor, saturation, _AUTOMATIC)
         light = radiance if self._glare is None else self._glare.scatter(radiance, saturation)
         return expose(light, sensor, self.camera.response, rng)
 

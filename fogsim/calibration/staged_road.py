@@ -28,10 +28,10 @@ from fogsim.values.pinhole import ray_from_pixel
 
 ILLUMINANCE = 10_000.0  # [lx] an overcast day
 AIRLIGHT = 3000.0  # [cd/m²] near E/π, that of a white horizontal surface under it
-LAYER = 250.0
+_LAYER = 250.0
 """Height of a layer of fog [m]."""
 
-NOISELESS = Sensor(saturation_luminance=AIRLIGHT, full_well=1e9, read_noise=0.0)
+_NOISELESS = Sensor(saturation_luminance=AIRLIGHT, full_well=1e9, read_noise=0.0)
 """A sensor that the airlight fills: pixel value 255."""
 
 _LENGTH, _WIDTH = 1500.0, 3.5  # of the lanes [m]
@@ -118,7 +118,7 @@ def foggy_radiance(
     if albedo is None:
         fog = FogField(extinction, (AIRLIGHT,) * 3)
     else:
-        fog = FogField(extinction, airlight_from_illuminance(ILLUMINANCE, airlight_share(albedo)), top=LAYER)
+        fog = FogField(extinction, airlight_from_illuminance(ILLUMINANCE, airlight_share(albedo)), top=_LAYER)
         fog = replace(fog, ground_albedo=albedo)
     return fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose), droplets)
 
@@ -126,4 +126,4 @@ def foggy_radiance(
 def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.uint8]:
     """Image of a view in homogeneous fog, the airlight at pixel value 255, without noise."""
     radiance = foggy_radiance(view, pose, camera, extinction)
-    return expose(radiance, NOISELESS, camera.response, np.random.default_rng(0)).astype(np.uint8)
+    return expose(radiance, _NOISELESS, camera.response, np.random.default_rng(0)).astype(np.uint8)

@@ -26,13 +26,13 @@ from fogsim.values.pinhole import ray_from_pixel
 PUBLISHED_VISIBILITIES = (15.0, 50.0, 100.0, 200.0, 500.0, math.inf)
 """Those of gallen2014's simulated references [m] (figure 12)."""
 
-LOG_SPACED_VISIBILITIES = (*np.geomspace(12.0, 1500.0, 20).tolist(), math.inf)
+_LOG_SPACED_VISIBILITIES = (*np.geomspace(12.0, 1500.0, 20).tolist(), math.inf)
 """References in equal steps of ln V, and a clear night [m]."""
 
-RETROREFLECTION = 0.015
+_RETROREFLECTION = 0.015
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
 
-VEIL_SAMPLES, ROAD_SAMPLES = 8, 8
+_VEIL_SAMPLES, _ROAD_SAMPLES = 8, 8
 """Directions across and along a cell in which veil and road are looked at: far away neither is smooth in a cell."""
 
 
@@ -41,7 +41,7 @@ _FARTHEST = 1000.0
 
 
 def compute_references(
-    camera: Camera, lamps: Lamp, setback: float, visibilities: Sequence[float] = LOG_SPACED_VISIBILITIES
+    camera: Camera, lamps: Lamp, setback: float, visibilities: Sequence[float] = _LOG_SPACED_VISIBILITIES
 ) -> VeilReferences:
     """Draw references of a car's lamps by the night model in moderate radiation fog; visibilities rise [m]."""
     cells = camera_of_cells(camera)
@@ -52,16 +52,16 @@ def compute_references(
 
 
 def _veil(cells: Camera, lit: tuple[HeadLamp, ...], extinction: float) -> NDArray[np.float64]:
-    camera, pose = _finer(cells, VEIL_SAMPLES), _pose(cells)
+    camera, pose = _finer(cells, _VEIL_SAMPLES), _pose(cells)
     air = Air(FogField(extinction, (0.0, 0.0, 0.0)), Droplets.MODERATE_RADIATION)
     view = flat_road(camera, pose, response=0.0)
-    return _means(air.radiance(view, camera, pose, Lights(lit, LightSources.none()))[:, :, 1], VEIL_SAMPLES)
+    return _means(air.radiance(view, camera, pose, Lights(lit, LightSources.none()))[:, :, 1], _VEIL_SAMPLES)
 
 
 def _roads(cells: Camera, lit: tuple[HeadLamp, ...], extinctions: Sequence[float]) -> NDArray[np.float64]:
     """The road as on a clear night, and as the fog dims it on the light's ways to it and back."""
-    camera, pose = _finer(cells, ROAD_SAMPLES), _pose(cells)
-    view = flat_road(camera, pose, RETROREFLECTION)
+    camera, pose = _finer(cells, _ROAD_SAMPLES), _pose(cells)
+    view = flat_road(camera, pose, _RETROREFLECTION)
     clear = Air(FogField(0.0, (0.0, 0.0, 0.0))).radiance(view, camera, pose, Lights(lit, LightSources.none()))[:, :, 1]
     seen = view.distance < _FARTHEST
     there = view.distance[seen].astype(np.float64)
@@ -72,7 +72,7 @@ def _roads(cells: Camera, lit: tuple[HeadLamp, ...], extinctions: Sequence[float
     for extinction in extinctions:
         dimmed = np.zeros(view.distance.shape)
         dimmed[seen] = clear[seen] * np.exp(-extinction * way)
-        roads.append(_means(dimmed, ROAD_SAMPLES))
+        roads.append(_means(dimmed, _ROAD_SAMPLES))
     return np.array(roads)
 
 

@@ -16,13 +16,13 @@ from fogsim.values.camera_response import respond
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 """Pixel values: of 8 bits, or of 10 or 12 in 16."""
 
-RESPONSE_STEPS = {8: 1 << 13, 10: 1 << 15, 12: 1 << 17}
+_RESPONSE_STEPS = {8: 1 << 13, 10: 1 << 15, 12: 1 << 17}
 """Resolution of the response table by bit depth: finer than a level even in the steepest part of the sRGB curve."""
 
-SAMPLES = 2400
+_SAMPLES = 2400
 """About as many pixels as are metered, evenly spread: every 121st of a 640 × 480 image."""
 
-HIGHLIGHT_SHARE = 0.95
+_HIGHLIGHT_SHARE = 0.95
 """Quantile of luminance that `Metering.HIGHLIGHTS` goes by: bright surfaces and sky, yet not the lamps among them."""
 
 _DARKEST_METERED = 1e-4
@@ -90,7 +90,7 @@ def response_table(response: Response, bits: int = 8) -> Pixels:
 
     Returns read-only.
     """
-    exposure = np.linspace(0.0, 1.0, RESPONSE_STEPS[bits] + 1)
+    exposure = np.linspace(0.0, 1.0, _RESPONSE_STEPS[bits] + 1)
     levels = np.round((2**bits - 1) * respond(exposure, response))
     table: Pixels = levels.astype(np.uint8) if bits == 8 else levels.astype(np.uint16)
     table.setflags(write=False)
@@ -120,11 +120,11 @@ class AutoExposure:
 def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> float:
     """Luminance that stands for a picture [cd/m²] (`radiance` (rows, cols, 3) [cd/m²])."""
     rows, cols = radiance.shape[:2]
-    stride = max(1, round(math.sqrt(rows * cols / SAMPLES)))
+    stride = max(1, round(math.sqrt(rows * cols / _SAMPLES)))
     samples = np.empty((rows // stride, cols // stride), np.float32)
     luminance_samples(np.ascontiguousarray(radiance, dtype=np.float32), stride, samples)
     if metering is Metering.HIGHLIGHTS:
-        place = int(HIGHLIGHT_SHARE * (samples.size - 1))
+        place = int(_HIGHLIGHT_SHARE * (samples.size - 1))
         return float(np.partition(samples.ravel(), place)[place])
     return math.exp(float(np.mean(np.log(np.maximum(samples, _DARKEST_METERED, dtype=np.float64)))))
 

@@ -13,10 +13,10 @@ _MEAN, _FIRST, _THIRD, _FIFTH = 510.0, 6.5477767300336385e-3, 1.2394842240073496
 """What makes the sum of four evenly distributed bytes, less its mean, a normal deviate: an odd polynomial fitted to the
 quantiles of both, of variance 1 and kurtosis 2.997; its distribution is within 0.0008 of the normal one everywhere."""
 
-BLOCK = 1024
+_BLOCK = 1024
 """Samples that go through the stages together: few enough for their buffers to stay in the nearest cache."""
 
-MOST_EXPOSURE = np.float32(4.0)
+_MOST_EXPOSURE = np.float32(4.0)
 """Exposure to which light is clipped before the noise, relative to saturation: beyond any doubt that it saturates."""
 
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
@@ -53,17 +53,17 @@ def develop(
     black_level = exposure.black_level
     top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
     zero, one = np.float32(0.0), np.float32(1.0)
-    index = np.empty(BLOCK, np.uint32)
+    index = np.empty(_BLOCK, np.uint32)
     mean, first, third, fifth = np.float32(_MEAN), np.float32(_FIRST), np.float32(_THIRD), np.float32(_FIFTH)
-    for start in range(begin, end, BLOCK):
-        count = min(BLOCK, end - start)
+    for start in range(begin, end, _BLOCK):
+        count = min(_BLOCK, end - start)
         light, pixels = luminance[start : start + count], out[start : start + count]
         _hash_counters(np.uint32(start), count, exposure.first_key, exposure.second_key, index)
         for i in range(count):
             signal = light[i] * gain
             # Written so that what is not a number counts as black, and never as an index into nowhere.
             signal = signal if signal > zero else zero
-            signal = signal if signal < MOST_EXPOSURE else MOST_EXPOSURE
+            signal = signal if signal < _MOST_EXPOSURE else _MOST_EXPOSURE
             pairs = (index[i] & np.uint32(0x00FF00FF)) + ((index[i] >> np.uint32(8)) & np.uint32(0x00FF00FF))
             off = np.float32(np.int32((pairs & np.uint32(0xFFFF)) + (pairs >> np.uint32(16)))) - mean
             square = off * off

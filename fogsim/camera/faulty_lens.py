@@ -15,16 +15,16 @@ from fogsim.values.pinhole import camera_axes
 
 Floats = NDArray[np.float64]
 
-GLASS_DISTANCE = 0.05
+_GLASS_DISTANCE = 0.05
 """From the entrance pupil to the glass along the axis [m]; assumed, for a camera close behind a windscreen."""
 
-PUPIL_DIAMETER = 0.003
+_PUPIL_DIAMETER = 0.003
 """Of the entrance pupil [m]: a focal length of 6 mm at F/2, assumed."""
 
-SIZE_SPREAD = 0.5
+_SIZE_SPREAD = 0.5
 """Standard deviation of the logarithm of blots' diameters [-], assumed."""
 
-PUPIL = 0.5 * PUPIL_DIAMETER / GLASS_DISTANCE
+PUPIL = 0.5 * _PUPIL_DIAMETER / _GLASS_DISTANCE
 """Radius of the pupil as the glass has it, in distances of the glass [-]."""
 
 
@@ -48,18 +48,18 @@ class _BlotPixels(NamedTuple):
 
 def scattered_blots(camera: Camera, coverage: float, diameter: float, rng: np.random.Generator) -> Blots:
     """Blots at random all over the glass (`diameter` [m])."""
-    usual = 0.5 * diameter / GLASS_DISTANCE
+    usual = 0.5 * diameter / _GLASS_DISTANCE
     margin = PUPIL + 3.0 * usual
     (u0, v0), focal = camera.principal_point, camera.focal_length
     left, right = -u0 / focal - margin, (camera.width - u0) / focal + margin
     top, bottom = -v0 / focal - margin, (camera.height - v0) / focal + margin
     # The mean square of a log-normal diameter is its median's times e^(2σ²).
-    mean_area = math.pi * usual**2 * math.exp(2.0 * SIZE_SPREAD**2)
+    mean_area = math.pi * usual**2 * math.exp(2.0 * _SIZE_SPREAD**2)
     count = round(coverage * (right - left) * (bottom - top) / mean_area)
     return Blots(
         rng.uniform(left, right, count),
         rng.uniform(top, bottom, count),
-        usual * np.exp(SIZE_SPREAD * rng.normal(size=count)),
+        usual * np.exp(_SIZE_SPREAD * rng.normal(size=count)),
     )
 
 
@@ -111,10 +111,10 @@ def shared_area(distance: Floats, one: float, other: float) -> Floats:
 
 Floats32 = NDArray[np.float32]
 
-DROP_VIEW = math.radians(165.0)
+_DROP_VIEW = math.radians(165.0)
 """Field of view of a drop of water (Garg and Nayar 2003, Photometric model of a rain drop) [rad]."""
 
-CELL = 16
+_CELL = 16
 """Rows and columns of the picture that count as one where drops show it small [px]."""
 
 STEP = 4
@@ -192,7 +192,7 @@ def _shown_by(drops: Blots, camera: Camera, margin: int) -> tuple[NDArray[np.boo
         across = np.where(here, np.clip((x - right) / radius, -1.0, 1.0), across)
         along = np.where(here, np.clip((y - down) / radius, -1.0, 1.0), along)
     rows, columns = (
-        np.clip(centre - focal * np.tan(0.5 * DROP_VIEW * offset[inside]), 0.0, size - 1.0) / CELL - 0.5
+        np.clip(centre - focal * np.tan(0.5 * _DROP_VIEW * offset[inside]), 0.0, size - 1.0) / _CELL - 0.5
         for offset, centre, size in ((along, v0, camera.height), (across, u0, camera.width))
     )
     return inside, (rows, columns)
@@ -200,8 +200,8 @@ def _shown_by(drops: Blots, camera: Camera, margin: int) -> tuple[NDArray[np.boo
 
 def _cells(radiance: Floats32) -> Floats:
     """Means of squares of the picture (rows, cols, 3), as far as they are whole."""
-    rows, columns = (max(size // CELL, 1) for size in radiance.shape[:2])
-    used = radiance[: rows * CELL, : columns * CELL].astype(np.float64)
+    rows, columns = (max(size // _CELL, 1) for size in radiance.shape[:2])
+    used = radiance[: rows * _CELL, : columns * _CELL].astype(np.float64)
     means = used.reshape(rows, used.shape[0] // rows, columns, used.shape[1] // columns, 3).mean(axis=(1, 3))
     return np.asarray(means)
 
@@ -224,17 +224,17 @@ def _smoothed(values: Any, deviation: Any, **options: Any) -> Any:
     return import_module("scipy.ndimage").gaussian_filter(values, deviation, **options)
 
 
-SUN_RADIUS = math.radians(0.267)
+_SUN_RADIUS = math.radians(0.267)
 """Half the angle that the sun is seen under [rad]."""
 
-NEAR_SCATTER = 1.0
+_NEAR_SCATTER = 1.0
 """Veil of a clean windscreen at 1° from a source, falling with the square of the angle [cd/m² per lx]: a tenth of that
 of the eye (CIE 146: 10), assumed."""
 
-NEAREST_SCATTER = math.radians(0.5)
+_NEAREST_SCATTER = math.radians(0.5)
 """Angle within which it grows no more [rad], assumed."""
 
-FAR_SCATTER = 0.4 * 561.0 / 88_900.0
+_FAR_SCATTER = 0.4 * 561.0 / 88_900.0
 """Veil of windscreens far from the sun, as the mean of 18 cars had it [cd/m² per lx]: of 561 cd/m² at 88 900 lx 40 %
 were scattered (Mefford and Flannagan 2003, UMTRI-2003-36)."""
 
@@ -259,10 +259,10 @@ class SunGlare:
         x = (np.arange(camera.width) - u0) / focal
         y = ((np.arange(camera.height) - v0) / focal)[:, None]
         angle = np.arccos(np.clip((x * right + y * down + ahead) / np.sqrt(1.0 + x**2 + y**2), -1.0, 1.0))
-        degrees = np.degrees(np.maximum(angle, NEAREST_SCATTER))
-        veil = glare.haze * (NEAR_SCATTER / degrees**2 + FAR_SCATTER)
+        degrees = np.degrees(np.maximum(angle, _NEAREST_SCATTER))
+        veil = glare.haze * (_NEAR_SCATTER / degrees**2 + _FAR_SCATTER)
         # The border of the disc is as wide as a pixel.
-        disc = np.clip((SUN_RADIUS - angle) * focal + 0.5, 0.0, 1.0) / (math.pi * SUN_RADIUS**2)
+        disc = np.clip((_SUN_RADIUS - angle) * focal + 0.5, 0.0, 1.0) / (math.pi * _SUN_RADIUS**2)
         self._added: Floats32 = (glare.illuminance * (veil + disc)).astype(np.float32)[..., None]
 
     def look_through(self, radiance: Floats32) -> Floats32:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
 
-PACKAGES = ("fogsim.vision.", "fogsim.estimators.", "fogsim.fusion.")
+_PACKAGES = ("fogsim.vision.", "fogsim.estimators.", "fogsim.fusion.")
 """Modules whose kernels the other process compiles."""
 
 _ENDS_WITHIN = 5.0
@@ -45,7 +45,7 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
                 # It has nothing to do in this run, however long the run is.
                 _end(process)
                 return
-            stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, PACKAGES))
+            stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, _PACKAGES))
             _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
 
         yield send
@@ -98,7 +98,7 @@ def _is_first() -> bool:
     from fogsim.core.jit import is_kept, processors
 
     # Everything that the methods use was imported with them.
-    modules = [module for name, module in tuple(sys.modules.items()) if name.startswith(PACKAGES)]
+    modules = [module for name, module in tuple(sys.modules.items()) if name.startswith(_PACKAGES)]
     kept = [is_kept(value) for module in modules for value in vars(module).values()]
     return processors() > 1 and False in kept and True not in kept
 

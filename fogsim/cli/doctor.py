@@ -13,7 +13,7 @@ from fogsim.cli.compile import compile_command
 from fogsim.cli.printing import escape, stdout
 from fogsim.errors import FogSimError
 
-PACKAGES = (
+_PACKAGES = (
     "fogsim",
     "libsumo",
     "pyrender",
@@ -57,7 +57,7 @@ def doctor_command(
 def examine() -> list[Finding]:
     """Check Python, packages, SUMO, the renderers and the video encoder."""
     findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
-    findings += [_package(name) for name in PACKAGES]
+    findings += [_package(name) for name in _PACKAGES]
     findings += [_try("SUMO", _sumo), _try("renderer opengl", _gl), _try("renderer cpu", _cpu)]
     findings += [_try("renderer auto", _auto), _try("video encoder", _ffmpeg)]
     return findings

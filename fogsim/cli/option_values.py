@@ -12,7 +12,7 @@ from typer.models import ArgumentInfo, OptionInfo
 from fogsim.cli.printing import BAD_INPUT, print_error
 from fogsim.errors import InputError, shown
 
-LARGEST = 2**63 - 1
+_LARGEST = 2**63 - 1
 """Bound of numbers whose option has none, like that of seeds in scenario files."""
 
 
@@ -72,8 +72,8 @@ def _text_parser(kind: type[Path] | type[str], name: str, expected: str) -> Call
 
 
 def _number_parser(kind: type[int] | type[float], name: str, info: OptionInfo | ArgumentInfo) -> Callable[[Any], float]:
-    least = -LARGEST if info.min is None else info.min
-    most = LARGEST if info.max is None else info.max
+    least = -_LARGEST if info.min is None else info.min
+    most = _LARGEST if info.max is None else info.max
     expected = f"a whole number from {least} to {most}" if kind is int else f"a number from {least:g} to {most:g}"
 
     def parse(given: Any) -> float:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _UNBROKEN = 200  # wider than any table [characters]
 
-ALL = "all"
+_ALL = "all"
 """Represents every paper."""
 
 
@@ -39,11 +39,11 @@ def reproduce_command(
     from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.reproduce import REPRODUCTIONS
 
-    if paper != ALL and paper not in REPRODUCTIONS:
-        raise UnknownNameError("paper", paper, [*REPRODUCTIONS, ALL])
-    if paper == ALL and table is not None:
-        raise InputError(f"--table {table} needs one paper, not {ALL}")
-    papers = REPRODUCTIONS if paper == ALL else (paper,)
+    if paper != _ALL and paper not in REPRODUCTIONS:
+        raise UnknownNameError("paper", paper, [*REPRODUCTIONS, _ALL])
+    if paper == _ALL and table is not None:
+        raise InputError(f"--table {table} needs one paper, not {_ALL}")
+    papers = REPRODUCTIONS if paper == _ALL else (paper,)
     if out is not None:
         refuse_unwritable_folder(out)
         for name in papers:

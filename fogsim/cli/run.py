@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario
     from fogsim.simulation.recording import RecordedRun
 
-SHOWN = {
+_SHOWN = {
     "distance_m": ("distance driven", "m"),
     "mean_speed_mps": ("mean speed", "m/s"),
     "collisions": ("collisions of all vehicles", ""),
@@ -48,7 +48,7 @@ SHOWN = {
 }
 """Metrics that the summary shows, with their wording and unit; metrics.json and the report have all of them."""
 
-SHOWN_OF_TRAFFIC = {
+_SHOWN_OF_TRAFFIC = {
     "duration_s": ("simulated time", "s"),
     "traffic_vehicle_time_s": ("time of all vehicles together", "s"),
     "traffic_mean_speed_mps": ("mean speed", "m/s"),
@@ -142,7 +142,7 @@ def run_command(
                 command_line=["fogsim", *sys.argv[1:]],
                 watch=progress.show,
             )
-    _print_result(result, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
+    _print_result(result, _SHOWN if loaded.traffic.has_ego else _SHOWN_OF_TRAFFIC)
     if result.ending is None:
         raise typer.Exit(INTERRUPTED)
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fogsim.testing import FileOutcome, FogTest
     from fogsim.testing.artefacts import Kept
 
-NOTHING_COLLECTED = 5
+_NOTHING_COLLECTED = 5
 """Exit code without tests, as in pytest."""
 
 _COLOURS = {"passed": "green", "failed": "red", "inconclusive": "yellow", "error": "red"}
@@ -105,7 +105,7 @@ def _asked_for(
     tests = only_cases(tests, noted) or tests
     if not tests:
         stdout.print(f"No tests: none of {len(found)} files expects anything that was asked for.")
-        raise typer.Exit(NOTHING_COLLECTED)
+        raise typer.Exit(_NOTHING_COLLECTED)
     return tests
 
 

@@ -39,7 +39,7 @@ _AGAIN = re.compile(r"(and|or|not|for|delayed)\b")
 OPERATORS = ("<", "<=", ">", ">=", "==", "!=")
 """Operators of comparisons."""
 
-MOST_CHARACTERS = 1000
+_MOST_CHARACTERS = 1000
 """Longest condition that is read."""
 
 DEEPEST = 20
@@ -115,8 +115,8 @@ class _Text:
     """Parses one text."""
 
     def __init__(self, text: str) -> None:
-        if len(text) > MOST_CHARACTERS:
-            raise ValueError(f"a condition has at most {MOST_CHARACTERS} characters, got {shown(text)}")
+        if len(text) > _MOST_CHARACTERS:
+            raise ValueError(f"a condition has at most {_MOST_CHARACTERS} characters, got {shown(text)}")
         self._text, self._at, self._depth = text, 0, 0
 
     def condition(self) -> Condition:

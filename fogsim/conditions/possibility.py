@@ -29,16 +29,16 @@ from fogsim.conditions.watching import shown_value
 Limits = Mapping[str, tuple[float, float]]
 """Least and greatest possible values of signals in one run, by their keys in `SIGNALS`, in SI units."""
 
-NO_LIMITS: Limits = {}
+_NO_LIMITS: Limits = {}
 
-MOST_CASES = 20_000
+_MOST_CASES = 20_000
 """Maximum number of combinations; a condition with more counts as possibly true and possibly false."""
 
 _OTHER = "\0"
 """A word that represents all unnamed ones."""
 
 
-def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool]:
+def outcomes(condition: Condition, limits: Limits = _NO_LIMITS) -> frozenset[bool]:
     """Values that a condition can have in some run: true, false or both; `limits` narrow the ranges of signals.
 
     Each signal takes every value that makes a difference to the condition; signals are assumed to be independent.
@@ -47,7 +47,7 @@ def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool
     values = {signal: list(_values(signal, asked, limits)) for signal in _measured(asked)}
     free = {part: list(_free(part, limits)) for part in parts_of(condition) if _is_free(part)}
     sizes = [*(len(those) for those in values.values()), *(len(those) for those in free.values())]
-    if math.prod(sizes) > MOST_CASES:
+    if math.prod(sizes) > _MOST_CASES:
         return frozenset({True, False})
     return frozenset(
         _evaluated(condition, dict(zip(values, case, strict=True)), dict(zip(free, known, strict=True)))
@@ -56,7 +56,7 @@ def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool
     )
 
 
-def pointless_parts(condition: Condition, limits: Limits = NO_LIMITS, ego: str = EGO) -> Iterator[str]:
+def pointless_parts(condition: Condition, limits: Limits = _NO_LIMITS, ego: str = EGO) -> Iterator[str]:
     """Parts of a condition that compare a signal with itself or can never be true, with the reason."""
     for reference in signals_of(condition):
         vehicles = [EGO if name == ego else name for name in vehicles_of(reference)]

@@ -15,22 +15,22 @@ from fogsim.units import KMH_PER_MPS
 from fogsim.units.quantities import parse_quantity
 from fogsim.values import DriverWarning, Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step
 
-FASTEST = 500.0 / KMH_PER_MPS
+_FASTEST = 500.0 / KMH_PER_MPS
 """No vehicle drives faster [m/s]."""
 
-HARDEST = 100.0
+_HARDEST = 100.0
 """Limit of accelerations, collisions included [m/s²]."""
 
 NO_LEADER = "none"
 """Value of ``ego.leader`` without a vehicle ahead."""
 
-LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
+_LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
 """Lamps by their words."""
 
-NO_WARNING = "none"
+_NO_WARNING = "none"
 """Value of ``warning`` while the driver is warned of nothing."""
 
-ENDING_WORDS = tuple(ending.name.lower() for ending in Ending)
+_ENDING_WORDS = tuple(ending.name.lower() for ending in Ending)
 """Endings of a run by their words."""
 
 _Read = TypeVar("_Read", float, str)
@@ -233,7 +233,7 @@ _OF_RUN = {
         "why the run is over; no value while it goes on",
         lambda m: None if m.step.ending is None else m.step.ending.name.lower(),
         Kind.WORD,
-        words=ENDING_WORDS,
+        words=_ENDING_WORDS,
     ),
     "collisions": Signal(
         "pairs of vehicles, or of a vehicle and a person, that have collided so far",
@@ -261,13 +261,13 @@ _OF_VEHICLES = {
         Kind.FLAG,
         places=_VEHICLE,
     ),
-    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.traffic.speed[i])), most=FASTEST, places=_VEHICLE),
+    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.traffic.speed[i])), most=_FASTEST, places=_VEHICLE),
     "X.acceleration": Signal(
         "acceleration along the heading",
         _of_vehicle(lambda m, i: float(m.traffic.acceleration[i])),
         unit="m/s^2",
-        least=-HARDEST,
-        most=HARDEST,
+        least=-_HARDEST,
+        most=_HARDEST,
         places=_VEHICLE,
     ),
     "X.position": Signal(
@@ -285,7 +285,7 @@ _OF_VEHICLES = {
         words=("right", "left"),
         places=_VEHICLE,
     ),
-    "X.lamps": Signal("lamps that are lit", _lamps, Kind.WORDS, words=LAMP_WORDS, places=_VEHICLE),
+    "X.lamps": Signal("lamps that are lit", _lamps, Kind.WORDS, words=_LAMP_WORDS, places=_VEHICLE),
     "X.advice": _speed(
         "lowest speed in force that the driver has heard advised; inf for none", _of_vehicle(_heard), places=_VEHICLE
     ),
@@ -335,8 +335,8 @@ _OF_PAIRS_BEYOND = {
         _speed_difference,
         unit="m/s",
         shown_unit="km/h",
-        least=-FASTEST,
-        most=FASTEST,
+        least=-_FASTEST,
+        most=_FASTEST,
         places=_PAIR,
     ),
     "headway(X, Y, LENGTH)": Signal(
@@ -402,13 +402,13 @@ _OF_EGO = {
     "advice": _speed("advised speed in force: the ego's; without one, the lowest anywhere; inf for none", _advice),
     "limit": _speed("speed limit where the ego is; inf off the lanes", _of_step(lambda s: s.speed_limit), needs=_EGO),
     "lamps": Signal(
-        "lamps of the ego that are lit", lambda m: _lamps(m, "ego"), Kind.WORDS, words=LAMP_WORDS, needs=_EGO
+        "lamps of the ego that are lit", lambda m: _lamps(m, "ego"), Kind.WORDS, words=_LAMP_WORDS, needs=_EGO
     ),
     "warning": Signal(
         "what the ego's driver is warned of; `none` for nothing",
-        _of_step(lambda s: NO_WARNING if s.command.warning is None else s.command.warning.value),
+        _of_step(lambda s: _NO_WARNING if s.command.warning is None else s.command.warning.value),
         Kind.WORD,
-        words=(NO_WARNING, *(one.value for one in DriverWarning)),
+        words=(_NO_WARNING, *(one.value for one in DriverWarning)),
         needs=_FRAMES,
     ),
 }

@@ -14,7 +14,7 @@ from typing import Self
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that ask a program to end."""
 
-ENDING_TIME = 3.0
+_ENDING_TIME = 3.0
 """Time within which a second signal does not cut off what the first one has ended [s]."""
 
 _PATIENCE = 1.5
@@ -142,7 +142,7 @@ class Interruption:
 
     def _take(self, signum: int, _: FrameType | None) -> None:
         # Who is impatient presses twice, and what the first one ends must be able to end.
-        if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
+        if self._allowed and time.monotonic() - self._raised > _ENDING_TIME:
             self._let_through(signum)
         else:
             self._waiting = signum

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 
-LEAST_PIVOT = 1e-14
+_LEAST_PIVOT = 1e-14
 """Share of a diagonal element below which what others leave of it counts as nothing [-]."""
 
 
@@ -52,7 +52,7 @@ def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     count = len(matrix)
     swept, left = matrix.copy(), np.ones(count, np.bool_)
     for _ in range(count):
-        pivot, largest = -1, LEAST_PIVOT
+        pivot, largest = -1, _LEAST_PIVOT
         for i in range(count):
             # Relative to what it was, so that units do not matter.
             if left[i] and swept[i, i] > largest * matrix[i, i]:

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-CLUSTERS = 3
+_CLUSTERS = 3
 """Too large, too small, and right (section 4.3)."""
 
 _ROUNDS = 50
 
 
-def majority(values: Sequence[float], weights: Sequence[float], clusters: int = CLUSTERS) -> NDArray[np.bool_]:
+def majority(values: Sequence[float], weights: Sequence[float], clusters: int = _CLUSTERS) -> NDArray[np.bool_]:
     """Which values are in the weightiest of some clusters, by weighted k-means on a line.
 
     Returns all of them, where there are no more than clusters: there is no majority among three (n,) bool.

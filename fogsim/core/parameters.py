@@ -57,11 +57,11 @@ class Range:
         return f"{ends} {self.unit}".rstrip()
 
 
-FINITE = Range()
+_FINITE = Range()
 NUMBER = Range(-math.inf, math.inf)
 NUMBER_OR_NAN = Range(-math.inf, math.inf, or_nan=True)
 
-_UNNAMED_RANGES = {FINITE: ", finite", NUMBER: "", NUMBER_OR_NAN: ""}
+_UNNAMED_RANGES = {_FINITE: ", finite", NUMBER: "", NUMBER_OR_NAN: ""}
 
 
 def checked_parameters(target: C) -> C:
@@ -202,7 +202,7 @@ def check_of(annotation: Any, *, classes: bool) -> Check | None:
     `classes` includes instances of classes, arrays and callables.
     """
     origin, parts = get_origin(annotation), get_args(annotation)
-    check = _plain_check(annotation, FINITE)
+    check = _plain_check(annotation, _FINITE)
     if origin in (Union, UnionType):
         check = _union_check([check_of(part, classes=classes) for part in parts])
     elif origin is Literal:
@@ -294,7 +294,7 @@ def _plain_check(kind: object, interval: Range) -> Check | None:
     if kind is float:
         return _number_check(float, Real, interval, f"a number{within}")
     if kind is int:
-        return _number_check(int, Integral, interval, f"a whole number{'' if interval is FINITE else within}")
+        return _number_check(int, Integral, interval, f"a whole number{'' if interval is _FINITE else within}")
     for plain, expected in ((bool, "true or false"), (str, "text"), (NoneType, "nothing")):
         if kind is plain:
             return _instance_check((plain, np.bool_) if plain is bool else (plain,), expected)

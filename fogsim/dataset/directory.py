@@ -18,7 +18,7 @@ from fogsim.dataset.encoding import png
 from fogsim.errors import InputError, shown
 
 IDENTITY = "dataset.json"
-ANNOTATIONS = "annotations.json"
+_ANNOTATIONS = "annotations.json"
 LAYERS = ("frames", "depth", "instance", "semantic", "transmission", "sign_map", "signs")
 """Folders of the images."""
 
@@ -142,7 +142,7 @@ class DatasetDirectory:
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
         """Write the COCO file, replacing an existing one."""
-        write_json(self.path / ANNOTATIONS, annotations)
+        write_json(self.path / _ANNOTATIONS, annotations)
 
     def _layer(self, layer: str, number: int) -> Path:
         return self.path / layer / f"{number:06d}.png"

@@ -36,7 +36,7 @@ from fogsim.traffic.road.configuration import input_files
 from fogsim.units import finite_or_none
 from fogsim.values import Camera, CameraPose, Ending, Observation, Step
 
-CATEGORIES = [
+_CATEGORIES = [
     {"id": int(kind), "name": kind.name.lower(), "supercategory": "sign" if kind is SemanticClass.SIGN else "vehicle"}
     for kind in SemanticClass
     if SemanticClass.SIGN <= kind <= SemanticClass.OTHER_VEHICLE
@@ -143,7 +143,7 @@ def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -
     return {
         "info": dict(information),
         "licenses": [],
-        "categories": CATEGORIES,
+        "categories": _CATEGORIES,
         "images": images,
         "annotations": annotations,
     }

@@ -13,16 +13,16 @@ from fogsim.values.camera import Camera
 
 Floats = NDArray[np.float64]
 
-NEAREST_ROW = 1.0
+_NEAREST_ROW = 1.0
 """How far the middle of a row is from the horizon at least for the row to count, as road or as sky [px]."""
 
-LEAST_LEFT = 1e-12
+_LEAST_LEFT = 1e-12
 """Information about k in an image, all else known, below whose share what is left is rounding [-]."""
 
-DARKEST = 1e-9
+_DARKEST = 1e-9
 """Least luminance of a road that is divided by [linear grey levels]."""
 
-PITCH = 3
+_PITCH = 3
 """Place of the pitch among k, airlight, road and pitch."""
 
 GreyLevels = Annotated[float, Range(0.0, 1e6, "grey levels")]
@@ -112,12 +112,12 @@ def extinction_bound(camera: Camera, scene: FoggyRoad) -> float:
     """
     information = _information(camera, scene)
     if scene.pitch_deviation == 0.0:
-        information = information[:PITCH, :PITCH]
+        information = information[:_PITCH, :_PITCH]
     else:
-        information[PITCH, PITCH] += scene.pitch_deviation**-2
+        information[_PITCH, _PITCH] += scene.pitch_deviation**-2
     of_k, shared, others = information[0, 0], information[1:, 0], np.ascontiguousarray(information[1:, 1:])
     left = of_k - float(matrix_product(shared, matrix_product(inverse_of(others), shared)))
-    return 1.0 / math.sqrt(left) if left > LEAST_LEFT * of_k else math.inf
+    return 1.0 / math.sqrt(left) if left > _LEAST_LEFT * of_k else math.inf
 
 
 def _information(camera: Camera, scene: FoggyRoad) -> Floats:
@@ -139,7 +139,7 @@ def _information(camera: Camera, scene: FoggyRoad) -> Floats:
 
 def _rows_of_road(camera: Camera, scene: FoggyRoad) -> _Rows:
     rows = np.arange(camera.height, dtype=np.float64)
-    rows = rows[rows >= camera.horizon_row + NEAREST_ROW]
+    rows = rows[rows >= camera.horizon_row + _NEAREST_ROW]
     slant, slope = _slant(camera, rows)
     near, far = (np.sqrt(_slant(camera, rows + half)[0] ** 2 - camera.mount_height**2) for half in (0.5, -0.5))
     # A metre across the road is as many pixels as the focal length over the depth along the optical axis.
@@ -158,7 +158,7 @@ def _slant(camera: Camera, rows: Floats) -> tuple[Floats, Floats]:
 
 def _sky_pixels(camera: Camera) -> int:
     """How many pixels show the sky."""
-    return camera.width * int(np.count_nonzero(np.arange(camera.height) <= camera.horizon_row - NEAREST_ROW))
+    return camera.width * int(np.count_nonzero(np.arange(camera.height) <= camera.horizon_row - _NEAREST_ROW))
 
 
 def _slopes(rows: _Rows, scene: FoggyRoad) -> Floats:
@@ -186,7 +186,7 @@ def _patch_covariance(rows: _Rows, scene: FoggyRoad) -> Floats:
 def _information_of_fading(rows: _Rows, scene: FoggyRoad, weights: Floats, patches: Floats) -> Floats:
     """(4, 4) float64: information in the covariance of the patches, which fade with distance as all contrast does."""
     # The covariance is that of albedos times R e^(−kd) of both rows: relative slopes are sums of theirs.
-    by_road = np.full(len(rows.slant), 1.0 / max(scene.road, DARKEST))
+    by_road = np.full(len(rows.slant), 1.0 / max(scene.road, _DARKEST))
     relative = (-rows.slant, np.zeros(len(rows.slant)), by_road, -scene.extinction * rows.slant_slope)
     changes = [matrix_product(weights, (one[:, None] + one) * patches) for one in relative]
     return np.array([[0.5 * float(np.sum(one * other.T)) for other in changes] for one in changes])

@@ -17,13 +17,13 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, SCALE_DEVIATION, PitchDeviation, ScaleDeviation
 
-MEASUREMENTS = 200
+_MEASUREMENTS = 200
 """Measurements that are remembered."""
 
-LEAST_WEIGHT = 1e-3
+_LEAST_WEIGHT = 1e-3
 """Weight below which a measurement is forgotten [-]."""
 
-LEAST_EXTINCTION = OPTICAL_DEPTH_AT_VISIBILITY / 10_000.0
+_LEAST_EXTINCTION = OPTICAL_DEPTH_AT_VISIBILITY / 10_000.0
 """Extinction that "no fog" is averaged as [1/m]: that of 10 km."""
 
 
@@ -130,7 +130,7 @@ class Huang2015:
         self._check.reset()
         self._rough.reset()
         self._lead.reset()
-        self._measurements: deque[Measurement] = deque(maxlen=MEASUREMENTS)
+        self._measurements: deque[Measurement] = deque(maxlen=_MEASUREMENTS)
         self._time: float | None = None
         self._way = 0.0
 
@@ -165,7 +165,7 @@ class Huang2015:
         if "horizon_row" in rough.diagnostics:
             diagnostics["horizon_row"] = rough.diagnostics["horizon_row"]
         known = [(m, self._weight(m)) for m in self._measurements]
-        known = [(m, weight) for m, weight in known if weight >= LEAST_WEIGHT]
+        known = [(m, weight) for m, weight in known if weight >= _LEAST_WEIGHT]
         diagnostics["measurements"] = len(known)
         if not known:
             return Estimate.invalid(self.method, str(rough.diagnostics.get("reason", "nothing seen")), **diagnostics)
@@ -190,14 +190,14 @@ class Huang2015:
         if track:
             # What a vehicle says is refined with every picture: one measurement a vehicle.
             kept = [m for m in self._measurements if m.track != track]
-            self._measurements = deque(kept, maxlen=MEASUREMENTS)
+            self._measurements = deque(kept, maxlen=_MEASUREMENTS)
         own = (estimate.extinction, estimate.standard_deviation, self._time or 0.0, self._way)
         self._measurements.append(Measurement(*own, track, estimate.common_deviation))
 
 
 def _published(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
     """Weighted mean of visibilities, as an extinction and its deviation [1/m]."""
-    seen = [OPTICAL_DEPTH_AT_VISIBILITY / max(m.extinction, LEAST_EXTINCTION) for m, _ in known]
+    seen = [OPTICAL_DEPTH_AT_VISIBILITY / max(m.extinction, _LEAST_EXTINCTION) for m, _ in known]
     mean, spread = mixture(seen, [weight for _, weight in known], [0.0] * len(known))
     extinction = OPTICAL_DEPTH_AT_VISIBILITY / mean
     # One measurement has no spread; its own deviation is all that is known then.
@@ -207,11 +207,11 @@ def _published(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
 
 def _combined(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
     """Mixture in ln k, as an extinction and its deviation [1/m]."""
-    logs = [math.log(max(m.extinction, LEAST_EXTINCTION)) for m, _ in known]
-    relative = [m.deviation / max(m.extinction, LEAST_EXTINCTION) for m, _ in known]
+    logs = [math.log(max(m.extinction, _LEAST_EXTINCTION)) for m, _ in known]
+    relative = [m.deviation / max(m.extinction, _LEAST_EXTINCTION) for m, _ in known]
     weights = [weight / max(sd, 1e-3) ** 2 for (_, weight), sd in zip(known, relative, strict=True)]
     mean, deviation = mixture(logs, weights, [min(sd, 3.0) for sd in relative])
     extinction = math.exp(mean)
-    if extinction <= 1.5 * LEAST_EXTINCTION:
+    if extinction <= 1.5 * _LEAST_EXTINCTION:
         return 0.0, max(m.deviation for m, _ in known)
     return extinction, extinction * deviation

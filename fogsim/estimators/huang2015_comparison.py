@@ -22,7 +22,7 @@ from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox
 from fogsim.vision.vehicle.registration import PlacementPrior, Regression, register
 from fogsim.vision.vehicle.vehicle_crop import MOST_NOISE, SkyReading, VehicleCrop, vehicle_crop
 
-HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
+_HALF_WIDTH, _MIDDLE, _HALF_HEIGHT = 0.42, 0.42, 0.32
 """The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half
 its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
 
@@ -30,36 +30,36 @@ BODY_HALF_WIDTH, BODY_HEIGHTS = 0.34, (0.15, 0.7)
 """The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: next to a
 narrow roof there is sky, and under the bumper road, whose share of a larger window would change with its place."""
 
-MARGIN, MARGIN_PIXELS = 0.12, 8
+_MARGIN, _MARGIN_PIXELS = 0.12, 8
 """What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
 
 FULL = 254.7
 """Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
 
-LEAST_WIDTH = 8.0
+_LEAST_WIDTH = 8.0
 """Narrowest vehicle whose picture is compared [px]."""
 
-STEERING = 0.1
+_STEERING = 0.1
 """Change of the lateral offset between frames in widths of the vehicle [-]."""
 
-SMALL = 0.6
+_SMALL = 0.6
 """Relative standard deviation of a contrast by how little a small picture shows [px]: over the vehicle's width."""
 
 BROADEST = 64.0
 """Width of a vehicle beyond which its picture is shrink before it is compared [px]: it shows no more."""
 
-OUTLINE = 1.28
+_OUTLINE = 1.28
 """Size of the region that places a vehicle, over the compared region [-]: an outline is more precise than a rear."""
 
 
-AGREES, CONTRADICTED = 0.1, 0.1
+_AGREES, _CONTRADICTED = 0.1, 0.1
 """Relative difference of the fading of detail and of mean contrast that says nothing, and the share of the rest of it
 that the mean may err by [-]."""
 
-MISPLACED = 3.0
+_MISPLACED = 3.0
 """Standard deviation of the fading of detail that is faster than the light's, over their difference [-]."""
 
-BUMPER = 0.15
+_BUMPER = 0.15
 """Height of the lowest part of a rear without information on light, in widths of the vehicle [-]: black plinths and
 shadows end at heights that no distant image resolves."""
 
@@ -127,7 +127,7 @@ def crop_vehicle(image: Pixels, camera: Camera, distance: float) -> VehicleCrop:
     """
     if not 0.5 < distance < math.inf:
         raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
-    if WIDTHS[1] * camera.focal_length / distance < LEAST_WIDTH:
+    if WIDTHS[1] * camera.focal_length / distance < _LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
     level = levelled(image, camera)
 
@@ -166,18 +166,18 @@ def cut_patch(crop: VehicleCrop, window: RearBox, number: int, blur: float) -> R
 
     Takes `window` [px], `blur` [px].
     """
-    if window.width < LEAST_WIDTH:
+    if window.width < _LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
-    row, col = window.foot - MIDDLE * window.width - crop.origin[1], window.column - crop.origin[0]
-    half_width, half_height = HALF_WIDTH * window.width, HALF_HEIGHT * window.width
-    margin = MARGIN * window.width + MARGIN_PIXELS
-    above = max(half_height, TOP * crop.scale - MIDDLE * window.width)
+    row, col = window.foot - _MIDDLE * window.width - crop.origin[1], window.column - crop.origin[0]
+    half_width, half_height = _HALF_WIDTH * window.width, _HALF_HEIGHT * window.width
+    margin = _MARGIN * window.width + _MARGIN_PIXELS
+    above = max(half_height, TOP * crop.scale - _MIDDLE * window.width)
     rows = max(math.floor(row - above - margin), 0), math.ceil(row + half_height + margin) + 1
     cols = max(math.floor(col - half_width - margin), 0), math.ceil(col + half_width + margin) + 1
     pixels = crop.luminance[rows[0] : max(rows[1], 0), cols[0] : max(cols[1], 0)].astype(np.float64)
     patch = Patch(pixels, col - cols[0], row - rows[0], half_width, half_height, blur)
     inside = 0 <= patch.column < pixels.shape[1] and 0 <= patch.row < pixels.shape[0]
-    if not inside or min(pixels.shape) < LEAST_WIDTH / 2:
+    if not inside or min(pixels.shape) < _LEAST_WIDTH / 2:
         raise CannotTellError("the vehicle ahead is outside the image")
     return RearPatch(
         number=number,
@@ -220,8 +220,8 @@ def lower(picture: RearPatch, widths: float) -> RearPatch:
 
 def _window_variance(patch: Patch) -> float:
     """Variance over the body (eq. 4.12 with the square that it lacks), pixels at its edges by their share of it."""
-    width = patch.half_width / HALF_WIDTH
-    low, high = ((MIDDLE - height) * width + patch.row for height in BODY_HEIGHTS[::-1])
+    width = patch.half_width / _HALF_WIDTH
+    low, high = ((_MIDDLE - height) * width + patch.row for height in BODY_HEIGHTS[::-1])
     sizes = patch.luminance.shape
     rows = pixel_shares(sizes[0], np.array([0.5 * (low + high)]), 0.5 * (high - low))
     cols = pixel_shares(sizes[1], np.array([patch.column]), BODY_HALF_WIDTH * width)
@@ -245,7 +245,7 @@ def expected_placement(
     nearness = 1.0 / picture.distance + 1.0 / reference.distance
     placement = Placement(picture.patch.column, picture.patch.row, picture.width / reference.width)
     return PlacementPrior(
-        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, range_deviation * nearness
+        placement, 1.0 + _STEERING * picture.width, 0.5 + picture.pitch_deviation, range_deviation * nearness
     )
 
 
@@ -262,7 +262,7 @@ def compare(near: RearPatch, far: RearPatch, prior: PlacementPrior, most: float 
     # A saturated sky does not tell the exposure.
     seen = near.sky.clipping is not None and far.sky.clipping is not None
     gain = far.sky.luminance / near.sky.luminance if seen else 1.0
-    found = register(near.patch, far.patch, prior, far.noise, most * gain, OUTLINE)
+    found = register(near.patch, far.patch, prior, far.noise, most * gain, _OUTLINE)
     if found is None:
         # Too many pixels are near saturation, or none differ: only its light may say something.
         found = _unplaced(prior.placement) if seen else None
@@ -275,15 +275,15 @@ def compare(near: RearPatch, far: RearPatch, prior: PlacementPrior, most: float 
     if light is None and found.pixels == 0:
         return None
     # What a small picture does not resolve alike: its detail and its place.
-    by_size = SMALL / far.width * abs(found.slope)
+    by_size = _SMALL / far.width * abs(found.slope)
     # Detail that has faded otherwise than the light was not found where it is, or it is drawn or lit otherwise.
     apart = _apart(found, gain, light)
-    contradicted = 0.0 if light is None else CONTRADICTED * max(apart, 0.0) * (1.0 - light.near)
+    contradicted = 0.0 if light is None else _CONTRADICTED * max(apart, 0.0) * (1.0 - light.near)
     return Comparison(
         picture=far,
         distance=far.distance,
         contrast=found.slope / gain,
-        deviation=math.hypot(found.slope_deviation / gain, by_size / gain, MISPLACED * abs(apart)),
+        deviation=math.hypot(found.slope_deviation / gain, by_size / gain, _MISPLACED * abs(apart)),
         mean=found.mean / skies[1] if light is None else light.far,
         near_mean=found.near_mean / skies[0] if light is None else light.near,
         mean_deviation=math.inf if light is None else math.hypot(light.deviation, contradicted),
@@ -297,7 +297,7 @@ def _apart(found: Regression, gain: float, light: MeanLuminances | None) -> floa
         return 0.0
     fallen = (1.0 - light.far) / (1.0 - light.near)
     apart = found.slope / gain - fallen
-    return math.copysign(max(abs(apart) - AGREES * abs(fallen) - 2.0 * found.noise_deviation / gain, 0.0), apart)
+    return math.copysign(max(abs(apart) - _AGREES * abs(fallen) - 2.0 * found.noise_deviation / gain, 0.0), apart)
 
 
 def _unplaced(at: Placement) -> Regression:
@@ -325,9 +325,9 @@ def _unclipped(light: MeanLuminances, sky: SkyReading) -> MeanLuminances:
 
 def _above_bumper(near: RearPatch, at: Placement) -> tuple[Patch, Placement]:
     """The rear from above its lowest part up to where roofs of all vehicles may be, and where that is."""
-    bottom = near.patch.row + near.patch.half_height - BUMPER * near.width
+    bottom = near.patch.row + near.patch.half_height - _BUMPER * near.width
     top = max(
-        min(near.patch.row - near.patch.half_height, near.patch.row + MIDDLE * near.width - TOP * near.metre), 0.5
+        min(near.patch.row - near.patch.half_height, near.patch.row + _MIDDLE * near.width - TOP * near.metre), 0.5
     )
     middle = 0.5 * (bottom + top)
     body = replace(near.patch, row=middle, half_height=bottom - middle)

@@ -32,16 +32,16 @@ from fogsim.vision.vehicle.camera_range import CameraRange, registered_deviation
 
 Floats = NDArray[np.float64]
 
-SPACING, PUBLISHED_SPACING = 2.5, 5.0
+_SPACING, _PUBLISHED_SPACING = 2.5, 5.0
 """Change of range between pictures that are kept [m]; the thesis clips one every 5 m."""
 
-LEAST_CHANGE = 10.0
+_LEAST_CHANGE = 10.0
 """Change of range below which nothing is said [m]: the shortest track of the thesis' table 5.1."""
 
-WORST = 1.0
+_WORST = 1.0
 """Relative standard deviation of k beyond which it is as good as unknown [-]."""
 
-CURVE_STEP, CURVE_END = 5.0, 200.0
+_CURVE_STEP, _CURVE_END = 5.0, 200.0
 """Ranges of the confidence curve in the diagnostics [m]."""
 
 
@@ -106,7 +106,7 @@ class Huang2015Lead:
     ) -> None:
         if vehicle_width is not None and range_from == "sensor":
             raise InputError('vehicle_width needs range_from="camera": ranges of the sensor need no width')
-        usual = PUBLISHED_SPACING if as_published else SPACING
+        usual = _PUBLISHED_SPACING if as_published else _SPACING
         self._spacing = usual if spacing is None else spacing
         self._blur = blur
         self._camera, self._check = camera, ObservationCheck(camera)
@@ -200,7 +200,7 @@ class Huang2015Lead:
             "window": None if window is None else (window.column, window.foot, window.width),
             "range_change": change,
         }
-        if change < LEAST_CHANGE or distances.size < (2 if self._as_published else 3):
+        if change < _LEAST_CHANGE or distances.size < (2 if self._as_published else 3):
             return Estimate.invalid(self.method, "the vehicle's range has not changed enough", **diagnostics)
         measured = self._published() if self._as_published else self._corrected()
         if measured is None or not math.isfinite(measured[1]):
@@ -209,7 +209,7 @@ class Huang2015Lead:
         road = self._track.road
         if not self._as_published and road is not None and road.is_lit(extinction, deviation):
             return Estimate.invalid(self.method, "lamps light the road: this is a daytime method", **diagnostics)
-        curve = np.arange(0.0, CURVE_END + CURVE_STEP, CURVE_STEP)
+        curve = np.arange(0.0, _CURVE_END + _CURVE_STEP, _CURVE_STEP)
         diagnostics |= {"confidence_distances": curve, "confidence": image_confidence(extinction, curve)}
         return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
 
@@ -239,7 +239,7 @@ class Huang2015Lead:
         if fit.extinction <= fit.deviation:
             # No fog that differs surely from none; what it may be is in the deviation.
             return max(fit.extinction, 0.0), fit.deviation
-        return (fit.extinction, fit.deviation) if fit.deviation <= WORST * fit.extinction else None
+        return (fit.extinction, fit.deviation) if fit.deviation <= _WORST * fit.extinction else None
 
 
 def _regressions(found: tuple[Comparison, ...]) -> Regressions:

@@ -29,7 +29,7 @@ STEP = 3.0
 """Largest difference between a pixel and its seed in the row below, and to the bottom row's median for each row
 between (constraints 1 and 2) [linear grey levels]."""
 
-FROM_MEDIAN = 10.0
+_FROM_MEDIAN = 10.0
 """Largest difference of a pixel from its row's median (constraint 4) [linear grey levels]."""
 
 ROWS_APART = 20
@@ -38,19 +38,19 @@ ROWS_APART = 20
 BELOW_INFLECTION = 50
 """Rows below the inflection that the optimisation looks at [px]."""
 
-SEARCH, SEARCH_STEPS = 0.01, 401
+_SEARCH, _SEARCH_STEPS = 0.01, 401
 """Half-width of the search about k0 [1/m], and how many extinctions it tries."""
 
-WIDER, TRIED = 2.0, 121
+_WIDER, _TRIED = 2.0, 121
 """The same where it is as wide in the ratio of k to k0 [-]."""
 
-DISAGREEMENT = math.radians(1.0)
+_DISAGREEMENT = math.radians(1.0)
 """Largest difference between the horizons of lane lines and of the calibration [rad]; the thesis names no number."""
 
-NEARER = 2.0
+_NEARER = 2.0
 """Ratio of the heights below the horizon of the two rows whose medians are compared [-]."""
 
-PLACES, HIGHEST = 160, 0.7
+_PLACES, _HIGHEST = 160, 0.7
 """Pairs of rows that are compared, evenly in ln(v − v_h), and the upper row of the first [px]."""
 
 
@@ -137,9 +137,9 @@ def grown_medians(
     if Huang2015Repair.GROWTH_BY_FOG in repairs:
         region = grow_region(blurred, edges.pixels, fog_limits(road, edges, slope))
     else:
-        region = grow_region(blurred, edges.pixels, constant_limits(slope.size, STEP, STEP, FROM_MEDIAN))
+        region = grow_region(blurred, edges.pixels, constant_limits(slope.size, STEP, STEP, _FROM_MEDIAN))
         medians = region_medians(road.luminance, region)
-        region[np.abs(road.luminance - medians.luminance[:, None]) > FROM_MEDIAN] = 0
+        region[np.abs(road.luminance - medians.luminance[:, None]) > _FROM_MEDIAN] = 0
     hidden = hide_vehicle(region, road, camera, lead) if Huang2015Repair.LEAD_LEFT_OUT in repairs else 0.0
     horizon, axis = _horizon(edges, road, camera, assumed, repairs)
     own_lane = Huang2015Repair.OWN_LANE in repairs
@@ -160,7 +160,7 @@ def _horizon(
         return horizon, column if seen is None else seen.column
     below = math.ceil(camera.horizon_row) - road.first_row + 1
     point = published_vanishing_point(hough_lines(edges.pixels, below, math.radians(1.0)), road.first_row)
-    if point is None or abs(point.row - camera.horizon_row) > DISAGREEMENT * camera.focal_length:
+    if point is None or abs(point.row - camera.horizon_row) > _DISAGREEMENT * camera.focal_length:
         return assumed, column
     return Horizon(point.row, assumed.standard_deviation), column
 
@@ -177,11 +177,11 @@ def first_extinctions(curve: RoadCurve, luminance: Floats, repairs: AbstractSet[
         change = np.abs(light[ROWS_APART:] - light[:-ROWS_APART])
         best = np.argmax(change, axis=0)
         return np.asarray((below[best] + below[best + ROWS_APART]) / curve.row_distance)
-    upper = np.geomspace(HIGHEST, max(float(below[-1]) / NEARER, 2.0 * HIGHEST), PLACES)
-    change = _between(below, light, upper) - _between(below, light, NEARER * upper)
+    upper = np.geomspace(_HIGHEST, max(float(below[-1]) / _NEARER, 2.0 * _HIGHEST), _PLACES)
+    change = _between(below, light, upper) - _between(below, light, _NEARER * upper)
     best = np.argmax(change, axis=0)
     # Of e^(−K/(2u)) − e^(−K/u) the greatest is where e^(−K/(2u)) = 1/2.
-    return np.asarray(NEARER * math.log(NEARER) / (NEARER - 1.0) * upper[best] / curve.row_distance)
+    return np.asarray(_NEARER * math.log(_NEARER) / (_NEARER - 1.0) * upper[best] / curve.row_distance)
 
 
 def _between(below: Floats, light: Floats, places: Floats) -> Floats:
@@ -212,12 +212,12 @@ def optimised_extinctions(
         return np.full(first.size, math.nan)
     least, most = float(first[known].min()), float(first[known].max())
     if Huang2015Repair.RELATIVE_SEARCH in repairs:
-        tried = np.geomspace(least / WIDER, most * WIDER, round(TRIED * (1.0 + math.log(most / least))))
-        near = (tried[:, None] >= first / WIDER) & (tried[:, None] <= first * WIDER)
+        tried = np.geomspace(least / _WIDER, most * _WIDER, round(_TRIED * (1.0 + math.log(most / least))))
+        near = (tried[:, None] >= first / _WIDER) & (tried[:, None] <= first * _WIDER)
     else:
-        steps = round(SEARCH_STEPS * (1.0 + (most - least) / (2.0 * SEARCH)))
-        tried = np.linspace(max(least - SEARCH, 1e-5), most + SEARCH, steps)
-        near = np.abs(tried[:, None] - first) <= SEARCH
+        steps = round(_SEARCH_STEPS * (1.0 + (most - least) / (2.0 * _SEARCH)))
+        tried = np.linspace(max(least - _SEARCH, 1e-5), most + _SEARCH, steps)
+        near = np.abs(tried[:, None] - first) <= _SEARCH
     seen = np.flatnonzero(curve.weight > 0.0)
     lowest = 0.5 * float(np.median(first[known])) * curve.row_distance + BELOW_INFLECTION
     used = seen[(curve.below_horizon[seen] > 0.0) & (curve.below_horizon[seen] <= lowest)]

@@ -10,41 +10,41 @@ from fogsim.core.linear_algebra import inverse_of, matrix_product, straight_line
 
 Floats = NDArray[np.float64]
 
-KEPT = 0.5
+_KEPT = 0.5
 """Ratios farther than this share from their row's median are dropped (section 4.3.3) [-]."""
 
-LARGEST_EXTINCTION = 0.09
+_LARGEST_EXTINCTION = 0.09
 """Upper end of the published search [1/m]: visibilities below 33 m cannot come out."""
 
 GRID = 1801
 """Extinctions that the published search tries."""
 
-RATIO_DEVIATION = 0.03
+_RATIO_DEVIATION = 0.03
 """Least standard deviation of a ratio of variances, be there one or many [-]."""
 
-SLOPE_SHARE = 0.045
+_SLOPE_SHARE = 0.045
 """Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
 
-MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.0015, 0.006
+_MEAN_SHARE, _MEAN_CONTRAST_SHARE = 0.0015, 0.006
 """The same of a mean luminance, relative to the sky's and to its contrast to the sky [-]."""
 
-SKY_SHARE = 0.01
+_SKY_SHARE = 0.01
 """Standard deviation of the airlight ahead relative to the sky's luminance above it [-]."""
 
-DETAIL_SHARE = 0.3
+_DETAIL_SHARE = 0.3
 """Standard deviation of the share of its detail that only the reference shows: fine detail, another noise [-]."""
 
-DRIFT = 0.009
+_DRIFT = 0.009
 """Standard deviation of the relative change of a mean contrast as a picture becomes smaller by a factor e [-]."""
 
-SIZE_SHARE = 0.01
+_SIZE_SHARE = 0.01
 """Standard deviation of the relative change of a contrast from the nearest to the farthest picture by size and place,
 which all pictures between share [-]."""
 
-HUBER = 2.0
+_HUBER = 2.0
 """Residuals beyond this many standard deviations count linearly, not squared [-]."""
 
-STEPS = 30
+_STEPS = 30
 """Most Gauss–Newton steps of the fit."""
 
 RANGE_DEVIATION = 0.3
@@ -85,7 +85,7 @@ def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTa
     found = []
     for step in np.unique(row[row > 0]):
         ratios = ratio[row == step]
-        kept = ratios[np.abs(ratios - np.median(ratios)) <= KEPT * np.median(ratios)]
+        kept = ratios[np.abs(ratios - np.median(ratios)) <= _KEPT * np.median(ratios)]
         if kept.size:
             found.append((float(apart[row == step].mean()), float(kept.mean()), kept.size))
     difference, mean, count = (np.array(column) for column in zip(*found, strict=True)) if found else (np.zeros(0),) * 3
@@ -97,12 +97,12 @@ def published_extinction(table: RatioTable) -> tuple[float, float]:
 
     Returns k and the standard deviation that the ratios' misfit makes of it [1/m].
     """
-    tried = np.linspace(0.0, LARGEST_EXTINCTION, GRID)
+    tried = np.linspace(0.0, _LARGEST_EXTINCTION, GRID)
     model = image_confidence(1.0, tried[:, None] * table.difference)
     best = int(np.argmin(((model - table.ratio) ** 2).sum(axis=1)))
     slope = -2.0 * table.difference * model[best]
     misfit = float(((model[best] - table.ratio) ** 2).sum()) / max(table.ratio.size - 1, 1)
-    misfit = max(misfit, RATIO_DEVIATION**2)
+    misfit = max(misfit, _RATIO_DEVIATION**2)
     return float(tried[best]), math.sqrt(misfit / max(float(matrix_product(slope, slope)), 1e-12))
 
 
@@ -146,17 +146,17 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
     first = _first_guess(data, apart)
     if first is None:
         return None
-    priors = np.array([SKY_SHARE, DETAIL_SHARE, DRIFT])
+    priors = np.array([_SKY_SHARE, _DETAIL_SHARE, _DRIFT])
     values = np.concatenate([data.slope, data.mean, np.zeros(priors.size)])
     state = np.array([first, 1.0, 0.0, 0.0, 0.0])
     covariance: Floats = np.eye(state.size)
     standardised: Floats = np.zeros(values.size)
     spread: Floats = np.ones(values.size)
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         model, jacobian, spread = _predicted(state, apart, data, priors)
         standardised = (values - model) / spread
         # The last values are priors, and no outliers.
-        weight = np.minimum(1.0, HUBER / np.maximum(np.abs(standardised), 1e-9)) / spread**2
+        weight = np.minimum(1.0, _HUBER / np.maximum(np.abs(standardised), 1e-9)) / spread**2
         weight[-priors.size :] = priors**-2
         covariance = inverse_of(matrix_product(jacobian.T, weight[:, None] * jacobian))
         step = matrix_product(covariance, matrix_product(jacobian.T, weight * (values - model)))
@@ -166,7 +166,7 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
             break
     finite = np.isfinite(spread)
     misfit = float(np.mean(standardised[finite] ** 2))
-    deviation = math.hypot(math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), SIZE_SHARE / float(np.ptp(apart)))
+    deviation = math.hypot(math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), _SIZE_SHARE / float(np.ptp(apart)))
     return ContrastFit(float(state[0]), deviation, misfit)
 
 
@@ -175,7 +175,7 @@ def _first_guess(data: Regressions, apart: Floats) -> float | None:
     contrast = 1.0 - np.stack([data.mean, data.near_mean])
     for fallen, deviation in (
         (contrast[0] / np.maximum(contrast[1], 1e-6), data.mean_deviation / np.maximum(contrast[1], 1e-6)),
-        (data.slope, np.hypot(data.slope_deviation, SLOPE_SHARE * data.slope)),
+        (data.slope, np.hypot(data.slope_deviation, _SLOPE_SHARE * data.slope)),
     ):
         seen = (fallen > 3.0 * deviation) & (contrast[1] > 0.0)
         if data.distance.size >= 3 and int(seen.sum()) >= 2 and float(np.ptp(apart[seen])) > 0.0:
@@ -195,8 +195,8 @@ def _predicted(state: Floats, apart: Floats, data: Regressions, priors: Floats) 
     means = np.stack([apart * seen, -seen / level, 1.0 - t * kept, zero, -known * t * smaller], axis=1)
     # A range that is off by δ changes either by k δ; near pixels are of a range, too.
     by_range = (data.range_deviation * extinction) ** 2
-    slope_spread = np.sqrt(data.slope_deviation**2 + (SLOPE_SHARE**2 + by_range) * t**2)
-    mean_spread = np.sqrt(data.mean_deviation**2 + MEAN_SHARE**2 + (MEAN_CONTRAST_SHARE**2 + by_range) * seen**2)
+    slope_spread = np.sqrt(data.slope_deviation**2 + (_SLOPE_SHARE**2 + by_range) * t**2)
+    mean_spread = np.sqrt(data.mean_deviation**2 + _MEAN_SHARE**2 + (_MEAN_CONTRAST_SHARE**2 + by_range) * seen**2)
     values = np.concatenate([(1.0 + detail) * t, 1.0 + excess - seen, [excess, detail, drift]])
     jacobian = np.concatenate([slopes, means, np.eye(5)[2:]])
     return values, jacobian, np.concatenate([slope_spread, mean_spread, priors])

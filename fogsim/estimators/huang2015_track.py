@@ -26,22 +26,22 @@ from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear
 from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
 
-FOLLOWED = 0.4
+_FOLLOWED = 0.4
 """Share of a new place that the expectation for the next frame takes over: pitch of the moment is no trend [-]."""
 
-GROWTH, UNSURE = 1.25, 4.0
+_GROWTH, _UNSURE = 1.25, 4.0
 """Factor by which contrast may seem to grow with range [-], and standard deviations that it may besides."""
 
-SAME = 0.2
+_SAME = 0.2
 """By how much a window that is found again may differ from what is known of it, in widths of the vehicle [-]."""
 
-MOST_JUMP = 12.0
+_MOST_JUMP = 12.0
 """Change of range between frames by more than which the vehicle is another one [m]."""
 
-PICTURES = 64
+_PICTURES = 64
 """Pictures of a vehicle that are kept."""
 
-NEARER = 0.9
+_NEARER = 0.9
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
 
 
@@ -68,7 +68,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
     """
 
     def __init__(self, camera: Camera, setback: float, spacing: float, blur: float, range_deviation: float) -> None:
-        super().__init__(SmoothedRanges(range_deviation), PICTURES, offset=setback, keeps_reference=True)
+        super().__init__(SmoothedRanges(range_deviation), _PICTURES, offset=setback, keeps_reference=True)
         self._camera = camera
         self._setback = setback
         self._spacing = spacing
@@ -90,7 +90,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
 
     def follows(self, distance: float) -> bool:
         """Whether a range can be that of the same vehicle as before (`distance` [m])."""
-        return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
+        return self.reference is not None and abs(distance + self._setback - self._last_distance) <= _MOST_JUMP
 
     def see(self, image: Pixels, measured: LeadMeasurement, time: float, deviation: float | None = None) -> None:
         """Look for the vehicle in the next frame (`image` (rows, cols), `time` [s], `deviation` [m])."""
@@ -135,13 +135,13 @@ class LeadTrack(TrackedVehicle[Comparison]):
         least = self._spacing - min(0.25 * self._spacing, 4.0 * RANGE_DEVIATION)
         if all(abs(distance - kept.distance) >= least for kept in self.detections):
             self._keep(replace(comparison, picture=placed_at(picture, full, at)))
-            if distance < NEARER * reference.distance:
+            if distance < _NEARER * reference.distance:
                 self._renew(crop, self.detections[-1].picture)
 
     def _most_contrast(self, distance: float) -> float:
         """Contrast that fog leaves at most: not more than nearer by, but for errors."""
-        nearer = [c.fallen[0] + UNSURE * c.fallen[1] for c in self.detections if c.distance <= distance]
-        return GROWTH * min(nearer, default=math.inf)
+        nearer = [c.fallen[0] + _UNSURE * c.fallen[1] for c in self.detections if c.distance <= distance]
+        return _GROWTH * min(nearer, default=math.inf)
 
     def _renew(self, crop: VehicleCrop, nearest: RearPatch) -> None:
         """Take the nearest picture for the reference of all: it shows the most, and best where the vehicle stands."""
@@ -162,7 +162,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
         """Keep lateral offset [m] and what pitch the foot shows [px]: they change least from frame to frame."""
         across = (column - self._camera.principal_point[0]) * distance / self._camera.focal_length
         pitch = foot - self._camera.horizon_row - self._camera.row_distance / distance
-        share = FOLLOWED if math.isfinite(self._last_distance) else 1.0
+        share = _FOLLOWED if math.isfinite(self._last_distance) else 1.0
         before = self._offset
         self._offset = (before[0] + share * (across - before[0]), before[1] + share * (pitch - before[1]))
         self._last_distance = distance
@@ -179,9 +179,9 @@ class LeadTrack(TrackedVehicle[Comparison]):
 def _is_same(found: RearBox, known: RearBox) -> bool:
     """Whether two windows of one picture are of one vehicle."""
     apart = max(abs(found.column - known.column), abs(found.foot - known.foot), abs(found.width - known.width))
-    return apart < SAME * known.width
+    return apart < _SAME * known.width
 
 
 def _exceeds(comparison: Comparison, most: float) -> bool:
     contrast, deviation = comparison.fallen
-    return contrast > most + UNSURE * deviation
+    return contrast > most + _UNSURE * deviation

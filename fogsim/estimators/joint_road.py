@@ -52,40 +52,40 @@ from fogsim.vision.uneven.airlight_edge import airlight_edge
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
 
-MIN_AIRLIGHT = 6.0
+_MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
-MIN_USED = 0.4
+_MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
 
-SURE_OF_FOG = 4.0
+_SURE_OF_FOG = 4.0
 """Least k in its standard deviations for an estimate of dense fog [-]."""
 
-OVERCONFIDENCE = 1.6
+_OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
 
-HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.13
+_HARDLY_UNEVEN, _UNEVEN_DEVIATION = 0.05, 0.13
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 
-MEMORY, CHANGING, MOST_CHANGE = 10.0, 1.5, 0.15
+_MEMORY, _CHANGING, _MOST_CHANGE = 10.0, 1.5, 0.15
 """Time over which recent extinctions measure how uneven the fog is [s], the factor on a single one's relative
 deviation, and its upper limit [-]: fog that has varied along the road will vary further."""
 
-LEAST_DEPTH = 1.0
+_LEAST_DEPTH = 1.0
 """Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
 obstacle across all lanes may be the edge of a shadow, and what is before it too little to distinguish fog from sun and
 shade."""
 
-LEAST_DEVIATION = 1e-4
+_LEAST_DEVIATION = 1e-4
 """Deviation of k that what the model leaves out makes in clear air [1/m]."""
 
-DARKENS = 0.5
+_DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
-MOST_OBSTACLES = 2
+_MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for again, each time nearer."""
 
 
@@ -202,7 +202,7 @@ class JointRoad:
         level = levelled(image, self._camera)
         pixels = linear_pixels(level, self._camera)
         sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
-        if sky is not None and sky.luminance < MIN_AIRLIGHT:
+        if sky is not None and sky.luminance < _MIN_AIRLIGHT:
             return Estimate.invalid(self.method, "too dark above the horizon: this is a daytime method", **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
@@ -262,7 +262,7 @@ class JointRoad:
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
         is_full = is_full or not left.suffices(fit)
-        if is_full and not course.sag.any() and fit.darkening_chance < DARKENS:
+        if is_full and not course.sag.any() and fit.darkening_chance < _DARKENS:
             seen = self._averaged(curves, sky)
             hidden = HiddenCourse(self._straight, self._camera, course)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, hidden)
@@ -297,7 +297,7 @@ class JointRoad:
             return uneven
         self._geometry, self._shaded = whole, 0.0
         alike = own is not None and own.extinction > 0.0 and abs(math.log(own.extinction / k)) < ALIKE
-        return "" if alike or uneven.reach * k < LEAST_DEPTH else why
+        return "" if alike or uneven.reach * k < _LEAST_DEPTH else why
 
     def _with_other_lanes(
         self, own: JointFit, pixels: LinearPixels, curves: StripCurves, sky: Sky, priors: Priors, free: float
@@ -307,7 +307,7 @@ class JointRoad:
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
         """
         fit = own
-        for _ in range(MOST_OBSTACLES):
+        for _ in range(_MOST_OBSTACLES):
             obstacle = _obstacle(fit, self._geometry)
             if obstacle < free:
                 if self._is_hidden(fit, curves, free):
@@ -345,10 +345,10 @@ class JointRoad:
 
     def _change(self, time: float, extinction: float) -> float:
         """Relative deviation of the extinction by how it changed over the last pictures [-]; 0 without their times."""
-        while self._before and not time - MEMORY <= self._before[0][0] < time:
+        while self._before and not time - _MEMORY <= self._before[0][0] < time:
             self._before.popleft()
-        self._before.append((time, math.log(max(extinction, LEAST_DEVIATION))))
-        return min(CHANGING * float(np.std([logarithm for _, logarithm in self._before])), MOST_CHANGE)
+        self._before.append((time, math.log(max(extinction, _LEAST_DEVIATION))))
+        return min(_CHANGING * float(np.std([logarithm for _, logarithm in self._before])), _MOST_CHANGE)
 
     def _rejection_reason(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, tracked: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
@@ -366,7 +366,7 @@ class JointRoad:
     def _is_hidden(self, fit: JointFit, curves: StripCurves, free: float) -> bool:
         """Whether too little of the own lane, as far as it is free, fits a road."""
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
-        return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
+        return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < _MIN_USED)
 
     def _estimate(
         self,
@@ -396,17 +396,17 @@ class JointRoad:
             optical_depths=_optical_depths(uneven, unevenness),
             denser=None if front is None else DenserFog(*front),
             # Fog that changes along the way is read with the same error until it has been passed.
-            common_deviation=math.sqrt(max(unevenness**2 - HARDLY_UNEVEN**2, 0.0)),
+            common_deviation=math.sqrt(max(unevenness**2 - _HARDLY_UNEVEN**2, 0.0)),
         )
 
 
 def _too_little_seen(uneven: UnevenFit, tracked: float) -> str:
     """Why too little is seen of a road that should be free up to a depth; empty if it is enough."""
     fit = uneven.fit
-    if math.isinf(tracked) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
+    if math.isinf(tracked) and fit.extinction > CLEAR and uneven.reach * fit.extinction < _LEAST_DEPTH:
         return "something hides all lanes, or shade lies on them"
     deviation = math.hypot(_deviation(fit), _unevenness(uneven) * fit.extinction)
-    if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
+    if fit.extinction < _SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
         return "the extinction is not observable: too little road is seen"
     return ""
 
@@ -414,19 +414,19 @@ def _too_little_seen(uneven: UnevenFit, tracked: float) -> str:
 def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
     model = MODEL_DEVIATION * fit.extinction
-    return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
+    return math.hypot(_OVERCONFIDENCE * fit.extinction_deviation, model, _LEAST_DEVIATION)
 
 
 def _unevenness(uneven: UnevenFit) -> float:
     """Relative deviation of a mean extinction by unevenness of the fog that the fit leaves out [-]."""
-    return math.hypot(HARDLY_UNEVEN, UNEVEN_DEVIATION * (1.0 - uneven.even))
+    return math.hypot(_HARDLY_UNEVEN, _UNEVEN_DEVIATION * (1.0 - uneven.even))
 
 
 def _optical_depths(uneven: UnevenFit, unevenness: float) -> OpticalDepths:
     """How the fog varies, what the model leaves out included in its deviations."""
     model = math.hypot(MODEL_DEVIATION, unevenness)
-    deviation = np.hypot(OVERCONFIDENCE * uneven.deviation, model * uneven.depth)
-    deviation = np.hypot(deviation, LEAST_DEVIATION * uneven.distance)
+    deviation = np.hypot(_OVERCONFIDENCE * uneven.deviation, model * uneven.depth)
+    deviation = np.hypot(deviation, _LEAST_DEVIATION * uneven.distance)
     return OpticalDepths(*(tuple(values.tolist()) for values in (uneven.distance, uneven.depth, deviation)))
 
 

@@ -24,51 +24,51 @@ from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE
 from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
 from fogsim.vision.vehicle.vehicle_crop import daytime_crop
 
-MIN_SAMPLES = 4
+_MIN_SAMPLES = 4
 """Fewest ranges for a fit."""
 
-MIN_ALIKE = 3
+_MIN_ALIKE = 3
 """Fewest of them at which the vehicle was surely seen; it may have faded at the others."""
 
-REGISTRATION = 0.005
+_REGISTRATION = 0.005
 """Relative deviation of a contrast by what is not noise: place, shading [-]."""
 
-SHAPE, BRIGHT_SHAPE = 0.005, 0.03
+_SHAPE, _BRIGHT_SHAPE = 0.005, 0.03
 """Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
-SMOOTHED = 0.008
+_SMOOTHED = 0.008
 """Relative deviation of k by what neighbouring detections share: errors of smoothed ranges, places in noise [-]."""
 
-LARGE_SHAPE = 0.018
+_LARGE_SHAPE = 0.018
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
 
-AIRLIGHT_DEVIATION = 0.002
+_AIRLIGHT_DEVIATION = 0.002
 """Relative deviation of the airlight behind the vehicle from the sky above it [-]."""
 
-RECKONED_LEVEL = 0.4
+_RECKONED_LEVEL = 0.4
 """Deviation of its level at the horizon where that is not seen but reckoned, over that of its darkening down to the
 nearest rear's foot [-]: both go by how much the sky brightens upward."""
 
-CLIPPED_AIRLIGHT_DEVIATION = 0.03
+_CLIPPED_AIRLIGHT_DEVIATION = 0.03
 """The same where some of the sky is clipped [-]."""
 
-JUMP, SURPRISE = 15.0, 5.0
+_JUMP, _SURPRISE = 15.0, 5.0
 """Changes of range, as such and against what the relative speed says, that together mean another vehicle [m]."""
 
-MAX_MISFIT = 6.0
+_MAX_MISFIT = 6.0
 """Mean square of the standardised residuals beyond which the contrast does not fall as Duntley's law has it [-]."""
 
-WORST = 0.4
+_WORST = 0.4
 """Largest deviation of k relative to itself for an estimate of fog [-]."""
 
-SURELY = 2.5
+_SURELY = 2.5
 """Standard deviations by which the contrast must grow with the range for it to be no vehicle's [-]."""
 
-LEAST_EXTINCTION = 0.003
+_LEAST_EXTINCTION = 0.003
 """Least extinction with which the airlight before the vehicle is reckoned [1/m]."""
 
-CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 500.0
+_CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 500.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
 
 
@@ -117,7 +117,7 @@ class LeadContrast:
         range_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.25,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
         window: Annotated[float, Range(0.01, 1e6, "s")] = 60.0,
-        frames: Annotated[int, Range(MIN_SAMPLES, 10_000)] = 64,
+        frames: Annotated[int, Range(_MIN_SAMPLES, 10_000)] = 64,
     ) -> None:
         self._camera, self._setback = camera, setback
         self._horizon = calibrated_horizon(camera, pitch_deviation)
@@ -168,7 +168,7 @@ class LeadContrast:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
             fit = self._fit()
-            about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, LEAST_EXTINCTION), DENSEST)
+            about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, _LEAST_EXTINCTION), DENSEST)
             self._track.relevel(about)
             crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
@@ -192,7 +192,7 @@ class LeadContrast:
         before, earlier = self._last
         expected = earlier.distance + earlier.relative_speed * (time - before)
         jump, surprise = abs(lead.distance - earlier.distance), abs(lead.distance - expected)
-        if jump > JUMP and surprise > SURPRISE:
+        if jump > _JUMP and surprise > _SURPRISE:
             self._forget()
             return 0.0
         return min(jump, surprise)
@@ -213,7 +213,7 @@ class LeadContrast:
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
     def _fit(self) -> DecayFit | None:
-        if len(self._track.detections) < MIN_SAMPLES or sum(one.alike for one in self._track.detections) < MIN_ALIKE:
+        if len(self._track.detections) < _MIN_SAMPLES or sum(one.alike for one in self._track.detections) < _MIN_ALIKE:
             return None
         distance = self._track.likely_distances()
         contrast, noise, lever = (
@@ -222,14 +222,14 @@ class LeadContrast:
         )
         clipped = any(s.clipped for s in self._track.detections)
         uneven = max(s.airlight_deviation for s in self._track.detections)
-        level = math.hypot(AIRLIGHT_DEVIATION, RECKONED_LEVEL * uneven)
-        airlight = CLIPPED_AIRLIGHT_DEVIATION if clipped else level
+        level = math.hypot(_AIRLIGHT_DEVIATION, _RECKONED_LEVEL * uneven)
+        airlight = _CLIPPED_AIRLIGHT_DEVIATION if clipped else level
         offset = max(airlight * float(np.median(lever)), 1e-6)
-        fit = fit_decay(distance, contrast, noise, REGISTRATION, offset)
+        fit = fit_decay(distance, contrast, noise, _REGISTRATION, offset)
         if fit is None:
             return None
         # Noise of the range acts as a relative noise of the contrast, k σ.
-        relative = math.hypot(REGISTRATION, fit.extinction * self._range_deviation)
+        relative = math.hypot(_REGISTRATION, fit.extinction * self._range_deviation)
         fit = fit_decay(distance, contrast, noise, relative, offset)
         if fit is None:
             return None
@@ -237,7 +237,7 @@ class LeadContrast:
         # What is wrong of an uneven airlight's shape is so at the nearest range, and nearly nothing far away.
         shape = math.hypot(self._shape(fit.extinction, float(np.median(lever))), uneven * float(np.median(lever)))
         by_shape = shape / max(_span(distance, certain), SPACING)
-        return replace(fit, deviation=math.hypot(fit.deviation, by_shape, SMOOTHED * fit.extinction))
+        return replace(fit, deviation=math.hypot(fit.deviation, by_shape, _SMOOTHED * fit.extinction))
 
     def _shape(self, extinction: float, lever: float) -> float:
         """By how much size and aspect may change the farthest contrast, relative [-]."""
@@ -245,7 +245,7 @@ class LeadContrast:
         # What the lever would be without fog is over 1 by luminance over contrast.
         bright = max(lever * math.exp(-max(extinction, 0.0) * depth) - 1.0, 0.0)
         large = self._track.detections[0].picture.width >= LARGE
-        return math.hypot(LARGE_SHAPE if large else SHAPE, BRIGHT_SHAPE * bright)
+        return math.hypot(_LARGE_SHAPE if large else _SHAPE, _BRIGHT_SHAPE * bright)
 
 
 def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
@@ -255,9 +255,9 @@ def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
 
 
 def _rejection_reason(fit: DecayFit, road: RoadFall | None) -> str:
-    if fit.misfit > MAX_MISFIT or fit.extinction < -SURELY * fit.deviation:
+    if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
         return "the contrast does not fall with the range as Duntley's law has it"
-    if fit.deviation > WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > CLEAR:
+    if fit.deviation > _WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > _CLEAR:
         return "the range has not changed enough yet"
     if road is not None and road.is_lit(fit.extinction, fit.deviation):
         return "lamps light the road: this is a daytime method"

@@ -13,45 +13,45 @@ from fogsim.vision.vehicle.vehicle_crop import LevelledRows, VehicleCrop
 SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""
 
-CHANGED, REFRESHED = 0.1, 10.0
+_CHANGED, _REFRESHED = 0.1, 10.0
 """Relative change of the contrast at a range from which the fog is another one and the track begins again [-], and age
 from which a detection gives way to another from its range [s]."""
 
-NEARER = 0.85
+_NEARER = 0.85
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
 
-STEERING = 0.25
+_STEERING = 0.25
 """Deviation of the vehicle's place sideways from where it was in the last picture [m]."""
 
-FOLLOWED = 0.1
+_FOLLOWED = 0.1
 """Least share of a new place's height in what is expected next: pitch of the moment is no trend [-]."""
 
-ALIKE = 0.6
+_ALIKE = 0.6
 """Least correlation with the reference where the vehicle must be visible [-]."""
 
-SCALED, RESCALED, BETTER = 0.06, 0.2, 0.03
+_SCALED, _RESCALED, _BETTER = 0.06, 0.2, 0.03
 """Changes of the range's logarithm from which a vehicle is distinguished by its correlation from a thing that keeps its
 size in the image: if that of such a thing is better by so much, and if it is better at all [-]."""
 
-VISIBLE = 3.0
+_VISIBLE = 3.0
 """Contrast of the reference, faded, in deviations of a cell from which the vehicle must look alike [-]."""
 
-GROWTH = 1.25
+_GROWTH = 1.25
 """Factor by which contrast may seem to grow with range [-]."""
 
-SUSPICION = 2.5
+_SUSPICION = 2.5
 """The same that mean another vehicle if it also looks otherwise [m]."""
 
-SURE = 12.0
+_SURE = 12.0
 """Contrast in its deviations from which a vehicle's place in a picture is believed [-]."""
 
-UNPLACED = 0.15
+_UNPLACED = 0.15
 """Relative deviation of its contrast where it is not: what is off its place shows less [-]."""
 
-GAP = 3.0
+_GAP = 3.0
 """Time without the vehicle after which it is another one, where frames have a time [s]."""
 
-RELEVELLED = 0.15
+_RELEVELLED = 0.15
 """Change of ln k from which the airlight before known pictures is reckoned again [-]."""
 
 DENSEST = 0.1
@@ -96,7 +96,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
     def is_lost(self, time: float) -> bool:
         """Count a frame without the vehicle; whether it may be another one from now on (`time` [s])."""
         seen = self.detections[-1].time if self.detections else time
-        return self.miss() and abs(time - seen) >= (GAP if time else 0.0)
+        return self.miss() and abs(time - seen) >= (_GAP if time else 0.0)
 
     def look(
         self, crop: VehicleCrop, number: int, distance: float, time: float, *, surprise: float, densest: float
@@ -111,7 +111,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
             try:
                 found = self._follow(crop, distance, self.reference, densest)
             except CannotTellError:
-                if surprise < SUSPICION:
+                if surprise < _SUSPICION:
                     raise
                 self._forget()
         picture, ratio, alike = self._begin(crop) if found is None else found
@@ -131,10 +131,10 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         self._missed = 0
         self._aside = crop.lateral_offset(picture)
         # What of the pitch's error is common to all frames: their mean, later frames no less than a share of it.
-        self._lift += max(1.0 / (self._swayed + 1.0), FOLLOWED) * (crop.pitch_error(picture) - self._lift)
+        self._lift += max(1.0 / (self._swayed + 1.0), _FOLLOWED) * (crop.pitch_error(picture) - self._lift)
         self._swayed += 1
         self._keep_new(detection)
-        if self.reference is None or detection.depth < NEARER * self.reference.depth:
+        if self.reference is None or detection.depth < _NEARER * self.reference.depth:
             self._compare_all(detection)
         return detection
 
@@ -159,10 +159,10 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
             self._keep(detection)
             return
         noise = math.hypot(known.contrast.deviation, detection.contrast.deviation)
-        if abs(detection.contrast.ratio - known.contrast.ratio) > CHANGED * known.contrast.ratio + 5.0 * noise:
+        if abs(detection.contrast.ratio - known.contrast.ratio) > _CHANGED * known.contrast.ratio + 5.0 * noise:
             self.detections = [detection]
             self._compare_all(detection)
-        elif detection.time - known.time > REFRESHED and not self._is_reference(known):
+        elif detection.time - known.time > _REFRESHED and not self._is_reference(known):
             self.detections = [*(one for one in self.detections if one is not known), detection]
 
     def _begin(self, crop: VehicleCrop) -> tuple[RearPicture, ContrastRatio, bool]:
@@ -180,28 +180,28 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         expected = crop.expected(self._aside, reference.picture.width).displaced(0.0, self._lift * crop.depth)
         pitch = crop.depth * self._pitch_deviation + 0.02
         behind = RoadBehind(crop.camera.mount_height, self._nearest(distance).contrast.ratio)
-        found = register_rear(reference.picture, expected, STEERING, pitch, behind)
+        found = register_rear(reference.picture, expected, _STEERING, pitch, behind)
         ratio = None if found is None else contrast_ratio(reference.picture, found[0])
         if found is None or ratio is None:
             raise CannotTellError("the vehicle ahead is too small in the image, or hidden")
         picture, likeness = found
-        if ratio.ratio < SURE * ratio.deviation:
+        if ratio.ratio < _SURE * ratio.deviation:
             # The best of many places would be that of the noise: it is where it was expected.
             picture, ratio = expected, contrast_ratio(reference.picture, expected) or ratio
-            ratio = replace(ratio, deviation=math.hypot(ratio.deviation, UNPLACED * ratio.ratio))
+            ratio = replace(ratio, deviation=math.hypot(ratio.deviation, _UNPLACED * ratio.ratio))
         least, most = self._bounds(distance, densest)
-        if ratio.visible * least > VISIBLE and likeness < max(ALIKE, _likeness_if_fixed(crop, reference)):
+        if ratio.visible * least > _VISIBLE and likeness < max(_ALIKE, _likeness_if_fixed(crop, reference)):
             raise CannotTellError("what is seen there does not look like the vehicle that was tracked")
         if ratio.ratio > most + 4.0 * ratio.deviation:
             raise CannotTellError("what is seen there has more contrast than fog leaves")
-        return picture, ratio, likeness >= ALIKE
+        return picture, ratio, likeness >= _ALIKE
 
     def _bounds(self, distance: float, densest: float) -> tuple[float, float]:
         """Least and greatest contrast that the vehicle can have at a range, over that of the reference."""
         upto = [one.contrast for one in self.detections if one.distance <= distance + SPACING]
         nearest = self._nearest(distance)
         least = nearest.contrast.ratio * math.exp(-min(densest, DENSEST) * abs(distance - nearest.distance))
-        return least, GROWTH * min((one.ratio + 4.0 * one.deviation for one in upto), default=math.inf)
+        return least, _GROWTH * min((one.ratio + 4.0 * one.deviation for one in upto), default=math.inf)
 
     def _compare(self, reference: RearDetection, detection: RearDetection) -> RearDetection | None:
         ratio = contrast_ratio(reference.picture, detection.picture)
@@ -218,7 +218,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
 
 
 def _is_near(levelled: LevelledRows | None, extinction: float) -> bool:
-    return levelled is None or abs(math.log(extinction / levelled.extinction)) < RELEVELLED
+    return levelled is None or abs(math.log(extinction / levelled.extinction)) < _RELEVELLED
 
 
 def _relevelled(detection: RearDetection, extinction: float) -> RearDetection:
@@ -233,8 +233,8 @@ def _relevelled(detection: RearDetection, extinction: float) -> RearDetection:
 def _likeness_if_fixed(crop: VehicleCrop, reference: RearDetection) -> float:
     """Correlation that a vehicle must have: that of what is at the reference's place and of its size in the image."""
     change = abs(math.log(crop.depth / reference.depth))
-    if change < SCALED:
+    if change < _SCALED:
         return 0.0
     behind = RoadBehind(crop.camera.mount_height, 1.0)
     found = register_rear(reference.picture, crop.picture(reference.box, reference.picture.scale), 0.1, 0.1, behind)
-    return 0.0 if found is None else found[1] - (BETTER if change < RESCALED else 0.0)
+    return 0.0 if found is None else found[1] - (_BETTER if change < _RESCALED else 0.0)

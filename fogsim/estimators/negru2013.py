@@ -51,19 +51,21 @@ from fogsim.vision.region.road_region import constant_limits
 from fogsim.vision.region.subpixel_inflection import subpixel_inflections
 from fogsim.vision.strips.strip_curves import lowest_road_row
 
-GROWTH_SHARE = 0.8
+_GROWTH_SHARE = 0.8
 """ρ of the published region growing [-]; the paper takes its limits from Hautière et al. (2006), without values."""
 
-MIDDLE, LEAST_MIDDLE = 0.3, 200.0
+_MIDDLE, _LEAST_MIDDLE = 0.3, 200.0
 """How far to either side of the vanishing column a band is sought, a share of the image's width and at least [px]."""
 
 REACH = math.radians(4.0)  # [rad] about the assumed vanishing point, within which lines of the road may pass
-ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
-HALF_PAVED, OTHER_GROUND = 4.0, 0.2
+_ALBEDO_DEVIATION = (
+    0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
+)
+_HALF_PAVED, _OTHER_GROUND = 4.0, 0.2
 """How far to either side the ground is as the road is [m], and relative deviation of k where the band leaves it at
 twice the inflection's height below the horizon or lower: another albedo begins there [-]."""
 
-BETWEEN = 1.0
+_BETWEEN = 1.0
 """Rows about the horizon that are neither road nor sky [px]."""
 
 
@@ -260,7 +262,7 @@ class Negru2013:
         diagnostics["profile"] = seen.profile
         curve = narrowed_curve(seen, axis, self._camera) if ahead else road_curve(seen, self._camera)
         paved = abs(0.5 * (band.left + band.right) - axis) * self._camera.row_distance
-        paved /= HALF_PAVED * self._camera.focal_length
+        paved /= _HALF_PAVED * self._camera.focal_length
         if curve.weight.sum() < MIN_ROWS // 2:
             raise CannotTellError("too little road is seen")
         whole = Negru2013Repair.SUBPIXEL_INFLECTION not in self._repairs
@@ -285,7 +287,7 @@ class Negru2013:
             road = road_image(image, self._camera, self._assumed, linear=linear)
             return road, linear_pixels(road.level, self._camera)
         # A band may lie in the middle only: the verges would but cost time.
-        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
+        centre, reach = self._camera.principal_point[0], max(_MIDDLE * self._camera.width, _LEAST_MIDDLE)
         columns = max(math.ceil(centre - reach), 0), min(math.floor(centre + reach) + 1, self._camera.width)
         road = road_image(image, self._camera, self._assumed, columns, linear=linear)
         pixels = linear_pixels(road.level, self._camera)
@@ -300,7 +302,7 @@ class Negru2013:
         if model is None:
             return None
         by_horizon = model.horizon_sensitivity * seen.horizon.standard_deviation
-        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
+        deviation = math.hypot(model.standard_deviation, by_horizon, _ALBEDO_DEVIATION * model.extinction)
         return replace(model, standard_deviation=deviation)
 
     def _between_rows(self, curve: RoadCurve, seen: SeenBand, paved: float) -> FogModel | None:
@@ -308,14 +310,14 @@ class Negru2013:
 
         The band is on the road from `paved` rows below the horizon downward.
         """
-        apart = np.abs(curve.below_horizon) > BETWEEN
+        apart = np.abs(curve.below_horizon) > _BETWEEN
         curve = replace(curve, weight=curve.weight * apart)
         extinction = float(self._extinctions(curve, curve.luminance[:, None])[0])
         if not extinction > 0.0:
             return None
         deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
         beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
-        deviation = math.hypot(deviation, OTHER_GROUND * beside * extinction)
+        deviation = math.hypot(deviation, _OTHER_GROUND * beside * extinction)
         if not fog_or_clear(extinction, deviation)[0] > 0.0:
             return None
         try:
@@ -344,7 +346,7 @@ class Negru2013:
 
     def _limits(self, road: RoadImage, edges: Edges, slope: NDArray[np.float32]) -> GrowthLimits:
         if Negru2013Repair.GROWTH_BY_FOG not in self._repairs:
-            return constant_limits(slope.size, self._growth, self._growth * GROWTH_SHARE, self._growth)
+            return constant_limits(slope.size, self._growth, self._growth * _GROWTH_SHARE, self._growth)
         return fog_limits(road, edges, slope)
 
     def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> tuple[Horizon, float]:

@@ -16,9 +16,9 @@ from fogsim.vision.region.region_kernels import GrowthLimits
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
 from fogsim.vision.region.road_region import Band, crossing_band, cumulative_limits, grow_region
 
-SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
+_SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 
-HALF_BODY = 1.1
+_HALF_BODY = 1.1
 """Half the width of a vehicle ahead, next to which a band may lie at once [m]."""
 
 
@@ -41,13 +41,13 @@ class SeenBand:
 def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
     """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
     below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
-    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
+    return np.minimum(steepest_slope(below_horizon, road.airlight), _SIMILARITY * road.contrast).astype(np.float32)
 
 
 def fog_limits(road: RoadImage, edges: Edges, slope: NDArray[np.float32]) -> GrowthLimits:
     """Limits of a region whose neighbouring rows differ by no more than what fog of the given slopes and noise make."""
     steps = slope + np.float32(edges.threshold)
-    return cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+    return cumulative_limits(steps, _SIMILARITY * road.contrast + edges.threshold)
 
 
 def road_band(
@@ -62,7 +62,7 @@ def road_band(
     """Find the band of road: columns are counted in the whole picture, rows in that of the road."""
     blurred = smoothed(road.luminance)
     region = grow_region(blurred, edges.pixels, limits)
-    hide_vehicle(region, road, camera, lead, HALF_BODY)
+    hide_vehicle(region, road, camera, lead, _HALF_BODY)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
     most = cols if widest else max(5, cols // 24)
     band = crossing_band(

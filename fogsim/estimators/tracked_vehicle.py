@@ -13,20 +13,20 @@ from fogsim.values.observation import LeadMeasurement
 
 Floats = NDArray[np.float64]
 
-KEPT = 512
+_KEPT = 512
 """Measurements that are smoothed together; older ones are taken as they were measured."""
 
-SPEED_DEVIATION, UNEVEN = 0.15, 0.3
+_SPEED_DEVIATION, _UNEVEN = 0.15, 0.3
 """Standard deviation of a relative speed [m/s], and of what the mean of two leaves out of the change of range between
 them over the square of the time between [m/s²]."""
 
 LONGEST = 2.0
 """Time between two measurements beyond which speeds say nothing of the way between [s]."""
 
-SURPRISING = 4.0
+_SURPRISING = 4.0
 """Standard deviations by which a change of range contradicts the speeds [-]: the sensor has jumped."""
 
-LATEST, CONTRADICTED = 8, 1.8
+_LATEST, _CONTRADICTED = 8, 1.8
 """Of how many of the last measurements, and of all, the root mean square change by smoothing may be, in deviations of a
 range [-]: more, and the speeds are not those of these ranges."""
 
@@ -134,7 +134,7 @@ class SmoothedRanges:
 
     def __init__(self, deviation: float) -> None:
         self._deviation = deviation
-        self._measured: deque[tuple[float, float, float]] = deque(maxlen=KEPT)
+        self._measured: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._count = 0
 
     def add(self, time: float, measured: LeadMeasurement) -> int:
@@ -157,7 +157,7 @@ class SmoothedRanges:
         time, distance, speed = np.array(self._measured).T.copy()
         likely = _smoothed(time, distance, speed, self._deviation)
         change = np.abs(likely - distance) / self._deviation
-        if max(_root_mean_square(change), _root_mean_square(change[-LATEST:])) > CONTRADICTED:
+        if max(_root_mean_square(change), _root_mean_square(change[-_LATEST:])) > _CONTRADICTED:
             return measured
         at = np.array(numbers, np.int64) - (self._count - time.size)
         return np.asarray(np.where(at >= 0, likely[np.maximum(at, 0)], measured))
@@ -187,9 +187,9 @@ def _filtered(time: Floats, distance: Floats, speed: Floats, deviation: float, w
         apart = time[i] - time[last]
         if 0.0 < way * apart < LONGEST:
             moved = 0.5 * (speed[i] + speed[last]) * apart
-            unsure = (SPEED_DEVIATION * apart) ** 2 / 2.0 + (UNEVEN * apart**2) ** 2
+            unsure = (_SPEED_DEVIATION * apart) ** 2 / 2.0 + (_UNEVEN * apart**2) ** 2
             surprise = distance[i] - distance[last] - moved
-            if surprise**2 < SURPRISING**2 * (2.0 * deviation**2 + unsure):
+            if surprise**2 < _SURPRISING**2 * (2.0 * deviation**2 + unsure):
                 weight = 1.0 / (1.0 / information[last] + unsure)
                 likely[i] = (likely[last] + moved) * weight + distance[i] / deviation**2
                 information[i] = weight + 1.0 / deviation**2

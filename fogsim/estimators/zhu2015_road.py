@@ -26,22 +26,22 @@ from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError
 from fogsim.vision.region.road_region import constant_limits, grow_region
 from fogsim.vision.region.steepest import fog_of_steepest_rows, highest_place, steepest_rows
 
-LOWEST_ANGLE = math.radians(10.0)
+_LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
 
 REACH = 0.7
 """Rows to either side over which the steepest slope is taken, over those below the horizon [-]."""
 
-RESOLVED = 1.3
+_RESOLVED = 1.3
 """The steepest row over the topmost at which a slope is seen, from which on it is no end of what is seen [-]."""
 
-MOST_SCATTER = 0.2
+_MOST_SCATTER = 0.2
 """Median deviation of the nearest row's pixels from their median, over the contrast, beyond which it is no road [-]."""
 
-TOGETHER = 3
+_TOGETHER = 3
 """Neighbouring rows that make the last that is seen."""
 
-FARTHEST_NEAR, LEAST_LEFT, ALBEDO = 30.0, 0.05, 0.04
+_FARTHEST_NEAR, _LEAST_LEFT, _ALBEDO = 30.0, 0.05, 0.04
 """Distance that the last row must have at least [m], least share of its contrast that must be left, and deviation of
 two places of a road from one another [-]."""
 
@@ -130,7 +130,7 @@ def seen_road(
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
     lines: list[LaneLine] = []
     if not {Zhu2015Repair.SUBPIXEL_HORIZON, Zhu2015Repair.OWN_LANE} <= repairs:
-        lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
+        lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, _LOWEST_ANGLE)
     if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
         horizon, point = seen_horizon(linear_pixels(road.level, camera), camera, assumed)
     else:
@@ -197,7 +197,7 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
             return _of_last_row(curve, road)
         return Inflection(0.0, detection_limit(seen_up_to(curve), apart, camera.row_distance))
     extinction = float(_read(curve, curve.luminance[:, None])[0])
-    resolved = RESOLVED * highest_place(curve, REACH)
+    resolved = _RESOLVED * highest_place(curve, REACH)
     if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
         airlight, dark = check_law(curve, extinction, road.image)
         deviation = extinction_deviation(curve, extinction, _read, apart)
@@ -212,28 +212,28 @@ def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
     """Fog of how far the last row that is seen has brightened."""
     rows = np.flatnonzero((curve.weight > 0.0) & (curve.below_horizon >= 1.0))
     # A row of a few pixels between edges may be anything: the last counts that has others below it.
-    together = np.flatnonzero(rows[TOGETHER - 1 :] - rows[: 1 - TOGETHER] == TOGETHER - 1)
+    together = np.flatnonzero(rows[_TOGETHER - 1 :] - rows[: 1 - _TOGETHER] == _TOGETHER - 1)
     rows = rows[int(together[0]) :] if together.size else rows[:0]
-    if rows.size < MIN_ROWS // 2 or curve.below_horizon[rows[0]] * FARTHEST_NEAR > curve.row_distance:
+    if rows.size < MIN_ROWS // 2 or curve.below_horizon[rows[0]] * _FARTHEST_NEAR > curve.row_distance:
         raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
     near = rows[curve.below_horizon[rows] >= 0.5 * curve.below_horizon[-1]]
     if near.size == 0:
         raise CannotTellError("no road is seen")
     bottom_row = int(near[-1])
     pixels = road.image.luminance[bottom_row][road.region[bottom_row] != 0]
-    if pixels.size and np.median(np.abs(pixels - np.median(pixels))) > MOST_SCATTER * road.image.contrast:
+    if pixels.size and np.median(np.abs(pixels - np.median(pixels))) > _MOST_SCATTER * road.image.contrast:
         raise CannotTellError("what is ahead is too patchy for a road")
-    last = rows[:TOGETHER]
-    below, apart = float(curve.below_horizon[last[TOGETHER // 2]]), road.horizon.standard_deviation
+    last = rows[:_TOGETHER]
+    below, apart = float(curve.below_horizon[last[_TOGETHER // 2]]), road.horizon.standard_deviation
     dark = road.image.airlight - float(np.median(curve.luminance[last]))
     bottom = road.image.airlight - float(np.median(curve.luminance[near]))
-    if dark <= LEAST_LEFT * bottom:
+    if dark <= _LEAST_LEFT * bottom:
         raise CannotTellError("the road has faded into the airlight where it is last seen")
     # (A − I) e^(kλ/(v − v_h)) is the same of both rows, and the nearer one's fog is thin.
     span = 1.0 / below - float(np.mean(1.0 / curve.below_horizon[near]))
     optical = max(math.log(bottom / dark), 0.0) / span
-    noise = road.image.contrast * ALBEDO / dark
-    deviation = math.hypot(math.hypot(ALBEDO, noise) / span, optical * apart / below)
+    noise = road.image.contrast * _ALBEDO / dark
+    deviation = math.hypot(math.hypot(_ALBEDO, noise) / span, optical * apart / below)
     return Inflection(*fog_or_clear(optical / curve.row_distance, deviation / curve.row_distance))
 
 

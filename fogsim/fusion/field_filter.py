@@ -20,19 +20,19 @@ from fogsim.values.observation import FogReport
 
 Floats = NDArray[np.float64]
 
-CUTS = np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
+_CUTS = np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
 """Range of optical depths in which a curve resolves stretches of its own [-]."""
 
-SHORTEST, SHARED, GRAIN = 15.0, 0.8, 0.02
+_SHORTEST, _SHARED, _GRAIN = 15.0, 0.8, 0.02
 """Shortest such stretch [m], correlation of a curve's errors at its ends, and least deviation of its depth [-]."""
 
 
-def curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
+def _curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
     """(n, 4) float64: start and end [m], ln of the mean extinction, and its standard deviation [ln 1/m, -].
 
     Takes `farthest` [m].
     """
-    return _cut(np.array(curve.distance), np.array(curve.depth), np.array(curve.standard_deviation), CUTS, farthest)
+    return _cut(np.array(curve.distance), np.array(curve.depth), np.array(curve.standard_deviation), _CUTS, farthest)
 
 
 @kernel
@@ -41,12 +41,12 @@ def _cut(distance: Floats, depth: Floats, deviation: Floats, cuts: Floats, farth
     start = reached = unsure = 0.0
     for cut in cuts:
         end = np.interp(cut, depth, distance) if cut < depth[-1] else distance[-1]
-        if end - start >= SHORTEST:
+        if end - start >= _SHORTEST:
             total, spread = np.interp(end, distance, depth), np.interp(end, distance, deviation)
             more = max(total - reached, 1e-4)
-            apart = math.sqrt(max(spread**2 + unsure**2 - 2.0 * SHARED * spread * unsure, 0.0))
+            apart = math.sqrt(max(spread**2 + unsure**2 - 2.0 * _SHARED * spread * unsure, 0.0))
             out[count, 0], out[count, 1] = start, min(end, farthest)
-            out[count, 2], out[count, 3] = math.log(more / (end - start)), math.hypot(apart, GRAIN) / more
+            out[count, 2], out[count, 3] = math.log(more / (end - start)), math.hypot(apart, _GRAIN) / more
             count += 1
             start, reached, unsure = end, total, spread
         if start >= farthest or cut >= depth[-1]:
@@ -57,20 +57,20 @@ def _cut(distance: Floats, depth: Floats, deviation: Floats, cuts: Floats, farth
 FARTHEST = CELL * AHEAD
 """How far ahead an estimate is taken to speak [m]."""
 
-CLEAR, UNSURE = 4e-4, 1.5
+_CLEAR, _UNSURE = 4e-4, 1.5
 """Extinction [1/m] and relative deviation [-] from which on an estimate only says that there is little fog."""
 
-STARTLED, CERTAIN, LEAST_LEAP = 3.0, 0.35, 0.3
+_STARTLED, _CERTAIN, _LEAST_LEAP = 3.0, 0.35, 0.3
 """By how many standard deviations, and by how much in ln k, the belief of the here and now must differ for a leap, and
 how sure it must be of ln k [-]."""
 
-CLOCKS_DISAGREE = 5.0
+_CLOCKS_DISAGREE = 5.0
 """How far in the future a report may be for it to count as one of now [s]: clocks of vehicles differ."""
 
-SAME_PLACE, BESIDE, SAME_FOG = 5.0, 100.0, 0.3
+_SAME_PLACE, _BESIDE, _SAME_FOG = 5.0, 100.0, 0.3
 """Distances between which a report next to a doubted one confirms it [m], and by how much the fog may differ [-]."""
 
-ANNOUNCED, ANNOUNCED_DEVIATION = 75.0, 0.6
+_ANNOUNCED, _ANNOUNCED_DEVIATION = 75.0, 0.6
 """Length of the denser fog that is announced [m], and the standard deviation of ln k there: a front is seen, not what
 lies behind it."""
 
@@ -187,15 +187,15 @@ class FieldFilter:
         """Learn an estimate over the stretch that it has seen."""
         if not estimate.valid:
             if estimate.bounds is not None and estimate.bounds.most < math.inf:
-                most = max(estimate.bounds.most, CLEAR)
+                most = max(estimate.bounds.most, _CLEAR)
                 self._field.learn_at_most(self._sight(most), math.log(most), max(estimate.bounds.softness, 0.05))
             return
         k = estimate.extinction
         if not (math.isfinite(k) and math.isfinite(estimate.standard_deviation)):
             return
-        relative = estimate.standard_deviation / max(k, CLEAR)
-        if k < CLEAR or relative > UNSURE:
-            most = max(k + 1.3 * estimate.standard_deviation, CLEAR)
+        relative = estimate.standard_deviation / max(k, _CLEAR)
+        if k < _CLEAR or relative > _UNSURE:
+            most = max(k + 1.3 * estimate.standard_deviation, _CLEAR)
             self._field.learn_at_most(min(estimate.reach, self._sight(most)), math.log(most), 0.3)
             return
         if estimate.optical_depths is None:
@@ -203,7 +203,7 @@ class FieldFilter:
             for start in (0.0, 0.5 * end):
                 self._learn(start, start + 0.5 * end, math.log(k), math.sqrt(2.0) * relative, estimate.common_deviation)
             return
-        for start, end, value, deviation in curve_stretches(estimate.optical_depths, FARTHEST).tolist():
+        for start, end, value, deviation in _curve_stretches(estimate.optical_depths, FARTHEST).tolist():
             self._learn(start, end, value, max(deviation, 0.5 * relative), estimate.common_deviation)
 
     def _learn(self, start: float, end: float, value: float, deviation: float, common: float) -> None:
@@ -215,14 +215,14 @@ class FieldFilter:
     def _hear(self, report: FogReport, time: float, place: float) -> None:
         """Learn what others have measured."""
         age, ahead, known = time - report.time, report.place - place, (report.source, report.number)
-        age = 0.0 if -CLOCKS_DISAGREE <= age < 0.0 else age
+        age = 0.0 if -_CLOCKS_DISAGREE <= age < 0.0 else age
         numbers = (age, ahead, report.extinction, report.relative_deviation)
         if known in self._heard or not all(map(math.isfinite, numbers)) or not 0.0 <= age <= self._oldest_report:
             return
         if not -FARTHEST < ahead < FARTHEST or report.extinction < 0.0 or report.relative_deviation <= 0.0:
             return
         self._heard.add(known)
-        value = math.log(max(report.extinction, CLEAR))
+        value = math.log(max(report.extinction, _CLEAR))
         deviation = math.hypot(max(report.relative_deviation, self._floor), math.sqrt(self._field.variance_of_age(age)))
         self._learn_report(report.place, value, deviation)
 
@@ -240,8 +240,8 @@ class FieldFilter:
 
     @staticmethod
     def _confirms(doubted: tuple[float, float, float], at: float, value: float, deviation: float) -> bool:
-        apart = SAME_FOG + NORMAL_90_PERCENT * math.hypot(deviation, doubted[2])
-        return SAME_PLACE < abs(doubted[0] - at) < BESIDE and abs(doubted[1] - value) < apart
+        apart = _SAME_FOG + NORMAL_90_PERCENT * math.hypot(deviation, doubted[2])
+        return _SAME_PLACE < abs(doubted[0] - at) < _BESIDE and abs(doubted[1] - value) < apart
 
     def _cell_at(self, place: float) -> tuple[float, float]:
         """Ends of a stretch as long as a cell about a place of the way, ahead of the vehicle [m]."""
@@ -250,21 +250,21 @@ class FieldFilter:
     def _mind_leaps(self, now: Belief, reach: float) -> None:
         """Doubt the field where the belief of the here and now surely differs from it, as far as that has been seen."""
         value, deviation = now.log_moments()
-        if deviation > CERTAIN:
+        if deviation > _CERTAIN:
             return
         # A bank that others have reported beyond what was seen is no contradiction.
         sight = min(self._sight(math.exp(value)), reach)
         believed, variance = self._field.mean_extinction(0.0, sight)
         apart = abs(value - believed)
-        if apart > max(STARTLED * math.sqrt(variance + deviation**2), LEAST_LEAP):
+        if apart > max(_STARTLED * math.sqrt(variance + deviation**2), _LEAST_LEAP):
             self._field.leap()
             self._field.learn(0.0, sight, value, max(deviation, 0.1), self._outlier_share, self._floor)
 
     def _expect(self, denser: DenserFog) -> None:
         start = denser.distance
-        value = math.log(max(denser.extinction, CLEAR))
-        widened = ANNOUNCED_DEVIATION / math.sqrt(self._share)
-        self._field.learn(start, start + ANNOUNCED, value, widened, self._outlier_share, self._floor)
+        value = math.log(max(denser.extinction, _CLEAR))
+        widened = _ANNOUNCED_DEVIATION / math.sqrt(self._share)
+        self._field.learn(start, start + _ANNOUNCED, value, widened, self._outlier_share, self._floor)
 
     def _belief(self, now: Belief) -> Belief:
         """The belief with its profile."""

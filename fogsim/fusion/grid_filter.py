@@ -17,16 +17,16 @@ from fogsim.values.belief import Belief
 from fogsim.values.estimate import DenserFog, Estimate, ExtinctionBounds
 from fogsim.values.observation import FogReport
 
-FEWEST = 2
+_FEWEST = 2
 """Fewest images that must report denser fog."""
 
-MOST, LEAST = 0.7, 0.3
+_MOST, _LEAST = 0.7, 0.3
 """Shares of the last images that must report denser fog for it to be announced, and to stay so [-]."""
 
-FASTEST = 70.0
+_FASTEST = 70.0
 """Speed beyond which nothing ahead comes nearer [m/s]."""
 
-NEARER, FARTHER = 0.35, 0.2
+_NEARER, _FARTHER = 0.35, 0.2
 """How much nearer than expected, and how much farther than before, a later image may report the same fog, in shares
 of its distance [-]. What seems to be fog beyond a crest recedes."""
 
@@ -77,7 +77,7 @@ class Announcements:
         ]
         agreeing, last = max(likely, key=lambda pair: (pair[0], pair[1][0]))
         share = agreeing / len(self._reports)
-        enough = agreeing >= FEWEST and share >= (LEAST if self.announced else MOST)
+        enough = agreeing >= _FEWEST and share >= (_LEAST if self.announced else _MOST)
         spans = self.announced or time - denser_fogs[0][0] >= 0.5 * self._window
         self.announced = bool(enough and spans)
         return last[1] if self.announced else None
@@ -86,26 +86,26 @@ class Announcements:
 def _is_same(earlier: tuple[float, DenserFog], later: tuple[float, DenserFog]) -> bool:
     """Whether the later one reports the same fog; the vehicle may have come nearer meanwhile."""
     way = later[0] - earlier[0]
-    nearest = earlier[1].distance - FASTEST * way
-    return way >= 0.0 and (1.0 - NEARER) * nearest <= later[1].distance <= (1.0 + FARTHER) * earlier[1].distance
+    nearest = earlier[1].distance - _FASTEST * way
+    return way >= 0.0 and (1.0 - _NEARER) * nearest <= later[1].distance <= (1.0 + _FARTHER) * earlier[1].distance
 
 
 Floats = NDArray[np.float64]
 
 CELLS = 240
-NEAREST, FARTHEST = 10.0, 10_000.0  # [m] visibilities at the ends of the grid
-LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST, NEAREST))
-LOG_RANGE = LOG_HIGH - LOG_LOW
+_NEAREST, FARTHEST = 10.0, 10_000.0  # [m] visibilities at the ends of the grid
+LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST, _NEAREST))
+_LOG_RANGE = LOG_HIGH - LOG_LOW
 _MOST_STEPS = 64
 
-MOST_COMMON, COMMON_TIME = 3.0, 5.0
+_MOST_COMMON, COMMON_TIME = 3.0, 5.0
 """Largest common deviation that counts [-]: a wider one leaves nothing known either; and the time over which that of
 worse estimates comes to count [s]."""
 
-SLOW, STILL = 15.0, 0.1
+_SLOW, _STILL = 15.0, 0.1
 """Speed below which fog changes in proportion to the way [m/s]; and the least share, since wind moves fog, too [-]."""
 
-LEAST_UNBOUND = 0.2
+_LEAST_UNBOUND = 0.2
 """Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
 
 
@@ -199,9 +199,9 @@ class GridFilter:
         Slower than 15 m/s the belief widens more slowly.
         """
         elapsed = math.nan if self._time is None else time - self._time
-        share = abs(place - self._place) / (SLOW * elapsed) if elapsed > 0.0 else math.nan
+        share = abs(place - self._place) / (_SLOW * elapsed) if elapsed > 0.0 else math.nan
         # In tenths, for the distributions over steps are kept.
-        self._moving = 1.0 if math.isnan(share) else min(max(round(share, 1), STILL), 1.0)
+        self._moving = 1.0 if math.isnan(share) else min(max(round(share, 1), _STILL), 1.0)
         self._place = place
         return self.update(estimates, time)
 
@@ -244,7 +244,7 @@ class GridFilter:
 
     def _update_common(self, common: float) -> None:
         """Follow the common deviation of the best estimate; better images stay known for some seconds."""
-        worse = min(max(common - self._common, 0.0), MOST_COMMON)
+        worse = min(max(common - self._common, 0.0), _MOST_COMMON)
         self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
 
     def _with_common_errors(self) -> Floats:
@@ -305,7 +305,7 @@ class GridFilter:
         seen = estimate.reach * measured / OPTICAL_DEPTH_AT_VISIBILITY if measured > 0.0 else 1.0
         unseen = self._unseen_deviation * max(0.0, 1.0 - seen) * measured
         # Errors in common that do not yet widen the belief are errors of this estimate.
-        more = math.sqrt(max(min(estimate.common_deviation, MOST_COMMON) ** 2 - self._common**2, 0.0))
+        more = math.sqrt(max(min(estimate.common_deviation, _MOST_COMMON) ** 2 - self._common**2, 0.0))
         deviation = math.hypot(min(max(estimate.own_deviation, 0.0), 10.0), floor, unseen, more * measured)
         return _log_likelihoods(self._extinction, measured, deviation, self._outlier_share)
 
@@ -318,7 +318,7 @@ class GridFilter:
         if bounds.least > 0.0:
             inside *= _normal_share((self._log_extinction - math.log(bounds.least)) / softness)
         # Wrong signs are more frequent than other outliers, and the belief must survive two of them.
-        share = max(self._outlier_share, LEAST_UNBOUND)
+        share = max(self._outlier_share, _LEAST_UNBOUND)
         return np.asarray(np.log(share + (1.0 - share) * inside))
 
 
@@ -347,8 +347,8 @@ def _folded(spread: Floats) -> Floats:
 @kernel
 def _log_likelihoods(extinction: Floats, measured: float, deviation: float, outlier_share: float) -> Floats:
     """Logarithm of the likelihood of each extinction by a measured one, relative to that of an outlier."""
-    # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
-    outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
+    # An outlier is any ln k on the grid: 1 / (k _LOG_RANGE) in k, and no more than that at k̂ = 0.
+    outlier = 1.0 / (_LOG_RANGE * max(measured, deviation))
     share = (1.0 - outlier_share) / outlier_share / (math.sqrt(2.0 * math.pi) * deviation * outlier)
     out = np.empty(len(extinction))
     for i in range(len(extinction)):

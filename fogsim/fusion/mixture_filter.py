@@ -20,7 +20,7 @@ from fogsim.values.observation import FogReport
 
 Floats = NDArray[np.float64]
 
-FORGOTTEN = 0.05
+_FORGOTTEN = 0.05
 """Probability of correctness below which a measurement is dropped [-]."""
 
 
@@ -115,7 +115,7 @@ class MixtureFilter:
                 self._measurements.append(_Measurement(one.visibility, time, place))
                 self._taken[one.method] = time + self._spacing - 1e-9
         correct = [self._correct(one, time, place) for one in self._measurements]
-        kept = [(one, p) for one, p in zip(self._measurements, correct, strict=True) if p >= FORGOTTEN]
+        kept = [(one, p) for one, p in zip(self._measurements, correct, strict=True) if p >= _FORGOTTEN]
         self._measurements = [one for one, _ in kept]
         return self._belief(np.array([one.visibility for one, _ in kept]), np.array([p for _, p in kept]))
 

@@ -23,10 +23,10 @@ LEVEL, LEVEL_DEVIATION = math.log(extinction_from_visibility(750.0)), 1.2
 GRAIN, GRAIN_LENGTH = 0.4, 50.0
 """Standard deviation of what else varies, from place to place [-], and the length over which it does [m]."""
 
-BELIEVED = 1.3
+_BELIEVED = 1.3
 """Standard deviations by which the belief lies below a bound that says nothing new [-]."""
 
-SAMPLES = 48
+_SAMPLES = 48
 """Pairs of samples that give the visibility ahead."""
 
 
@@ -51,7 +51,7 @@ class RouteField:
         self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
         self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
         # The same in every run: samples of a distribution must not depend on chance.
-        self._normals = np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1)).T)
+        self._normals = np.ascontiguousarray(np.random.default_rng(0).standard_normal((_SAMPLES, AHEAD + 1)).T)
         self.reset()
 
     def reset(self) -> None:
@@ -114,7 +114,7 @@ class RouteField:
         Takes `end` [m].
         """
         before, shared, variance = self._linearised(0.0, end)
-        if variance <= 0.0 or before + BELIEVED * math.sqrt(variance) < value:
+        if variance <= 0.0 or before + _BELIEVED * math.sqrt(variance) < value:
             return
         moved, left = route_field_kernels.moments_at_most(before, variance, value, softness)
         self._condition(shared, variance, moved, variance - left)

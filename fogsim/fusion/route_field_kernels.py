@@ -9,13 +9,13 @@ from fogsim.core.jit import kernel
 
 Floats = NDArray[np.float64]
 
-LEAST_EXTINCTION, MOST_EXTINCTION = 1e-4, 0.5
+_LEAST_EXTINCTION, _MOST_EXTINCTION = 1e-4, 0.5
 """Range of the extinctions that are reckoned with [1/m]."""
 
-LOG_RANGE = 7.0
+_LOG_RANGE = 7.0
 """ln k that a wrong measurement may have any of [-]."""
 
-WEIGHED = 41
+_WEIGHED = 41
 """Values over which a likelihood is weighed."""
 
 
@@ -131,7 +131,7 @@ def learn(
     if variance <= floor**2 and apart**2 < 4.0 * total:
         return 1.0
     density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / total) / math.sqrt(2.0 * math.pi * total)
-    right = density / (density + wrong / LOG_RANGE)
+    right = density / (density + wrong / _LOG_RANGE)
     gain = variance / total
     narrowed = right * gain * variance - right * (1.0 - right) * (gain * apart) ** 2
     condition(mean, covariance, shared / variance, right * gain * apart, narrowed)
@@ -215,7 +215,7 @@ def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends:
             if found[sample] > 0.0:
                 continue
             value = mean[i] + (apart[sample] if sample < pairs else -apart[sample - pairs])
-            k = min(max(math.exp(value), LEAST_EXTINCTION), MOST_EXTINCTION)
+            k = min(max(math.exp(value), _LEAST_EXTINCTION), _MOST_EXTINCTION)
             more = k * (ends[i] - start)
             if reached[sample] + more >= depth:
                 found[sample] = depth / (start + (depth - reached[sample]) / k)
@@ -233,8 +233,8 @@ def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends:
 def moments_at_most(before: float, variance: float, value: float, softness: float) -> tuple[float, float]:
     """Shift of the mean of a normal distribution that is likely below a value, and the variance that it keeps."""
     total = first = second = 0.0
-    for i in range(WEIGHED):
-        apart = math.sqrt(variance) * (8.0 * i / (WEIGHED - 1) - 4.0)
+    for i in range(_WEIGHED):
+        apart = math.sqrt(variance) * (8.0 * i / (_WEIGHED - 1) - 4.0)
         below = 0.5 * math.erfc((before + apart - value) / (math.sqrt(2.0) * softness))
         weight = math.exp(-0.5 * apart**2 / variance) * (below + 1e-12)
         total += weight

@@ -9,7 +9,7 @@ from fogsim.lighting.high_beam import HIGH_BEAMS, Metres, Seconds, is_dark, sett
 from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 
-FOG_VISIBILITY = 1000.0
+_FOG_VISIBILITY = 1000.0
 """Visibility below which there is fog, where rules say no more than that [m] (WMO)."""
 
 Country = Literal["germany", "france", "united_kingdom", "unece"]
@@ -42,9 +42,9 @@ LAWS: Mapping[Country, LightingLaw] = {
         },
     ),
     "france": LightingLaw(
-        rear_fog_below=FOG_VISIBILITY,
-        front_fog_below=FOG_VISIBILITY,
-        high_beam_from=FOG_VISIBILITY,
+        rear_fog_below=_FOG_VISIBILITY,
+        front_fog_below=_FOG_VISIBILITY,
+        high_beam_from=_FOG_VISIBILITY,
         near_lead=100.0,
         sources={
             "rear_fog_below": "Code de la route R416-7 II: in fog or falling snow; fog by the meteorologists' 1000 m",
@@ -67,8 +67,8 @@ LAWS: Mapping[Country, LightingLaw] = {
     ),
     "unece": LightingLaw(
         rear_fog_below=50.0,
-        front_fog_below=FOG_VISIBILITY,
-        high_beam_from=FOG_VISIBILITY,
+        front_fog_below=_FOG_VISIBILITY,
+        high_beam_from=_FOG_VISIBILITY,
         near_lead=100.0,
         sources={
             "rear_fog_below": "Vienna Convention on Road Traffic 1968, art. 32: in thick fog; 50 m is FogSim's reading",

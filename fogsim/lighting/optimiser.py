@@ -12,10 +12,10 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 from fogsim.values.eye import disability_glare
 
-MEETING_DISTANCE, MEETING_ANGLE = 50.0, math.radians(4.0)
+_MEETING_DISTANCE, _MEETING_ANGLE = 50.0, math.radians(4.0)
 """Where the policy takes a driver to be who meets it: at 50 m, 3.5 m aside [m], [rad]."""
 
-LEAD_DISTANCE, MIRROR_ANGLE, MIRROR_SHARE = 50.0, math.radians(40.0), 0.8
+_LEAD_DISTANCE, _MIRROR_ANGLE, _MIRROR_SHARE = 50.0, math.radians(40.0), 0.8
 """Assumed range of the driver ahead without a radar range [m], the angle at which that driver's mirrors are
 [rad], and how much light they send on [-]."""
 
@@ -88,10 +88,10 @@ def glare_dealt(beam: Lamp, visibility: float, observation: Observation) -> floa
     toward, into_mirrors = _TOWARD[beam]
     veil = 0.0
     if light is None or light.oncoming:
-        at_eye = toward * math.exp(-k * MEETING_DISTANCE) / MEETING_DISTANCE**2
-        veil += float(disability_glare(at_eye, MEETING_ANGLE))
+        at_eye = toward * math.exp(-k * _MEETING_DISTANCE) / _MEETING_DISTANCE**2
+        veil += float(disability_glare(at_eye, _MEETING_ANGLE))
     if lead is not None or (light is not None and light.preceding):
-        distance = max(lead.distance, 5.0) if lead is not None else LEAD_DISTANCE
-        in_mirror = MIRROR_SHARE * into_mirrors * math.exp(-k * distance) / distance**2
-        veil += float(disability_glare(in_mirror, MIRROR_ANGLE))
+        distance = max(lead.distance, 5.0) if lead is not None else _LEAD_DISTANCE
+        in_mirror = _MIRROR_SHARE * into_mirrors * math.exp(-k * distance) / distance**2
+        veil += float(disability_glare(in_mirror, _MIRROR_ANGLE))
     return veil

@@ -21,16 +21,16 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import HeadLamp, Lamp
 from fogsim.values.luminous_intensity import luminous_intensity
 
-EYE_HEIGHT, SETBACK = 1.08, 2.0
+_EYE_HEIGHT, _SETBACK = 1.08, 2.0
 """Height of a car driver's eyes above the road (AASHTO), and how far they are behind the front bumper [m]."""
 
-LEVEL = 7.0
+_LEVEL = 7.0
 """Visibility level that is asked for [-], as gallen2014 does."""
 
-NEAREST, FARTHEST = 6.0, 300.0
+_NEAREST, FARTHEST = 6.0, 300.0
 """Distances from the eyes between which the object is looked for [m]."""
 
-_DISTANCES = np.geomspace(NEAREST, FARTHEST, 64)
+_DISTANCES = np.geomspace(_NEAREST, FARTHEST, 64)
 _PAVEMENT = Pavement()
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 
@@ -57,7 +57,7 @@ def own_veil(lamps: Lamp, visibility: float, distance: float) -> float:
 
 @lru_cache(maxsize=8192)
 def _sight_distance(beams: int, extinction: float, glare: float) -> float:
-    lit = own_head_lamps(Lamp(beams), EYE_HEIGHT, SETBACK)
+    lit = own_head_lamps(Lamp(beams), _EYE_HEIGHT, _SETBACK)
     both_ways = np.exp(-2.0 * extinction * _DISTANCES)
     target = _PAVEMENT.target_reflectance / math.pi * _illuminance(lit, 0.5 * _PAVEMENT.target_size) * both_ways
     road = _PAVEMENT.retroreflected_luminance * _illuminance(lit, 0.0) * both_ways
@@ -66,7 +66,7 @@ def _sight_distance(beams: int, extinction: float, glare: float) -> float:
     level = visibility_level(
         target + veil, background, angular_size(_PAVEMENT.target_size, _DISTANCES), adaptation=background + glare
     )
-    margin = np.abs(level) - LEVEL
+    margin = np.abs(level) - _LEVEL
     seen = np.flatnonzero(margin >= 0.0)
     if not len(seen):
         return 0.0
@@ -83,7 +83,7 @@ def _illuminance(lit: tuple[HeadLamp, ...], height: float) -> NDArray[np.float64
     for lamp in lit:
         forward, left, up = lamp.offset
         ahead = _DISTANCES - forward
-        below = height - EYE_HEIGHT - up
+        below = height - _EYE_HEIGHT - up
         squared = ahead**2 + left**2 + below**2
         total += luminous_intensity(lamp.beam, np.arctan(left / ahead), np.arctan(below / ahead)) / squared
     return total
@@ -92,10 +92,10 @@ def _illuminance(lit: tuple[HeadLamp, ...], height: float) -> NDArray[np.float64
 @lru_cache(maxsize=8)
 def _air(beams: int) -> LitAir:
     """Light on the ways to the object at all distances."""
-    down = np.arctan(EYE_HEIGHT / _DISTANCES)
+    down = np.arctan(_EYE_HEIGHT / _DISTANCES)
     directions = np.stack((np.cos(down), np.zeros_like(down), -np.sin(down)), axis=1).astype(np.float32)
     rays = VeilRays((len(down), 1), directions, *ray_pieces())
-    lamps = [(lamp.offset, lamp_table(lamp.beam)) for lamp in own_head_lamps(Lamp(beams), EYE_HEIGHT, SETBACK)]
+    lamps = [(lamp.offset, lamp_table(lamp.beam)) for lamp in own_head_lamps(Lamp(beams), _EYE_HEIGHT, _SETBACK)]
     return lit_air(rays, lamps, Droplets.MODERATE_RADIATION)
 
 

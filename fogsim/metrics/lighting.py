@@ -8,7 +8,7 @@ from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of,
 from fogsim.units import clock_time
 from fogsim.values import Lamp
 
-DAZZLED_FROM = 1.0
+_DAZZLED_FROM = 1.0
 """Veil from which a driver counts as dazzled [cd/m²]: three times what the low beams of one car on the next lane
 lay over the eye at most, and more than the fog in the own low beams does."""
 
@@ -31,7 +31,7 @@ class Lighting:
         effects = sample.step.truth.lamp_effects
         if effects is None:
             return
-        dazzled = sum(veil >= DAZZLED_FROM for veil in effects.veils)
+        dazzled = sum(veil >= _DAZZLED_FROM for veil in effects.veils)
         self._time += sample.elapsed
         self._sight_time += effects.own_sight * sample.elapsed
         self._least_sight = min(

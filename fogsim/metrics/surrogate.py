@@ -17,10 +17,10 @@ QUEUE_SPEED = 5.0
 CRITICAL_DECELERATION = 3.4
 """Deceleration to avoid a crash from which a conflict is serious [m/s²] (threshold of SUMO's SSM device for MDRAC)."""
 
-ALERT_REACTION_TIME = 1.0
+_ALERT_REACTION_TIME = 1.0
 """Perception and reaction time of a driver who looks ahead [s] (default of SUMO's SSM device)."""
 
-FULL_BRAKING = 6.43
+_FULL_BRAKING = 6.43
 """Deceleration that the brakes of a passenger car must reach at least [m/s²] (UN R13-H, mean fully developed)."""
 
 AVAILABLE_DECELERATION = (8.45, 1.40, 4.23, 12.68)
@@ -90,7 +90,7 @@ def deceleration_rate_to_avoid_crash(gap: ArrayLike, speed: ArrayLike, leader_sp
 
 
 def modified_deceleration_rate_to_avoid_crash(
-    gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike, reaction_time: float = ALERT_REACTION_TIME
+    gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike, reaction_time: float = _ALERT_REACTION_TIME
 ) -> NDArray[np.float64]:
     """Deceleration to avoid a crash when it begins only after a reaction time, MDRAC = Δv / (2 (TTC − PRT)).
 
@@ -117,8 +117,8 @@ def potential_collision_speed(
     gap: ArrayLike,
     speed: ArrayLike,
     leader_speed: ArrayLike,
-    reaction_time: float = ALERT_REACTION_TIME,
-    deceleration: float = FULL_BRAKING,
+    reaction_time: float = _ALERT_REACTION_TIME,
+    deceleration: float = _FULL_BRAKING,
 ) -> NDArray[np.float64]:
     """Difference of speed at which a follower hits its leader if that brakes fully now, and it itself after reacting.
 
@@ -181,8 +181,8 @@ def stopping_distance_difference(
     gap: ArrayLike,
     speed: ArrayLike,
     leader_speed: ArrayLike,
-    reaction_time: float = ALERT_REACTION_TIME,
-    deceleration: float = FULL_BRAKING,
+    reaction_time: float = _ALERT_REACTION_TIME,
+    deceleration: float = _FULL_BRAKING,
 ) -> NDArray[np.float64]:
     """Difference of space distance and stopping distance, gap + v_L² / 2b − (v_F t + v_F² / 2b) (DSS).
 

@@ -14,7 +14,7 @@ from fogsim.metrics.following import Following, pair_on_courses
 from fogsim.metrics.metric import Definition, JsonValue, share
 from fogsim.values import Cohort, Collision, Step, TrafficState, TrafficStep
 
-MOST_ROWS = 4096
+_MOST_ROWS = 4096
 """Rows that are gathered before the metrics get them."""
 
 _OF_ROWS = (
@@ -165,7 +165,7 @@ class TrafficGathering:
     @property
     def is_full(self) -> bool:
         """True if a span is worth making."""
-        return self._rows >= MOST_ROWS
+        return self._rows >= _MOST_ROWS
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
         """Add a step, a time [s] after the one before."""

@@ -7,7 +7,7 @@ from fogsim.values import Estimate
 from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.lines.horizon import PITCH_DEVIATION
 
-ON_THE_ROAD = ("night_road",)
+_ON_THE_ROAD = ("night_road",)
 """Methods that take distances from the calibration of the road plane, so that their extinction goes with the inverse of
 focal length × mount height, and have no parameter `scale_deviation`."""
 
@@ -41,7 +41,7 @@ class CalibrationDeviations:
         estimate : Estimate
             Of a method that may measure along the road.
         """
-        if not estimate.valid or self.scale == 0.0 or estimate.method not in ON_THE_ROAD:
+        if not estimate.valid or self.scale == 0.0 or estimate.method not in _ON_THE_ROAD:
             return estimate
         deviation = self._of(estimate.extinction, estimate.standard_deviation)
         depths = estimate.optical_depths

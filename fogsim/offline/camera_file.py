@@ -17,10 +17,10 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
-MADE_TO_BE_LOOKED_AT = 8
+_MADE_TO_BE_LOOKED_AT = 8
 """Bit depth of images for viewing; sensor values with more bits are proportional to light."""
 
-HEIGHT_DEVIATION, FOCAL_DEVIATION, USUAL_PITCH_DEVIATION = 0.05, 0.03, math.radians(0.15)
+_HEIGHT_DEVIATION, _FOCAL_DEVIATION, _USUAL_PITCH_DEVIATION = 0.05, 0.03, math.radians(0.15)
 """Assumed standard deviations where a camera file states none: relative [-], and of the pitch of a moving vehicle
 [rad]."""
 
@@ -146,7 +146,7 @@ def load_calibration(path: str | Path) -> Calibration:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
         raise InputError(mistake_lines(document, CameraFile, error)) from error
-    assumed = Response.SRGB if keys.bits == MADE_TO_BE_LOOKED_AT else Response.LINEAR
+    assumed = Response.SRGB if keys.bits == _MADE_TO_BE_LOOKED_AT else Response.LINEAR
     remark = f"{path}: response is not given: {assumed.value} is assumed, as images of {keys.bits} bits mostly have"
     camera = Camera(
         width=keys.width,
@@ -170,7 +170,7 @@ def load_calibration(path: str | Path) -> Calibration:
 
 def _deviations(keys: CameraFile) -> CalibrationDeviations:
     """The stated standard deviations, or the usual ones."""
-    focal, height, pitch = FOCAL_DEVIATION, HEIGHT_DEVIATION, USUAL_PITCH_DEVIATION
+    focal, height, pitch = _FOCAL_DEVIATION, _HEIGHT_DEVIATION, _USUAL_PITCH_DEVIATION
     if keys.focal_length_sd_px is not None:
         focal = keys.focal_length_sd_px / keys.focal_length_px
     if keys.mount_height_sd_m is not None:

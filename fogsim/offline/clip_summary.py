@@ -13,16 +13,16 @@ from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.results import ENDLESS, metres, span_text
 from fogsim.values.estimate import Estimate, fog_category
 
-RECENT = 1.0
+_RECENT = 1.0
 """Time before the last image over which estimates are summed up as those of now [s]."""
 
-NEAREST, FARTHEST, COLUMNS = 20.0, 2000.0, 60
+_NEAREST, FARTHEST, COLUMNS = 20.0, 2000.0, 60
 """Visibilities at the ends of the drawn scale [m], and columns of the line of blocks."""
 
-MOST_REASONS = 3
+_MOST_REASONS = 3
 """Reasons that are listed, the most frequent ones."""
 
-BLOCKS = "▁▂▃▄▅▆▇█"
+_BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Clip:
 def _summary(readings: list[Reading]) -> Iterator[str]:
     valid = [one for one in readings if not one.reason]
     end = readings[-1].time
-    recent = [one for one in valid if one.time >= end - RECENT]
+    recent = [one for one in valid if one.time >= end - _RECENT]
     length = end - readings[0].time
     if recent:
         middle, low, high = (float(np.median([getattr(one, name) for one in recent])) for name in _VALUES)
@@ -87,10 +87,10 @@ def _summary(readings: list[Reading]) -> Iterator[str]:
     if valid:
         low, middle, high = np.quantile([min(one.visibility, ENDLESS) for one in valid], (0.05, 0.5, 0.95))
         yield f"over {length:.1f} s    median {metres(middle)}, 9 of 10 frames within {span_text(low, high)}"
-        yield f"               {_blocks(readings)}  {NEAREST:.0f} m … {FARTHEST:.0f} m, log scale"
+        yield f"               {_blocks(readings)}  {_NEAREST:.0f} m … {FARTHEST:.0f} m, log scale"
     yield f"valid          {len(valid)} of {len(readings)} frames"
     reasons = Counter(one.reason for one in readings if one.reason)
-    for reason, count in reasons.most_common(MOST_REASONS):
+    for reason, count in reasons.most_common(_MOST_REASONS):
         yield f"no answer      {count} × {reason}"
 
 
@@ -105,8 +105,10 @@ def _blocks(readings: list[Reading]) -> str:
         if seen.size == 0:
             columns.append(" ")
             continue
-        share = math.log(min(max(float(np.median(seen)), NEAREST), FARTHEST) / NEAREST) / math.log(FARTHEST / NEAREST)
-        columns.append(BLOCKS[min(int(share * len(BLOCKS)), len(BLOCKS) - 1)])
+        share = math.log(min(max(float(np.median(seen)), _NEAREST), FARTHEST) / _NEAREST) / math.log(
+            FARTHEST / _NEAREST
+        )
+        columns.append(_BLOCKS[min(int(share * len(_BLOCKS)), len(_BLOCKS) - 1)])
     return "".join(columns)
 
 
@@ -114,12 +116,12 @@ def _draw(axes: Axes, readings: list[Reading]) -> None:
     time = np.array([one.time for one in readings])
     shown, low, high = (np.array([getattr(one, name) for one in readings]) for name in _VALUES)
     silent = np.isnan(shown)
-    low, high = (np.where(silent, np.nan, np.clip(end, NEAREST, FARTHEST)) for end in (low, high))
+    low, high = (np.where(silent, np.nan, np.clip(end, _NEAREST, FARTHEST)) for end in (low, high))
     axes.fill_between(time, low, high, alpha=0.25, linewidth=0, label="90 % interval")
-    axes.plot(time, np.clip(shown, NEAREST, FARTHEST), linewidth=1.4, label="visibility")
+    axes.plot(time, np.clip(shown, _NEAREST, FARTHEST), linewidth=1.4, label="visibility")
     if silent.any():
-        axes.plot(time[silent], np.full(int(silent.sum()), NEAREST), "|", color="0.5", label="no answer")
-    axes.set(yscale="log", ylim=(NEAREST, FARTHEST), ylabel="V_met [m]")
+        axes.plot(time[silent], np.full(int(silent.sum()), _NEAREST), "|", color="0.5", label="no answer")
+    axes.set(yscale="log", ylim=(_NEAREST, FARTHEST), ylabel="V_met [m]")
     axes.set_yticks([20, 50, 100, 300, 1000], ["20", "50", "100", "300", "1000"])
     axes.grid(alpha=0.3)
     axes.legend(loc="upper right", fontsize="small")

@@ -19,10 +19,10 @@ from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
-ALL = "all"
+_ALL = "all"
 """Represents every method of the registry."""
 
-WHOLE_RANGE_BITS = 12
+_WHOLE_RANGE_BITS = 12
 """Bit depth for estimating images that use all 16 bits; four more bits are noise in any camera."""
 
 
@@ -59,16 +59,16 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
         If a name is unknown; the message has the known ones and the nearest.
     """
     for name in names:
-        if name != ALL and name not in ESTIMATORS:
-            raise UnknownNameError("method", name, [*ESTIMATORS, ALL])
-    meant = [one for name in names for one in (ESTIMATORS if name == ALL else (name,))]
+        if name != _ALL and name not in ESTIMATORS:
+            raise UnknownNameError("method", name, [*ESTIMATORS, _ALL])
+    meant = [one for name in names for one in (ESTIMATORS if name == _ALL else (name,))]
     return tuple(dict.fromkeys(meant))
 
 
 def estimate_images(
     inputs: Sequence[str | Path] | str | Path,
     camera: Camera | Calibration,
-    methods: Sequence[str] | str = ALL,
+    methods: Sequence[str] | str = _ALL,
     *,
     sequence: bool | None = None,
     rate: float | None = None,
@@ -226,5 +226,5 @@ def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:
-        return (image >> (16 - WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=WHOLE_RANGE_BITS)
+        return (image >> (16 - _WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=_WHOLE_RANGE_BITS)
     return image, camera

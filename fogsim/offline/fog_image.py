@@ -20,7 +20,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
 
-LEAST_SKY = 0.001
+_LEAST_SKY = 0.001
 """Least share of sky in an image from which its airlight is taken; otherwise, the brightest such share is used."""
 
 
@@ -49,7 +49,7 @@ def fog_image(
     extinction = extinction_from_visibility(visibility)
     if extinction == 0:
         return image.copy()
-    full = full_scale(image, camera)
+    full = _full_scale(image, camera)
     colours = image.reshape(*image.shape[:2], -1)
     channels = min(colours.shape[2], 3)
     if layer is None:
@@ -66,7 +66,7 @@ def fog_image(
     return out.reshape(image.shape)
 
 
-def full_scale(image: Pixels, camera: Camera) -> float:
+def _full_scale(image: Pixels, camera: Camera) -> float:
     """Largest pixel value of an image, by its type and the camera's bit depth."""
     if image.dtype == np.uint16 and camera.bits > 8:
         return float(2**camera.bits - 1)
@@ -80,11 +80,11 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0
     """
     colours = image.reshape(-1, 1 if image.ndim == 2 else image.shape[2])[:, :3].astype(np.float64)
     sky = np.isinf(distance).reshape(-1)
-    if sky.mean() >= LEAST_SKY:
+    if sky.mean() >= _LEAST_SKY:
         above = colours[sky]
         above = above[np.argsort(above.sum(axis=1))[-max(1, round(share * len(above))) :]] if share < 1.0 else above
         return np.asarray(np.median(above, axis=0))
-    brightest = np.argsort(colours.sum(axis=1))[-max(1, round(LEAST_SKY * len(colours))) :]
+    brightest = np.argsort(colours.sum(axis=1))[-max(1, round(_LEAST_SKY * len(colours))) :]
     return np.asarray(colours[brightest].mean(axis=0))
 
 
@@ -94,7 +94,7 @@ def in_layer(
     """Pixel values of the level airlight in a layer, from those of a uniform one."""
     if layer is None:
         return airlight
-    full = full_scale(image, camera)
+    full = _full_scale(image, camera)
     light = layer.level * exposure_of(airlight / full, camera.response, camera.black_level)
     return np.asarray(full * respond(light, camera.response, camera.black_level))
 
@@ -142,7 +142,7 @@ def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None
 
 def given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
     """A user's airlight as pixel values, blue first as images are stored; InputError if number or range do not fit."""
-    full = full_scale(pixels, camera)
+    full = _full_scale(pixels, camera)
     if len(airlight) not in (1, colours):
         raise InputError(f"--airlight must be one pixel value or {colours}, got {len(airlight)}")
     if not all(0 <= value <= full for value in airlight):

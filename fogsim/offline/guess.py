@@ -19,43 +19,43 @@ from fogsim.values import Camera, Response
 from fogsim.vision.lines.segments import RoadSegments, road_segments
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
-ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
+_ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
 """Default horizontal field of view of an unknown camera [rad]."""
 
-ASSUMED_MOUNT_HEIGHT = 1.3
+_ASSUMED_MOUNT_HEIGHT = 1.3
 """Default height of a dash camera in a passenger car [m]."""
 
-STATED_DEVIATION, METADATA_DEVIATION, FIELD_DEVIATION, HEIGHT_DEVIATION = 0.03, 0.05, 0.25, 0.12
+_STATED_DEVIATION, _METADATA_DEVIATION, _FIELD_DEVIATION, _HEIGHT_DEVIATION = 0.03, 0.05, 0.25, 0.12
 """Relative standard deviations of stated values, of a focal length in metadata, of one by the assumed field of view
 (45° to 82° within 90 %), and of the assumed height [-]."""
 
-LANE_WIDTH, LANE_DEVIATION = 3.5, 0.08
+_LANE_WIDTH, _LANE_DEVIATION = 3.5, 0.08
 """Usual width of lanes [m] and its relative standard deviation, including the lines' own errors [-]."""
 
-NEAREST_LINE, FARTHEST_LINE, SHORTEST_LINE = 0.4, 3.0, 0.3
+_NEAREST_LINE, _FARTHEST_LINE, _SHORTEST_LINE = 0.4, 3.0, 0.3
 """Lateral offsets over the camera's height between which the own lane's lines are sought, and their least length over
 the longest on that side [-]."""
 
-AGREEING = 2.0
+_AGREEING = 2.0
 """Standard deviations up to which the height by the lane agrees with the assumed one."""
 
-LINES_DEVIATION = math.radians(0.25)
+_LINES_DEVIATION = math.radians(0.25)
 """Standard deviation of the pitch by the lines of real roads, which bend and undulate and whose shadows pass for lines
 [rad]."""
 
-MOST_IMAGES, MOST_COLUMNS = 40, 960
+_MOST_IMAGES, _MOST_COLUMNS = 40, 960
 """Maximum number of images that are used, spread over the source, and of their columns: larger ones are reduced."""
 
-SURE_PITCH = math.radians(0.1)
+_SURE_PITCH = math.radians(0.1)
 """Standard deviation of the pitch above which a guess is called uncertain [rad]: 10 % of V at 100 m."""
 
-SURE_COUNT = 5
+_SURE_COUNT = 5
 """Images with a vanishing point below which a guess is called uncertain."""
 
-SYSTEMATIC = 0.5
+_SYSTEMATIC = 0.5
 """Standard deviation of a vanishing point that more images of the same road do not reduce [px]."""
 
-ASIDE = math.radians(3.0)
+_ASIDE = math.radians(3.0)
 """Angle to the side above which the camera is reported not to look along the road [rad]."""
 
 _FULL_FRAME_DIAGONAL_MM = 43.27
@@ -154,7 +154,7 @@ def guess_camera(
     return CameraGuess(
         Camera(cols, rows, focal.value, middle, height.value, pitch, response=response),
         CalibrationDeviations(
-            focal.deviation, height.deviation, math.hypot(LINES_DEVIATION, horizon.deviation / focal.value)
+            focal.deviation, height.deviation, math.hypot(_LINES_DEVIATION, horizon.deviation / focal.value)
         ),
         reasons,
         (*focal.warnings, *horizon.warnings, *height.warnings),
@@ -194,7 +194,7 @@ def _check_values(mount_height: float | None, field_of_view: float | None) -> No
 
 def _spread(source: Source, progress: Callable[[int, int], None]) -> Iterator[Pixels]:
     """Images of one size, spread over the source."""
-    every = max(1, math.ceil(source.count / MOST_IMAGES))
+    every = max(1, math.ceil(source.count / _MOST_IMAGES))
     size, name, reason = None, None, ""
     for index, picture in enumerate(source.pictures()):
         reason = reason or picture.error
@@ -221,18 +221,18 @@ def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | N
     """Focal length [px]."""
     if field_of_view is not None:
         reason = f"a field of view of {math.degrees(field_of_view):g}° as stated"
-        return _Guessed(0.5 * cols / math.tan(0.5 * field_of_view), STATED_DEVIATION, reason)
+        return _Guessed(0.5 * cols / math.tan(0.5 * field_of_view), _STATED_DEVIATION, reason)
     stated = _stated_focal_length(source.paths[0])
     if stated is not None:
         focal = stated * math.hypot(cols, rows) / _FULL_FRAME_DIAGONAL_MM
-        return _Guessed(focal, METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
-    degrees = math.degrees(ASSUMED_FIELD_OF_VIEW)
+        return _Guessed(focal, _METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
+    degrees = math.degrees(_ASSUMED_FIELD_OF_VIEW)
     warning = (
         f"the field of view is assumed to be {degrees:g}°, and an error of the focal length goes into every visibility "
         "one to one: look it up and give it as --field-of-view"
     )
-    focal = 0.5 * cols / math.tan(0.5 * ASSUMED_FIELD_OF_VIEW)
-    return _Guessed(focal, FIELD_DEVIATION, f"ASSUMED: a field of view of {degrees:g}°", (warning,))
+    focal = 0.5 * cols / math.tan(0.5 * _ASSUMED_FIELD_OF_VIEW)
+    return _Guessed(focal, _FIELD_DEVIATION, f"ASSUMED: a field of view of {degrees:g}°", (warning,))
 
 
 def _stated_focal_length(path: Path) -> float | None:
@@ -248,7 +248,7 @@ def _stated_focal_length(path: Path) -> float | None:
 
 def _road_lines(image: Pixels, response: Response) -> RoadSegments | None:
     """Segments along the road in an image, in its own pixels though sought in a reduced one."""
-    shrink = max(1.0, image.shape[1] / MOST_COLUMNS)
+    shrink = max(1.0, image.shape[1] / _MOST_COLUMNS)
     reduced: Any = image
     if shrink > 1.0:
         reduced = cv2.resize(image, None, fx=1.0 / shrink, fy=1.0 / shrink, interpolation=cv2.INTER_AREA)
@@ -283,21 +283,21 @@ def _horizon(lines: Sequence[RoadSegments], images: int, focal: float, cols: int
 def _mount_height(lines: Sequence[RoadSegments], stated: float | None) -> _Guessed:
     """Height of the camera [m]."""
     if stated is not None:
-        return _Guessed(stated, STATED_DEVIATION, "as stated")
-    warning = f"the mount height is assumed to be {ASSUMED_MOUNT_HEIGHT} m: measure it and correct it"
-    assumed = _Guessed(ASSUMED_MOUNT_HEIGHT, HEIGHT_DEVIATION, "ASSUMED: a passenger car", (warning,))
+        return _Guessed(stated, _STATED_DEVIATION, "as stated")
+    warning = f"the mount height is assumed to be {_ASSUMED_MOUNT_HEIGHT} m: measure it and correct it"
+    assumed = _Guessed(_ASSUMED_MOUNT_HEIGHT, _HEIGHT_DEVIATION, "ASSUMED: a passenger car", (warning,))
     widths = [width for one in lines if (width := _lane_over_height(one)) is not None]
-    if len(widths) < SURE_COUNT:
+    if len(widths) < _SURE_COUNT:
         return assumed
-    by_lane = LANE_WIDTH / float(np.median(widths))
-    apart = math.log(by_lane / ASSUMED_MOUNT_HEIGHT)
-    if abs(apart) > AGREEING * math.hypot(HEIGHT_DEVIATION, LANE_DEVIATION):
+    by_lane = _LANE_WIDTH / float(np.median(widths))
+    apart = math.log(by_lane / _ASSUMED_MOUNT_HEIGHT)
+    if abs(apart) > _AGREEING * math.hypot(_HEIGHT_DEVIATION, _LANE_DEVIATION):
         return assumed
-    share = HEIGHT_DEVIATION**2 / (HEIGHT_DEVIATION**2 + LANE_DEVIATION**2)
-    height = round(ASSUMED_MOUNT_HEIGHT * math.exp(share * apart), 2)
-    reason = f"ASSUMED: a passenger car, and lanes of {LANE_WIDTH} m, which alone give {by_lane:.2f} m"
+    share = _HEIGHT_DEVIATION**2 / (_HEIGHT_DEVIATION**2 + _LANE_DEVIATION**2)
+    height = round(_ASSUMED_MOUNT_HEIGHT * math.exp(share * apart), 2)
+    reason = f"ASSUMED: a passenger car, and lanes of {_LANE_WIDTH} m, which alone give {by_lane:.2f} m"
     warning = f"the mount height is assumed to be {height} m, also by the width of the lane: measure it and correct it"
-    return _Guessed(height, LANE_DEVIATION * math.sqrt(share), reason, (warning,))
+    return _Guessed(height, _LANE_DEVIATION * math.sqrt(share), reason, (warning,))
 
 
 def _scaled(
@@ -318,7 +318,7 @@ def _scaled(
         at = way(picture.time)
         if picture.image is not None and at is not None:
             motion.add(picture.image, at)
-        if motion.pairs >= MOST_IMAGES:
+        if motion.pairs >= _MOST_IMAGES:
             break
     scale = motion.scale()
     if scale is None:
@@ -337,10 +337,10 @@ def _lane_over_height(lines: RoadSegments) -> float | None:
     sides = []
     for side in (-1.0, 1.0):
         offset = side * lines.slopes
-        near = (offset > NEAREST_LINE) & (offset < FARTHEST_LINE)
+        near = (offset > _NEAREST_LINE) & (offset < _FARTHEST_LINE)
         if not near.any():
             return None
-        sure = near & (lines.length >= SHORTEST_LINE * lines.length[near].max())
+        sure = near & (lines.length >= _SHORTEST_LINE * lines.length[near].max())
         sides.append(float(offset[sure].min()))
     return sum(sides)
 
@@ -352,22 +352,22 @@ def _median_row(points: list[VanishingPoint]) -> tuple[float, float]:
     scatter = 1.4826 * float(np.median(np.abs(rows - row)))
     single = float(np.median([point.row_deviation for point in points]))
     # A median is a quarter less certain than a mean.
-    return row, math.hypot(1.25 * max(scatter, single) / math.sqrt(len(points)), SYSTEMATIC)
+    return row, math.hypot(1.25 * max(scatter, single) / math.sqrt(len(points)), _SYSTEMATIC)
 
 
 def _warnings_of(points: list[VanishingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
     """Uncertainty of a horizon from vanishing points, in words."""
     found = []
-    if len(points) < SURE_COUNT:
+    if len(points) < _SURE_COUNT:
         found.append(f"the pitch comes from {len(points)} image{'s' if len(points) > 1 else ''} alone: give more")
-    sure = focal * SURE_PITCH
+    sure = focal * _SURE_PITCH
     if deviation > sure:
         found.append(
             f"the vanishing point is uncertain: row {row:.1f} ± {deviation:.1f}, where ± {sure:.1f} would be 0.1°; "
             "give images of a straight road with marks, or the row of the horizon as --horizon-row"
         )
     aside = math.atan((float(np.median([point.column for point in points])) - 0.5 * (cols - 1)) / focal)
-    if abs(aside) > ASIDE:
+    if abs(aside) > _ASIDE:
         side = "left" if aside > 0 else "right"
         found.append(
             f"the road leads {abs(math.degrees(aside)):.0f}° past the image's middle: either the road bends, or the "

@@ -19,10 +19,10 @@ from fogsim.core.files.readers import read_bytes
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.values import Camera
 
-DEPTH_KINDS = ("planar", "range")
+_DEPTH_KINDS = ("planar", "range")
 """Types of a depth map: distance along the optical axis, or along the viewing ray."""
 
-CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
+_CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
 """Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
 
 ANIMATED_FORMATS = ("GIF", "WEBP", "PNG")
@@ -33,7 +33,7 @@ _ORIENTATION = 0x0112  # EXIF, as below
 _SIDEWAYS = (5, 6, 7, 8)
 _TOP_TO_BOTTOM, _LEFT_TO_RIGHT = (3, 4, 7, 8), (2, 3, 6, 7)
 
-MOST_BYTES = 2**31
+_MOST_BYTES = 2**31
 """Largest file of an image or a depth map [bytes]."""
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
@@ -49,7 +49,7 @@ def read_image(path: Path) -> Pixels:
 
 
 def _decoded(path: Path) -> NDArray[np.generic]:
-    data = read_bytes(path, MOST_BYTES)
+    data = read_bytes(path, _MOST_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty")
     orientation = _checked(path, data)
@@ -80,7 +80,7 @@ def _checked(path: Path, data: bytes) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(data))
-            if image.format in CHECKED_FORMATS:
+            if image.format in _CHECKED_FORMATS:
                 image.load()
             parts, orientation = getattr(image, "n_frames", 1), image.getexif().get(_ORIENTATION, 1)
     except UnidentifiedImageError:
@@ -110,8 +110,8 @@ class DepthMap(NamedTuple):
 def read_distance(depth_map: DepthMap, camera: Camera) -> NDArray[np.float64]:
     """Distances along the rays (rows, cols) [m] from a depth map; ``inf`` (sky) where it has 0 or ``inf``."""
     path, kind, scale = depth_map
-    if kind not in DEPTH_KINDS:
-        raise UnknownNameError("depth kind", kind, DEPTH_KINDS)
+    if kind not in _DEPTH_KINDS:
+        raise UnknownNameError("depth kind", kind, _DEPTH_KINDS)
     if scale is not None and not (scale > 0 and math.isfinite(scale)):
         raise InputError(f"--depth-scale must be a positive number of metres, got {scale!r}")
     depth = _numbers(path) if path.suffix.lower() == ".npy" else _steps(path, scale)
@@ -127,7 +127,7 @@ def read_distance(depth_map: DepthMap, camera: Camera) -> NDArray[np.float64]:
 
 def _numbers(path: Path) -> NDArray[np.float64]:
     try:
-        loaded = np.load(io.BytesIO(read_bytes(path, MOST_BYTES)), allow_pickle=False)
+        loaded = np.load(io.BytesIO(read_bytes(path, _MOST_BYTES)), allow_pickle=False)
     except InputError:
         raise
     except (ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:

@@ -11,13 +11,13 @@ from fogsim.errors import InputError, suggest
 from fogsim.offline.source import Animation, ImageFiles, Source
 from fogsim.offline.video_source import VideoFile
 
-IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
+_IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
 """Suffixes of the images that are taken from a folder."""
 
-VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
+_VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
 """Suffixes of videos."""
 
-SEQUENCE_RATE = 10.0
+_SEQUENCE_RATE = 10.0
 """Default number of images of a numbered sequence per second [1/s]."""
 
 
@@ -58,7 +58,7 @@ def find_source(
         return animation
     if not any(is_video(path) for path in paths):
         temporal = is_sequence(paths) if sequence is None else sequence
-        return ImageFiles(tuple(paths), temporal, 1.0 / (rate or SEQUENCE_RATE))
+        return ImageFiles(tuple(paths), temporal, 1.0 / (rate or _SEQUENCE_RATE))
     if len(paths) > 1:
         raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
     if rate is not None:
@@ -68,15 +68,17 @@ def find_source(
 
 def is_video(path: Path) -> bool:
     """Whether a file is a video, by its suffix."""
-    return path.suffix.lower() in VIDEO_ENDINGS
+    return path.suffix.lower() in _VIDEO_ENDINGS
 
 
 def _paths(given: str) -> list[Path]:
     path = Path(given)
     if path.is_dir():
-        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
+        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in _IMAGE_ENDINGS and one.is_file())
         if not found:
-            raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
+            raise InputError(
+                f"{path}: the folder contains no image with one of the endings {', '.join(_IMAGE_ENDINGS)}"
+            )
         return found
     if path.exists():
         return [path]

@@ -25,10 +25,10 @@ from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_col
 from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import eight_bit
 
-WIDEST, NARROWEST = 1280, 640
+_WIDEST, _NARROWEST = 1280, 640
 """Width to which narrower and wider images are scaled [px]."""
 
-LOOKED_AT = 20
+_LOOKED_AT = 20
 """Constant rate factor of a video for viewing."""
 
 _LINE = 30
@@ -46,7 +46,7 @@ class Overlay:
     def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
         self._bits = camera.bits
         self._colours = method_colours(methods)
-        self._scale = min(max(camera.width, NARROWEST), WIDEST) / camera.width
+        self._scale = min(max(camera.width, _NARROWEST), _WIDEST) / camera.width
         # Videos of 4:2:0 have even sizes.
         width, height = (2 * math.ceil(self._scale * side / 2) for side in (camera.width, camera.height))
         self._picture_height = height
@@ -140,7 +140,7 @@ def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:
     return eight_bit(image, bits if bits > 8 else 16)
 
 
-PICTURE_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+_PICTURE_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 """Suffixes of images, and their names in Pillow."""
 
 
@@ -174,8 +174,8 @@ class OverlayFile:
         _check(path, source, overwrite)
         self._path = path
         self._overlay = Overlay(camera, methods)
-        self._video = VideoWriter(path, LOOKED_AT)
-        self._format = PICTURE_FORMATS.get(path.suffix.lower())
+        self._video = VideoWriter(path, _LOOKED_AT)
+        self._format = _PICTURE_FORMATS.get(path.suffix.lower())
         self._picture = b""
 
     def add(self, result: FrameEstimates) -> None:
@@ -210,7 +210,7 @@ class OverlayFile:
 
 def _check(path: Path, source: Source, overwrite: bool) -> None:
     ending = path.suffix.lower()
-    if ending != ".mp4" and ending not in PICTURE_FORMATS:
+    if ending != ".mp4" and ending not in _PICTURE_FORMATS:
         raise InputError(
             f"--overlay {path}: expected a name that ends in .mp4, .png or .jpg, got {ending or 'no ending'}"
         )

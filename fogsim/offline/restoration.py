@@ -19,7 +19,7 @@ from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import respond
 
-ESTIMATOR = "joint_road"
+_ESTIMATOR = "joint_road"
 """Method that estimates the extinction if no visibility is given."""
 
 
@@ -69,7 +69,7 @@ class Restored:
     held: bool = False
 
 
-def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[Restored]:
+def _restored_images(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[Restored]:
     """Restore the images of a source in turn.
 
     `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept.
@@ -92,7 +92,7 @@ def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> It
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
     """Images, with their estimates if needed."""
     if wish.estimates:
-        for result in estimates_of(source, camera, (ESTIMATOR,)):
+        for result in estimates_of(source, camera, (_ESTIMATOR,)):
             yield result.picture, next(iter(result.estimates), None)
         return
     for picture in source.pictures():
@@ -150,7 +150,7 @@ def restore_files(
         refuse_unwritable_image(target, "--out", overwrite=overwrite, read=source.paths, makes_folder=is_folder)
     if is_folder:
         out.mkdir(parents=True, exist_ok=True)
-    for target, one in zip(targets, restored_images(source, camera, wish), strict=True):
+    for target, one in zip(targets, _restored_images(source, camera, wish), strict=True):
         if one.image is not None:
             # Stored with blue first.
             write_image(target, one.image if one.image.ndim == 2 else one.image[..., ::-1].copy())
@@ -178,7 +178,7 @@ def restore_video(
     refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
     found, reason, damage = False, "", ""
     with VideoWriter(out) as writer:
-        for one in restored_images(source, camera, wish):
+        for one in _restored_images(source, camera, wish):
             seen = one.picture.image
             if seen is None:
                 damage = one.picture.error

@@ -32,7 +32,7 @@ def span_text(low: float, high: float) -> str:
     return f"{low:.0f} – {high:.0f} m"
 
 
-DIGITS = 6
+_DIGITS = 6
 """Significant digits; no method has more than three."""
 
 
@@ -149,7 +149,7 @@ def _number(value: object) -> float | None:
     """Value with the shown digits; None for values without a JSON number, such as infinite visibility."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return None
-    return float(f"{value:.{DIGITS}g}")
+    return float(f"{value:.{_DIGITS}g}")
 
 
 _MOST_NAME = 48

@@ -17,10 +17,10 @@ from fogsim.values.pinhole import camera_axes
 
 Floats = NDArray[np.float64]
 
-MOST_UNBENT = 1e-3
+_MOST_UNBENT = 1e-3
 """Largest error of a ray after the lens model [px]; above it the pixel has no ray."""
 
-MOST_STEPS = 30
+_MOST_STEPS = 30
 """Steps of Newton's method; about five are enough for lenses of vehicle cameras."""
 
 
@@ -64,7 +64,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
         return right, down
     seen = (right, down)
     # Newton's method; Brown's model has no inverse in closed form.
-    for _ in range(MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         bent, (same, mixed, other) = _bent(right, down, calibration.distortion)
         off = (bent[0] - seen[0], bent[1] - seen[1])
         determinant = same * other - mixed * mixed
@@ -73,7 +73,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
             down = down - (same * off[1] - mixed * off[0]) / determinant
     with np.errstate(all="ignore"):
         bent, (same, mixed, other) = _bent(right, down, calibration.distortion)
-        close = camera.focal_length * np.hypot(bent[0] - seen[0], bent[1] - seen[1]) < MOST_UNBENT
+        close = camera.focal_length * np.hypot(bent[0] - seen[0], bent[1] - seen[1]) < _MOST_UNBENT
         lost = np.count_nonzero(~(close & (same * other > mixed * mixed) & (same > 0.0)))
     if lost:
         raise InputError(

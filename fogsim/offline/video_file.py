@@ -14,7 +14,7 @@ from fogsim.offline.image_files import Pixels
 from fogsim.recorders.video import Encoder, encoding_command
 from fogsim.values import Camera
 
-RATE_FACTOR = 12
+_RATE_FACTOR = 12
 """Constant rate factor: distant road in fog differs by only a few pixel values, which must be kept."""
 
 _TICKS = 90_000  # a second
@@ -26,7 +26,7 @@ class VideoWriter:
     `rate_factor` is libx264's constant rate factor, 0 … 51.
     """
 
-    def __init__(self, out: Path, rate_factor: int = RATE_FACTOR) -> None:
+    def __init__(self, out: Path, rate_factor: int = _RATE_FACTOR) -> None:
         self._out, self._rate_factor = out, rate_factor
         self._encoder: Encoder | None = None
 

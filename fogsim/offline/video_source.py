@@ -22,15 +22,15 @@ _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME_TIME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
 _PACKET_SIZES = (188, 192, 204)  # of MPEG transport streams: ISO/IEC 13818-1, with a time code, with error correction
-MOST_MISSING = 0.5
+_MOST_MISSING = 0.5
 """Time by which a complete video's frames may end before its header's duration, as with longer sound [s]."""
 
 _BLOCK, _MOST_ERRORS = 100_000, 100
 
-CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
+_CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
 """ffmpeg's names of the allowed formats: none that opens further files or addresses, such as a playlist."""
 
-MOST_PIXELS = 16_384**2 // 2
+_MOST_PIXELS = 16_384**2 // 2
 """Most pixels of a frame [px]."""
 
 _HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
@@ -142,7 +142,7 @@ class VideoFile:
             *log.errors,
             *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else []),
         ]
-        is_short = self.duration - end > max(MOST_MISSING, 2.0 * self.period)
+        is_short = self.duration - end > max(_MOST_MISSING, 2.0 * self.period)
         if failed or errors or is_short:
             frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
             reason = f" ({errors[0]})" if errors else ""
@@ -195,7 +195,7 @@ def _number(text: str) -> float:
 
 def _command(path: Path, *limits: str) -> list[str]:
     """Command line of a decoder that writes each frame as a PPM image, and its time among its messages."""
-    allowed = ["-protocol_whitelist", "file", "-format_whitelist", CONTAINERS, "-max_pixels", str(MOST_PIXELS)]
+    allowed = ["-protocol_whitelist", "file", "-format_whitelist", _CONTAINERS, "-max_pixels", str(_MOST_PIXELS)]
     source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", "showinfo=checksum=0", *limits]
     # Neither repeated nor dropped for a constant rate.
     sink = ["-fps_mode", "passthrough", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]

@@ -13,7 +13,7 @@ from fogsim.errors import InputError, shown, suggest
 from fogsim.openscenario.parameters import Parameters, declared
 from fogsim.openscenario.xml_tree import Findings, Node, NodeError, read_xml
 
-MOST_CASES = 100_000  # of a file
+_MOST_CASES = 100_000  # of a file
 _SHAPES = ("Uniform", "Normal", "LogNormal", "Poisson")
 _DRAWN = ("ProbabilityDistributionSet", "Histogram", *(f"{shape}Distribution" for shape in _SHAPES))
 _MOST_ROUNDS = 1_000  # Draws for all test runs before limits that hardly any draw meets are refused
@@ -91,8 +91,8 @@ def _grid(block: Node) -> list[Parameters]:
             if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:
                 raise ValueError("an earlier distribution has the same parameter")
     number = math.prod(map(len, axes))
-    if number > MOST_CASES:
-        raise NodeError(block, f"{number:,} cases; at most {MOST_CASES:,} are allowed")
+    if number > _MOST_CASES:
+        raise NodeError(block, f"{number:,} cases; at most {_MOST_CASES:,} are allowed")
     merged = [{k: v for part in cell for k, v in part.items()} for cell in itertools.product(*axes)]
     return [dict(items) for items in dict.fromkeys(tuple(case.items()) for case in merged)]
 
@@ -105,8 +105,8 @@ def _values(node: Node) -> list[str]:
         raise ValueError("expected a DistributionSet, DistributionRange or ValueSetDistribution with values")
     (low, high), step = _limits(ranged), ranged.number("stepWidth")
     number = math.floor((high - low) / step + 1e-9) + 1 if step > 0.0 and math.isfinite(high - low) else 0
-    if not 0 < number <= MOST_CASES:
-        raise NodeError(ranged, f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on")
+    if not 0 < number <= _MOST_CASES:
+        raise NodeError(ranged, f"expected a stepWidth above 0 with 1 … {_MOST_CASES:,} values from lowerLimit on")
     return [f"{low + i * step:.9g}" for i in range(number)]
 
 
@@ -124,8 +124,8 @@ def _limits(node: Node) -> tuple[float, float]:
 def _test_runs(block: Node) -> list[Parameters]:
     """Random test runs; with the same seed a parameter has the same values, whatever else is drawn."""
     number, seed = block.number("numberOfTestRuns"), block.number("randomSeed", 0.0)
-    if not (number.is_integer() and 1 <= number <= MOST_CASES):
-        raise NodeError(block, f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}")
+    if not (number.is_integer() and 1 <= number <= _MOST_CASES):
+        raise NodeError(block, f"numberOfTestRuns: expected a whole number of 1 … {_MOST_CASES:,}, got {number:g}")
     columns: dict[str, list[str]] = {}
     for one in block.some("StochasticDistribution"):
         name = one.get("parameterName")

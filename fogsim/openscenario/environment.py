@@ -14,7 +14,7 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 _OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}  # In 1.0
-USUAL_LATITUDE = math.radians(50.0)  # If a map gives none [rad]
+_USUAL_LATITUDE = math.radians(50.0)  # If a map gives none [rad]
 _BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear_sky_illuminance`
     (20.0, (3.74, 3.97, -4.07, 1.47)),
     (5.0, (3.05, 13.28, -45.98, 64.33)),
@@ -23,7 +23,7 @@ _BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear
     (-12.0, (2.70, 12.17, -431.69, -1899.83)),
     (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
 )
-BRIGHTEST = 200_000.0
+_BRIGHTEST = 200_000.0
 _DARKEST = 0.001  # Of a clear day, under any clouds
 _STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
@@ -78,7 +78,7 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> flo
             sun.remark(f"{message}; read as the share of the sky without clouds")
             return through_clouds(clear, 8.0 * (1.0 - lux))
         sun.refuse(f"{message}; expected some {clear:.0f} lx")
-    return min(max(lux, 0.0), BRIGHTEST)
+    return min(max(lux, 0.0), _BRIGHTEST)
 
 
 def _oktas(weather: Node) -> float:
@@ -142,7 +142,7 @@ def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float 
     )
     solar = hour + (equation / 60.0 if longitude is not None else 0.0)
     angle = math.pi * (solar - 12.0) / 12.0
-    north = USUAL_LATITUDE if latitude is None else latitude
+    north = _USUAL_LATITUDE if latitude is None else latitude
     height = math.sin(north) * math.sin(declination) + math.cos(north) * math.cos(declination) * math.cos(angle)
     return math.asin(min(max(height, -1.0), 1.0))
 

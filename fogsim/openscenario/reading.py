@@ -29,8 +29,8 @@ from fogsim.traffic.road.opendrive_lanes import read_opendrive_lanes
 from fogsim.traffic.templates.xml_text import element, opening
 from fogsim.units import KMH_PER_MPS
 
-USUAL_DURATION = 120.0  # Longest simulated time of a file whose stop trigger has no time [s]
-NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
+_USUAL_DURATION = 120.0  # Longest simulated time of a file whose stop trigger has no time [s]
+_NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
 _FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
 """Attributes of drivers who change lane where their route needs it, and for nothing else."""
@@ -123,7 +123,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     root, positions = story.root, begin.positions
     ego, lanes, routed = positions.vehicles.ego, positions.lanes, {*begin.effect.routes, *positions.rerouted}
     route = positions.ways[ego]
-    end = math.inf if lanes.followers.get(route[-1]) else lanes.starts(route)[-1] - NEAR_THE_END
+    end = math.inf if lanes.followers.get(route[-1]) else lanes.starts(route)[-1] - _NEAR_THE_END
     story.triggers = Triggers(positions, story.state, story.value, end)
     entries = story.timeline()
     stop = story.triggers.trigger(storyboard.one("StopTrigger"))
@@ -152,7 +152,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
         "traffic": {
             "ego": ego,
             "keep_lane": [name for name in positions.vehicles if name not in routed],
-            "stop_before_end_m": NEAR_THE_END,
+            "stop_before_end_m": _NEAR_THE_END,
         },
         "fog": fog,
         **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
@@ -180,13 +180,13 @@ def _initial(begin: Beginning) -> list[dict[str, Any]]:
 
 def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) -> dict[str, Any]:
     if stop is None or not stop.condition:
-        return {"duration_s": USUAL_DURATION}
+        return {"duration_s": _USUAL_DURATION}
     if stop.at is not None:
         return {"duration_s": max(stop.at, 0.1)}
     if not stop.delay:
-        return {"duration_s": USUAL_DURATION, "end_when": stop.condition}
+        return {"duration_s": _USUAL_DURATION, "end_when": stop.condition}
     timeline.append(timeline_entry(node, "stop", stop, {})[1])
-    return {"duration_s": USUAL_DURATION, "end_when": "happened(stop)"}
+    return {"duration_s": _USUAL_DURATION, "end_when": "happened(stop)"}
 
 
 def _vehicles_text(begin: Beginning) -> str:

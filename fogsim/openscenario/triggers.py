@@ -49,7 +49,7 @@ class Triggers:
         groups = [self._group(group) for group in node.all("ConditionGroup")] if node else []
         times = [group.at for group in groups if group.at is not None]
         if len(times) == len(groups):
-            return at_time(min(times)) if times else None
+            return _at_time(min(times)) if times else None
         groups = _of_one_delay(groups)
         phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
         return Trigger(phrase, groups[0].delay)
@@ -59,7 +59,7 @@ class Triggers:
         latest = max((trigger.at for trigger in read if trigger.at is not None), default=-1.0)
         others = _of_one_delay([trigger for trigger in read if trigger.at is None])
         if not others:
-            return at_time(latest)
+            return _at_time(latest)
         delay = others[0].delay
         phrase = [f"time >= {latest - delay:g} s"] if latest > delay else []
         parts = list(dict.fromkeys(one.condition for one in others))
@@ -89,7 +89,7 @@ class Triggers:
         if node.tag == "StoryboardElementStateCondition":
             found = self.states(node)
             if found.at is not None:
-                return at_time(max(found.at, 0.0) + delay) if delay else found
+                return _at_time(max(found.at, 0.0) + delay) if delay else found
             return replace(found, delay=found.delay + delay)
         if node.tag in ("ParameterCondition", "VariableCondition"):
             return replace(self.values(node), delay=delay)
@@ -243,7 +243,7 @@ class Triggers:
 CONDITIONS = handlers(Triggers, "condition")
 
 
-def at_time(time: float) -> Trigger:
+def _at_time(time: float) -> Trigger:
     """Trigger at a time [s]."""
     return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
 
@@ -253,7 +253,7 @@ def both(first: Trigger, then: Trigger) -> Trigger:
     if not first.condition or not then.condition:
         return NEVER
     if first.at is not None and then.at is not None:
-        return at_time(max(first.at, then.at))
+        return _at_time(max(first.at, then.at))
     if first.at is not None and first.at <= 0.0:
         return then
     return Trigger(f"{_bracketed(first.condition, 2)} and {_bracketed(then.condition, 2)}", then.delay)

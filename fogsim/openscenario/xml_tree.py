@@ -13,7 +13,7 @@ from fogsim.core.files.xml_reader import XmlFile
 from fogsim.errors import InputError, LeftOutWarning, shown, suggest
 from fogsim.openscenario.elements import HARMLESS, REFUSED
 
-MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file
+_MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file
 _NAMESPACES = ("xmlns", "xml:", "xsi:")
 
 
@@ -208,7 +208,7 @@ def handlers(reader: type, kind: str) -> dict[str, Callable[..., Any]]:
 def read_xml(path: Path, findings: Findings | None = None) -> Node:
     """Read a file; nothing outside it is loaded, and document types raise InputError."""
     builder = _Builder(path, findings or Findings())
-    builder.file.read_all(builder, MOST_BYTES, MOST_ELEMENTS)
+    builder.file.read_all(builder, _MOST_BYTES, MOST_ELEMENTS)
     return builder.root.children[0]
 
 

@@ -27,7 +27,7 @@ _UNITS: Mapping[str, str] = {
 }
 """Unit by the end of a key."""
 
-MOST_SIGNS = 60
+_MOST_SIGNS = 60
 """Signs listed in the report."""
 
 _KEY_NUMBERS: Sequence[tuple[str, str]] = (
@@ -181,7 +181,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             decisive=self._decisive(),
             pictures=self._pictures(),
             signs=self._signs(),
-            most_signs=MOST_SIGNS,
+            most_signs=_MOST_SIGNS,
             footer=_footnotes(information.seed),
             label=_label,
             value=shown_metric,

@@ -146,7 +146,7 @@ class Album:
         return [pictures[place] for place in places]
 
 
-CLOSE = 200.0
+_CLOSE = 200.0
 """Visibility ahead below which drivers slow down [m] (White & Jeffery 1980)."""
 
 _LEAST_BRAKING = 1.0  # m/s²; anything softer is no braking that a reader asks about
@@ -163,9 +163,9 @@ class DecisiveFrames:
         """Keep the frame of a step where it is the most decisive one so far."""
         row, left = step.ego, derived["time_to_collision_s"]
         ahead, braking = step.truth.visibility_ahead, -float(step.traffic.acceleration[row])
-        if self._was_clear and ahead < CLOSE:
-            self._keep("fog", 0.0, f"First frame with less than {CLOSE:.0f} m of visibility ahead", step)
-        self._was_clear |= ahead >= CLOSE
+        if self._was_clear and ahead < _CLOSE:
+            self._keep("fog", 0.0, f"First frame with less than {_CLOSE:.0f} m of visibility ahead", step)
+        self._was_clear |= ahead >= _CLOSE
         if braking > _LEAST_BRAKING:
             self._keep("braking", -braking, f"Hardest braking: {braking:.1f} m/s²", step)
         if left is not None:

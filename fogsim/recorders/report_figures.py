@@ -16,7 +16,7 @@ from fogsim.units import KMH_PER_MPS
 from fogsim.values import DriverWarning
 
 TRUTH, BELIEF, ADVICE, ALARM, SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
-MUTED = "#7b8794"
+_MUTED = "#7b8794"
 """Colours of what is drawn; `ALARM` is of collisions and dangers."""
 
 _VISIBILITY_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
@@ -24,7 +24,7 @@ _MOST_MARGIN = 300.0
 """Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
 
 
-_WARNINGS = {DriverWarning.FOG_AHEAD: "#e39a1f", DriverWarning.CANNOT_SEE: MUTED, DriverWarning.CAMERA_DEGRADED: ALARM}
+_WARNINGS = {DriverWarning.FOG_AHEAD: "#e39a1f", DriverWarning.CANNOT_SEE: _MUTED, DriverWarning.CAMERA_DEGRADED: ALARM}
 
 
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
@@ -165,7 +165,7 @@ def shown_visibility(values: Sequence[float | None]) -> NDArray[np.float64]:
 
 
 def _draw_speed(axis: Axes, curves: Curves) -> None:
-    axis.plot(curves.time, plottable(curves.limit) * KMH_PER_MPS, color=MUTED, linewidth=1.0, label="speed limit")
+    axis.plot(curves.time, plottable(curves.limit) * KMH_PER_MPS, color=_MUTED, linewidth=1.0, label="speed limit")
     advice = plottable(curves.advice) * KMH_PER_MPS
     axis.plot(curves.time, advice, color=ADVICE, linewidth=1.6, drawstyle="steps-post", label="advice")
     axis.plot(curves.time, plottable(curves.speed) * KMH_PER_MPS, color=SPEED, linewidth=1.6, label="speed")
@@ -192,7 +192,7 @@ def _draw_conflict(axes: Sequence[Axes], curves: Curves, threshold: float) -> No
 def _draw_margin(axis: Axes, curves: Curves) -> None:
     margin = np.minimum(np.nan_to_num(plottable(curves.margin), nan=_MOST_MARGIN), _MOST_MARGIN)
     axis.fill_between(curves.time, margin, 0, where=margin < 0, color=ALARM, alpha=0.25, linewidth=0, interpolate=True)
-    axis.axhline(0, color=MUTED, linewidth=1.0)
+    axis.axhline(0, color=_MUTED, linewidth=1.0)
     axis.plot(curves.time, margin, color=SPEED, linewidth=1.6)
     axis.set_ylabel("margin [m]", fontsize=9)
 

@@ -28,7 +28,7 @@ TRAJECTORY_LOG = "trajectories" + LOG_SUFFIX
 EVENT_LOG = "events" + LOG_SUFFIX
 """Rows of ``events.parquet``."""
 
-SUMO_OUTPUTS = "sumo_outputs"
+_SUMO_OUTPUTS = "sumo_outputs"
 """Folder of SUMO's own outputs; ``sumo_outputs.part`` until the end of the run."""
 
 _NAMES = {
@@ -82,8 +82,8 @@ class RunDirectory:
             if there.exists() and there.is_dir() != (name == UNFINISHED):
                 raise InputError(f"{there} is in the way of the results; choose another directory with --out")
         refuse_living(self.unfinished)
-        outputs = self.path / SUMO_OUTPUTS
-        if outputs.exists() and SUMO_OUTPUTS not in (*_listed(self.path), *_listed(self.unfinished)):
+        outputs = self.path / _SUMO_OUTPUTS
+        if outputs.exists() and _SUMO_OUTPUTS not in (*_listed(self.path), *_listed(self.unfinished)):
             raise InputError(f"{outputs} is not of an earlier run; move it, or choose another directory with --out")
         if overwrite:
             return
@@ -113,7 +113,7 @@ class RunDirectory:
     @property
     def sumo_outputs(self) -> Path:
         """Folder of SUMO's own outputs, from before the first step on."""
-        return partial_path(self.path / SUMO_OUTPUTS)
+        return partial_path(self.path / _SUMO_OUTPUTS)
 
     def clear_sumo_outputs(self) -> None:
         """Remove SUMO's outputs of a run that never finished."""
@@ -220,7 +220,7 @@ class RunDirectory:
 def whole_files(folder: Path) -> list[str]:
     """Sorted names of the complete result files in a folder and of its folder of SUMO's outputs."""
     files = [name for name in _NAMES.values() if (folder / name).is_file()]
-    return sorted([*files, *([SUMO_OUTPUTS] if (folder / SUMO_OUTPUTS).is_dir() else [])])
+    return sorted([*files, *([_SUMO_OUTPUTS] if (folder / _SUMO_OUTPUTS).is_dir() else [])])
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -238,9 +238,9 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     (folder / _RESERVE).unlink(missing_ok=True)
     # Files that an earlier call has moved already are named in the manifest that it wrote.
     names = {_NAMES["manifest"], *whole_files(folder), *_listed(folder)}
-    outputs = partial_path(path / SUMO_OUTPUTS)
+    outputs = partial_path(path / _SUMO_OUTPUTS)
     if outputs.is_dir() and any(outputs.iterdir()):
-        names.add(SUMO_OUTPUTS)
+        names.add(_SUMO_OUTPUTS)
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
     if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
         return
@@ -254,14 +254,14 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
             (folder / name).replace(path / name)
         elif name not in names:
             (path / name).unlink(missing_ok=True)
-    _place_sumo_outputs(path, SUMO_OUTPUTS in names)
+    _place_sumo_outputs(path, _SUMO_OUTPUTS in names)
     (folder / _NAMES["manifest"]).replace(path / _NAMES["manifest"])
     shutil.rmtree(folder)
 
 
 def _place_sumo_outputs(path: Path, there_are: bool) -> None:
     """Replace an earlier run's SUMO outputs; without new ones, the old ones are removed."""
-    outputs, final = partial_path(path / SUMO_OUTPUTS), path / SUMO_OUTPUTS
+    outputs, final = partial_path(path / _SUMO_OUTPUTS), path / _SUMO_OUTPUTS
     if outputs.exists() or not there_are:
         shutil.rmtree(final, ignore_errors=True)
     if there_are and outputs.exists():
@@ -272,7 +272,7 @@ def _place_sumo_outputs(path: Path, there_are: bool) -> None:
 def _listed(folder: Path) -> list[str]:
     """Results that a folder's manifest names."""
     listed = read_manifest(folder).get("files", [])
-    known = (*_NAMES.values(), SUMO_OUTPUTS)
+    known = (*_NAMES.values(), _SUMO_OUTPUTS)
     return [name for name in listed if name in known] if isinstance(listed, list) else []
 
 

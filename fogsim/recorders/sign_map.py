@@ -8,7 +8,7 @@ from fogsim.core.files.atomic import write_json
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 
-GEOGRAPHIC = "longitude and latitude [deg], WGS 84"
+_GEOGRAPHIC = "longitude and latitude [deg], WGS 84"
 NET = "x and y of the SUMO network [m], not longitude and latitude: the network has no usable projection"
 
 LonLat = tuple[float, float]
@@ -24,7 +24,7 @@ def write_sign_map(
         {
             "type": "FeatureCollection",
             "name": name,
-            "coordinates": GEOGRAPHIC if geographic else NET,
+            "coordinates": _GEOGRAPHIC if geographic else NET,
             "features": [_feature(sign, place) for sign in signs.signs],
         },
     )

@@ -8,10 +8,10 @@ from fogsim.recorders.style import ADVICE, GROUND, MUTED, Colour, font
 from fogsim.values import Frame, SignLook, Step
 from fogsim.values.observation import sign_place
 
-LEAST_RADIUS = 4.0
+_LEAST_RADIUS = 4.0
 """Least radius of a mark [px]."""
 
-MOST = 8
+_MOST = 8
 """Signs that are marked, the nearest; more would hide the picture."""
 
 
@@ -45,8 +45,8 @@ def draw_signs(
     Takes `origin` [px], `size` [px].
     """
     written: list[tuple[float, float, float, float]] = []
-    for sign in sorted(signs, key=lambda one: one.distance)[:MOST]:
-        u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, LEAST_RADIUS)
+    for sign in sorted(signs, key=lambda one: one.distance)[:_MOST]:
+        u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, _LEAST_RADIUS)
         if -radius < u < size[0] + radius and -radius < v < size[1] + radius:
             _mark(draw, sign, (u + origin[0], v + origin[1]), radius + 2.0, written)
 

@@ -11,10 +11,10 @@ from fogsim.recorders.protocol import DERIVED_QUANTITIES, AnyStep_contra, Derive
 from fogsim.units import finite_or_none, visibility_from_extinction
 from fogsim.values import Estimate, Leader, LeadMeasurement, Step, TrafficStep
 
-PLACES = (100.0, 200.0, 400.0)
+_PLACES = (100.0, 200.0, 400.0)
 """Distances ahead along the route whose fog has columns of its own [m]."""
 
-CLEAR_AIR = 100_000.0
+_CLEAR_AIR = 100_000.0
 """Visibility from which on the truth counts as clear air [m]."""
 
 
@@ -33,7 +33,7 @@ def table_columns(methods: Sequence[str]) -> list[Column[Step]]:
     """List the columns of the table for given estimators, in their order."""
     columns: list[Column[Step]] = [*_CLOCK_COLUMNS, *_EGO_COLUMNS, *_NEAR_COLUMNS, *_EVENT_COLUMNS]
     columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
-    columns += [column for distance in PLACES for column in _place_columns(distance)]
+    columns += [column for distance in _PLACES for column in _place_columns(distance)]
     columns += _FAULT_COLUMNS
     for method in methods:
         columns += _estimator_columns(method)
@@ -83,7 +83,7 @@ def _true_at(distance: float) -> Callable[[Step, Derived], object]:
         if profile is None or not profile.distance.size or distance > profile.distance[-1]:
             return None
         visibility = profile.visibility_quantile(distance, 0.5)
-        return visibility if visibility < CLEAR_AIR else None
+        return visibility if visibility < _CLEAR_AIR else None
 
     return true
 

@@ -82,10 +82,10 @@ class TrafficReportRecorder(StepReport[TrafficStep]):
 
     def _figures(self) -> Sequence[tuple[str, bytes]]:
         along_road = self._information.along_road()
-        return [*draw_traffic_figures(self._curves), *([road_figure(along_road)] if len(along_road) else [])]
+        return [*_draw_traffic_figures(self._curves), *([_road_figure(along_road)] if len(along_road) else [])]
 
 
-def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
+def _draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
     """Draw every figure of the report of traffic alone.
 
     Returns caption and PNG of each figure (str, bytes).
@@ -108,7 +108,7 @@ def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
     ]
 
 
-def road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
+def _road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
     """Draw speed over the road, and the visibility there.
 
     Returns caption and PNG. Takes `along_road` (n, 4).

@@ -15,13 +15,13 @@ from fogsim.values.pinhole import ray_from_pixel
 REFLECTANCE = 0.06
 """Of dark paint, alike in all directions [-]."""
 
-CLEAR_COAT = 0.04
+_CLEAR_COAT = 0.04
 """Share of light that the clear coat mirrors straight down; more at grazing angles, by Schlick's formula [-]."""
 
-ROUNDING = 0.5
+_ROUNDING = 0.5
 """How far back from the front edge the bonnet's corners are rounded [m]."""
 
-NEAREST = 0.35
+_NEAREST = 0.35
 """Distance ahead of the camera at which the bonnet begins: before it are windscreen and scuttle, as dark [m]."""
 
 _AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
@@ -73,9 +73,9 @@ def _seen(camera: Camera, bonnet: Bonnet) -> _Seen:
     falls = np.maximum(-rays[:, 2], 1e-9)
     scale = (camera.mount_height - bonnet.height) / falls
     ahead, aside = scale * rays[:, 0], scale * rays[:, 1]
-    corner = np.maximum(ahead - (bonnet.reach - ROUNDING), 0.0) / ROUNDING
-    inside = (corner**2 + (aside / bonnet.half_width) ** 2 < 1.0) | (ahead < NEAREST)
+    corner = np.maximum(ahead - (bonnet.reach - _ROUNDING), 0.0) / _ROUNDING
+    inside = (corner**2 + (aside / bonnet.half_width) ** 2 < 1.0) | (ahead < _NEAREST)
     found = np.flatnonzero((rays[:, 2] < 0.0) & (scale > 0.0) & (rays[:, 0] > 0.0) & inside)
     steepness = falls[found] / lengths[found]
-    mirrored = CLEAR_COAT + (1.0 - CLEAR_COAT) * (1.0 - steepness) ** 5
+    mirrored = _CLEAR_COAT + (1.0 - _CLEAR_COAT) * (1.0 - steepness) ** 5
     return _Seen(found, (scale * lengths)[found].astype(np.float32), mirrored.astype(np.float32))

@@ -37,10 +37,10 @@ def lens_of(camera: Camera, pose: CameraPose) -> Lens:
 @functools.lru_cache(maxsize=8)
 def _of_camera(camera: Camera) -> tuple[Wide, Wide]:
     """What does not depend on where the camera is: its numbers and its planes."""
-    return np.array((camera.focal_length, *camera.principal_point)), frustum(camera)
+    return np.array((camera.focal_length, *camera.principal_point)), _frustum(camera)
 
 
-def frustum(camera: Camera) -> Wide:
+def _frustum(camera: Camera) -> Wide:
     """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
     (u0, v0), focal = camera.principal_point, camera.focal_length
     planes = np.array(

@@ -22,7 +22,7 @@ _WARM = (1.0, 0.86, 0.66)
 _LENS = SIGNAL_INTENSITY / (math.pi / 4.0 * SIGNAL_DIAMETER**2)
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.DAYTIME
 
-LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, float]]] = {
+_LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, float]]] = {
     Surface.LAMP_POSITION_REAR: (Lamp.POSITION, 1300.0, _RED),
     Surface.LAMP_STOP: (Lamp.STOP, 17e3, _RED),
     Surface.LAMP_REAR_FOG: (Lamp.REAR_FOG, 20e3, _RED),
@@ -49,9 +49,9 @@ def zenith_luminance(illuminance: float) -> float:
 
 def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
     """Radiance of a lit lamp's surface per channel [cd/m²]; zero for what is no lamp."""
-    if surface not in LAMPS:
+    if surface not in _LAMPS:
         return np.zeros(3)
-    _, luminance, colour = LAMPS[surface]
+    _, luminance, colour = _LAMPS[surface]
     return luminance * np.array(colour) / luminance_of(colour)
 
 
@@ -59,4 +59,4 @@ def lighting_bits(surface: Surface) -> int:
     """Bits of `Lamp`; any of them lights a surface. −1 for one that is always lit, 0 for what is no lamp."""
     if surface == Surface.LAMP_STREET:
         return -1
-    return int(LAMPS[surface][0]) if surface in LAMPS else 0
+    return int(_LAMPS[surface][0]) if surface in _LAMPS else 0

@@ -28,7 +28,7 @@ class Ground:
     places: NDArray[np.float64]  # (k, 3): Where the origin of each piece is [m]
 
 
-def split_ground(ground: Mesh) -> Ground:
+def _split_ground(ground: Mesh) -> Ground:
     """Take a ground apart."""
     flat = ground.surface[ground.faces[:, 0]] == int(Surface.TERRAIN)
     height, reflectance = -np.inf, np.zeros(3)
@@ -77,7 +77,7 @@ class SceneRenderer:
     """Draws a scene in overcast daylight, with one sample a pixel and without clamping (`illuminance` [lx])."""
 
     def __init__(self, scene: Scene, illuminance: float, make_rasteriser: Callable[[MeshTable], Rasteriser]) -> None:
-        ground = split_ground(scene.ground)
+        ground = _split_ground(scene.ground)
         meshes = {**scene.shapes, **ground.pieces}
         # Levels of detail are drawn where they are small, and so from outside.
         self._table = MeshTable.of(meshes, lambda name: name.endswith(LEVELS_OF_DETAIL))

@@ -16,16 +16,16 @@ from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Watch, unwatched
 from fogsim.values import Camera, Observation, Response
 
-KINDS = ("speed_limit", "pedestrian_crossing", "stop")
+_KINDS = ("speed_limit", "pedestrian_crossing", "stop")
 """Kinds of the paper's signs, in turn."""
 
-DIAMETER = 0.9
+_DIAMETER = 0.9
 """Size of their faces [m]."""
 
-STEP, IMAGES = 5.0, 504
+STEP, _IMAGES = 5.0, 504
 """Way between two images [m], and how many there are in each fog."""
 
-APART, FIRST = 100.0, 600.0
+_APART, _FIRST = 100.0, 600.0
 """Way between two signs, and to the first of them [m]; not given in the paper."""
 
 REACH = 560.0
@@ -34,26 +34,26 @@ REACH = 560.0
 PUBLISHED = {100.0: 72.0, 150.0: 172.0, 200.0: 218.0, 250.0: 245.0, 300.0: 285.0, 400.0: None}
 """Visibilities of the six fogs, and what the paper's section 5.2 says was estimated [m]; it prints none for 400 m."""
 
-LARGEST_ERRORS: Mapping[str, tuple[float, tuple[float, ...]]] = {
+_LARGEST_ERRORS: Mapping[str, tuple[float, tuple[float, ...]]] = {
     "dense fog": (28.0, (100.0, 150.0)),
     "moderate fog": (18.0, (200.0, 250.0)),
     "light fog": (25.0, (300.0, 400.0)),
 }
 """Section 5.2's limits of the errors, and the fogs that they are of [m]."""
 
-TABLES = ("figure 4",)
+_TABLES = ("figure 4",)
 """Parts of the evaluation that can be run alone: that is all of it."""
 
-APPROACHES = 12
+_APPROACHES = 12
 """Drives of each calibration."""
 
-CALIBRATED = (60.0, 80.0, 110.0, 150.0, 200.0, 260.0, 330.0, 400.0, 500.0, 650.0)
+_CALIBRATED = (60.0, 80.0, 110.0, 150.0, 200.0, 260.0, 330.0, 400.0, 500.0, 650.0)
 """Visibilities of the calibration [m], other ones than those of the evaluation but for one."""
 
-NOTES = (
+_NOTES = (
     "The paper prints neither camera, sign size, spacing nor the coefficients of its curve. Ours: signs of"
-    f" {DIAMETER} m (speed limit, pedestrian crossing, stop) every {APART:.0f} m, images of 1400x600 px every"
-    f" {STEP:.0f} m, {IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the stated"
+    f" {_DIAMETER} m (speed limit, pedestrian crossing, stop) every {_APART:.0f} m, images of 1400x600 px every"
+    f" {STEP:.0f} m, {_IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the stated"
     " pitch by 0.1° (standard deviations).",
     "Calibration: drives of their own up to single signs (`fogsim calibrate signs`), with other numbers drawn. 'ours'"
     " is a monotone curve through the distances of first detection; it abstains where resolution and not fog sets them"
@@ -76,27 +76,27 @@ def _camera(focal_length: float) -> Camera:
     return Camera(1400, 600, focal_length, (699.5, 299.5), 1.4, pitch=0.01, response=Response.SRGB)
 
 
-SETUPS = (Setup("1400 px", _camera(1400.0)), Setup("3400 px", _camera(3400.0)))
+_SETUPS = (Setup("1400 px", _camera(1400.0)), Setup("3400 px", _camera(3400.0)))
 """53° across, as cameras behind windscreens, and 23°."""
 
 
-QUICK_APPROACHES = 4
+_QUICK_APPROACHES = 4
 """Drives of each calibration of a quick evaluation; half of the images would leave an estimate to two signs."""
 
 
 def reproduce(
-    images: int = IMAGES,
-    setups: Sequence[Setup] = SETUPS,
+    images: int = _IMAGES,
+    setups: Sequence[Setup] = _SETUPS,
     approaches: int | None = None,
     *,
-    fogs: Sequence[float] = CALIBRATED,
+    fogs: Sequence[float] = _CALIBRATED,
     quick: bool = False,
     table: str | None = None,
     watch: Watch = unwatched,
 ) -> Reproduction:
     """Drive past signs in each fog; an image is a step, `approaches` and `fogs` [m] are the calibration's."""
-    chosen_tables(TABLES, table)
-    approaches = approaches or (QUICK_APPROACHES if quick else APPROACHES)
+    chosen_tables(_TABLES, table)
+    approaches = approaches or (_QUICK_APPROACHES if quick else _APPROACHES)
     share, records, ranges = approaches + images // 10 + 1, list[dict[str, Cell]](), list[OperatingRange]()
     total = share * len(setups)
     for number, setup in enumerate(setups):
@@ -105,7 +105,7 @@ def reproduce(
             watch(before + done, total)
 
         measured = measure_operating_range(
-            setup.camera, DIAMETER, fogs, approaches=approaches, seed=1, watch=calibrating
+            setup.camera, _DIAMETER, fogs, approaches=approaches, seed=1, watch=calibrating
         )
         ranges.append(measured)
         found: list[dict[str, Cell]] = []
@@ -117,7 +117,7 @@ def reproduce(
     watch(total, total)
     drawing = picture(records, list(zip([setup.name for setup in setups], ranges, strict=True)), PUBLISHED)
     cells = tuple(cell for setup in setups for cell in paper_cells(setup.name, records))
-    return Reproduction("belaroussi2015", tuple(records), _table(records), NOTES, drawing, cells=cells)
+    return Reproduction("belaroussi2015", tuple(records), _table(records), _NOTES, drawing, cells=cells)
 
 
 def paper_cells(camera: str, records: Sequence[Mapping[str, Cell]]) -> Iterator[PaperCell]:
@@ -129,8 +129,8 @@ def paper_cells(camera: str, records: Sequence[Mapping[str, Cell]]) -> Iterator[
             published, corrected = (_metres(found[visibility][form]) for form in forms)
             row = f"f = {camera}, V_met {visibility:g} m"
             yield PaperCell("section 5.2", row, "estimate [m]", printed, published, corrected, truth=visibility)
-    overall = max(error for error, _ in LARGEST_ERRORS.values())
-    for name, (largest, fogs) in {**LARGEST_ERRORS, "all fogs": (overall, tuple(PUBLISHED))}.items():
+    overall = max(error for error, _ in _LARGEST_ERRORS.values())
+    for name, (largest, fogs) in {**_LARGEST_ERRORS, "all fogs": (overall, tuple(PUBLISHED))}.items():
         published, corrected = (_largest_error([found[visibility] for visibility in fogs], form) for form in forms)
         of_fogs = f"f = {camera}, {name}"
         yield PaperCell("section 5.2", of_fogs, "largest error [m]", largest, published, corrected, "at_most")
@@ -164,8 +164,8 @@ def _track(setup: Setup, measured: OperatingRange, images: int) -> Iterator[list
     """Drive the track in all fogs at once; after each image what is known so far."""
     rng = np.random.default_rng(20)
     places = tuple((STEP * np.arange(images)).tolist())
-    wanted = np.arange(FIRST, max(places[-1], FIRST + 1.0), APART).tolist()
-    signs = tuple(sign_beside(f"s{i}", KINDS[i % len(KINDS)], x, DIAMETER, rng) for i, x in enumerate(wanted))
+    wanted = np.arange(_FIRST, max(places[-1], _FIRST + 1.0), _APART).tolist()
+    signs = tuple(sign_beside(f"s{i}", _KINDS[i % len(_KINDS)], x, _DIAMETER, rng) for i, x in enumerate(wanted))
     camera = cropped(setup.camera)
     drive = SignDrive(camera, signs, places, PoseNoise(), 200.0, REACH)
     watches = {v: _SharedWatch(camera, None, PoseDeviation()) for v in PUBLISHED}

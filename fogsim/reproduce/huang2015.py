@@ -38,10 +38,10 @@ VEHICLE = StagedVehicle(length=4.7, width=1.8, height=1.45, paint=(0.03, 0.05, 0
 SAMPLES = 3
 """Samples a pixel side: with one, a number plate of 15 rows is 15 or 16 rows high, and variances scatter by 6 %."""
 
-PICTURED = (150.0, 500.0)
+_PICTURED = (150.0, 500.0)
 """Visibilities of figure 4.9's confidence curves [m]."""
 
-NOTES = (
+_NOTES = (
     "The thesis states neither size of image nor camera; its vehicles are clipped by hand from a simulator's pictures,"
     " which seem to be without noise. Ours: 800x600 px, airlight at 200 of 255 levels, noise of photons and read-out"
     " only where it says 'noisy', a radar's range with 0.25 m of noise; the estimator finds and follows the vehicle.",
@@ -67,7 +67,7 @@ def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = u
     more = [Case(v, back=back, noisy=not back) for v in TABLE_4_1 for back in (True, False)]
     if quick or table is not None:
         more = []
-    cases = wanted_cases(wanted, [*more, *map(Case, PICTURED)])
+    cases = wanted_cases(wanted, [*more, *map(Case, _PICTURED)])
     road = sorted({figure.visibility for figure in wanted if figure.case is None})
     drives = 0 if table is not None else 1 if quick else DRIVES
     steps = Steps(sum(len(c.frames(last)) for c, last in cases.items()) + len(road) + 1 + steps_of(drives), watch)
@@ -78,7 +78,7 @@ def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = u
             alike = {case: last for case, last in cases.items() if (case.back, case.noisy) == way}
             results |= _followed(renderer, alike, rng, steps) if alike else {}
         rough = _rough(renderer, road, rng, steps)
-        shown = [Tracked(v, {name: results[Case(v)][name][LAST] for name in VARIANTS}) for v in PICTURED]
+        shown = [Tracked(v, {name: results[Case(v)][name][LAST] for name in VARIANTS}) for v in _PICTURED]
         drawing = picture(renderer, Chase(CAMERA, VEHICLE, samples=SAMPLES), shown)
         steps.advance()
         sweeps: list[dict[str, Cell]] = []
@@ -93,7 +93,7 @@ def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = u
         "huang2015",
         tuple(records(wanted, more, results, rough)),
         tables[0].rows,
-        NOTES,
+        _NOTES,
         drawing,
         (*tables, *more_tables),
         tuple(sweeps),

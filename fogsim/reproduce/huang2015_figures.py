@@ -15,10 +15,10 @@ from fogsim.values import Estimate
 TABLES = ("4.1", "4.2", "4.3", "5.1", "5.2", "5.3")
 VARIANTS = ("published", "corrected")
 
-STEP, FIRST, LAST = 5.0, 25.0, 90.0
+STEP, _FIRST, LAST = 5.0, 25.0, 90.0
 """Ranges at which the thesis clips [m]; table 5.1 has tracks that end beyond."""
 
-VISIBILITY_4_2 = 150.0
+_VISIBILITY_4_2 = 150.0
 """V_met of table 4.2 [m]."""
 
 FARTHEST = 10_000.0
@@ -31,7 +31,7 @@ class Case:
 
     visibility: float
     interval: float = STEP
-    start: float = FIRST
+    start: float = _FIRST
     back: bool = False
     noisy: bool = False
 
@@ -76,11 +76,11 @@ def _of_chapter_4() -> Iterator[Figure]:
     for v, (first, optimised) in TABLE_4_1.items():
         yield Figure("4.1", _fog(v), "first", first, v, first=True)
         yield Figure("4.1", _fog(v), "optimised", optimised, v)
-    case, farthest = Case(VISIBILITY_4_2), max(TABLE_4_2[STEP])
+    case, farthest = Case(_VISIBILITY_4_2), max(TABLE_4_2[STEP])
     for apart, ratios in TABLE_4_2.items():
         for far, ratio in ratios.items():
             row, column = f"{apart:g} m apart [%]", f"far one at {far:g} m"
-            yield Figure("4.2", row, column, ratio, VISIBILITY_4_2, case, farthest, (far - apart, far))
+            yield Figure("4.2", row, column, ratio, _VISIBILITY_4_2, case, farthest, (far - apart, far))
     for v, (vehicle, road) in TABLE_4_3.items():
         yield Figure("4.3", _fog(v), "from the vehicle", vehicle, v, Case(v))
         yield Figure("4.3", _fog(v), "from the road", road, v)
@@ -89,7 +89,7 @@ def _of_chapter_4() -> Iterator[Figure]:
 def _of_chapter_5() -> Iterator[Figure]:
     for share, row in TABLE_5_1.items():
         for v, paper in row.items():
-            after = FIRST + STEP * max(round(share * v / STEP), 2)
+            after = _FIRST + STEP * max(round(share * v / STEP), 2)
             yield Figure("5.1", f"track of {100 * share:g} % of V_met", _fog(v), paper, v, Case(v), after)
     for interval, row in TABLE_5_2.items():
         for v, paper in row.items():

@@ -19,10 +19,10 @@ from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 
-RANGES = (25.0, 35.0, 45.0, 55.0, 65.0, 75.0, 85.0)
+_RANGES = (25.0, 35.0, 45.0, 55.0, 65.0, 75.0, 85.0)
 """Ranges of the patches [m]."""
 
-COLOURS = {"published": "tab:orange", "corrected": "tab:blue"}
+_COLOURS = {"published": "tab:orange", "corrected": "tab:blue"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArr
     grid = figure.add_gridspec(len(shown) + 1, 1, height_ratios=[*([1.0] * len(shown)), 2.0])
     found = _patches(renderer, chase, [row.visibility for row in shown])
     for i, row in enumerate(shown):
-        for j, axes in enumerate(figure.add_subfigure(grid[i]).subplots(1, len(RANGES))):
+        for j, axes in enumerate(figure.add_subfigure(grid[i]).subplots(1, len(_RANGES))):
             _patch(axes, *found[row.visibility][j], "" if j else f"V = {row.visibility:.0f} m")
-            axes.set_xlabel(f"{RANGES[j]:.0f} m")
+            axes.set_xlabel(f"{_RANGES[j]:.0f} m")
     plots = figure.add_subfigure(grid[len(shown)]).subplots(1, len(shown), squeeze=False)[0]
     for axes, row in zip(plots, shown, strict=True):
         _curves(axes, row)
@@ -59,7 +59,7 @@ def _patches(
     found: dict[float, list[tuple[NDArray[np.uint8], tuple[float, float, float] | None]]] = {
         v: [] for v in visibilities
     }
-    for ahead, seen in chase.seen(renderer, dict.fromkeys(RANGES, visibilities), np.random.default_rng(1)):
+    for ahead, seen in chase.seen(renderer, dict.fromkeys(_RANGES, visibilities), np.random.default_rng(1)):
         scale = chase.camera.focal_length / ahead
         row = round(chase.camera.horizon_row + chase.camera.row_distance / ahead)
         col = round(chase.camera.principal_point[0] - chase.vehicle.left * scale)
@@ -92,13 +92,13 @@ def _curves(axes: Axes, row: Tracked) -> None:
         if not estimate.valid:
             continue
         curve = 100.0 * image_confidence(estimate.extinction, distance)
-        axes.plot(distance, curve, color=COLOURS[name], label=f"{name}: V = {estimate.visibility:.0f} m")
+        axes.plot(distance, curve, color=_COLOURS[name], label=f"{name}: V = {estimate.visibility:.0f} m")
     published = row.estimates.get("published")
     if published is not None and "variances" in published.diagnostics:
         at = np.asarray(published.diagnostics["distances"])
         variance = np.asarray(published.diagnostics["variances"])
         left = 100.0 * variance / variance[0] * image_confidence(true, at[0])
-        axes.plot(at, left, ".", color=COLOURS["published"], label="variances, over the nearest")
+        axes.plot(at, left, ".", color=_COLOURS["published"], label="variances, over the nearest")
     axes.set_title(f"Image confidence at V = {row.visibility:.0f} m", fontsize=10)
     axes.set_xlabel("range [m]")
     axes.set_ylabel("confidence [%]")

@@ -31,7 +31,7 @@ SCENES: Mapping[str, tuple[bool, tuple[tuple[float, float], ...]]] = {
 }
 """Whether things stand next to the road, and cars by distance ahead and to the left [m]."""
 
-TABLES = ("figure 4",)
+_TABLES = ("figure 4",)
 """Parts of the evaluation that can be run alone."""
 
 VARIANTS: Mapping[str, Mapping[str, bool]] = {
@@ -41,18 +41,22 @@ VARIANTS: Mapping[str, Mapping[str, bool]] = {
 }
 """Options of the estimator: with eqs. 17 and 18 as printed, with their signs mended alone, and with all repairs."""
 
-TITLES: Mapping[str, str] = {"printed": "eqs. 17, 18 as printed", "published": "signs mended", "corrected": "corrected"}
+_TITLES: Mapping[str, str] = {
+    "printed": "eqs. 17, 18 as printed",
+    "published": "signs mended",
+    "corrected": "corrected",
+}
 """Variants as the table calls them."""
 
-PICTURED = 0.03
+_PICTURED = 0.03
 """Extinction coefficient of the picture [1/m]."""
 
-PAPER_MS: Mapping[tuple[int, int], float] = {(688, 515): 21.0, (512, 383): 12.0}
+_PAPER_MS: Mapping[tuple[int, int], float] = {(688, 515): 21.0, (512, 383): 12.0}
 """Average time of a frame in section V [ms], by width and height [px]: of synthetic and of real images."""
 
-BLUE, PINK, BLACK = (40, 70, 255), (255, 60, 200), (0, 0, 0)
+_BLUE, _PINK, _BLACK = (40, 70, 255), (255, 60, 200), (0, 0, 0)
 
-NOTES = (
+_NOTES = (
     "The paper prints no errors: it shows images with the visibility written on them, so only times can be compared. Of"
     " its real images (319 m to less than 30 m) the true visibility is not known.",
     "It does not say focal length, mount height or pitch; assumed 700 px, 1.3 m and 0.02 rad.",
@@ -68,7 +72,7 @@ def reproduce(
     drives: int | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
     """Estimate on each scene at each extinction, and sweep what the paper leaves open over some drives."""
-    chosen_tables(TABLES, table)
+    chosen_tables(_TABLES, table)
     drives = drives or (1 if quick else DRIVES)
     records: list[Mapping[str, Cell]] = []
     pictures = []
@@ -79,7 +83,7 @@ def reproduce(
                 image = foggy_image(view, pose, CAMERA, extinction)
                 estimates = {name: _estimate(image, options) for name, options in VARIANTS.items()}
                 records.append(_record(scene, extinction, estimates))
-                if extinction == PICTURED:
+                if extinction == _PICTURED:
                     pictures.append(_picture(image, estimates["corrected"]))
                 steps.advance()
     shown = [TitledTable("V_met by scene and k: true, and as found (error)", _table(records))]
@@ -91,19 +95,19 @@ def reproduce(
         shown += tables
     cells = paper_cells()
     return Reproduction(
-        "negru2013", tuple(records), shown[0].rows, NOTES, np.hstack(pictures), tuple(shown), tuple(sweeps), cells
+        "negru2013", tuple(records), shown[0].rows, _NOTES, np.hstack(pictures), tuple(shown), tuple(sweeps), cells
     )
 
 
 def paper_cells() -> tuple[PaperCell, ...]:
     """Times of a frame at both sizes of the paper."""
     cells = []
-    for (width, height), printed in PAPER_MS.items():
+    for (width, height), printed in _PAPER_MS.items():
         scale = width / CAMERA.width
         point = (0.5 * (width - 1), 0.5 * (height - 1))
         camera = replace(CAMERA, width=width, height=height, focal_length=scale * 700.0, principal_point=point)
         with views(camera, (), trees=False) as (view, pose):
-            image = foggy_image(view, pose, camera, PICTURED)
+            image = foggy_image(view, pose, camera, _PICTURED)
         published, corrected = (_milliseconds(image, camera, VARIANTS[name]) for name in ("published", "corrected"))
         row = f"frame of {width}×{height} px"
         cells.append(PaperCell("section V", row, "time [ms]", printed, published, corrected, "at_most"))
@@ -142,7 +146,7 @@ def _record(scene: str, extinction: float, estimates: Mapping[str, Estimate]) ->
 
 
 def _table(records: list[Mapping[str, Cell]]) -> tuple[tuple[str, ...], ...]:
-    heading = ("scene", "k [1/m]", "V_met [m]", *(f"{TITLES[name]} [m]" for name in VARIANTS), "category", "found")
+    heading = ("scene", "k [1/m]", "V_met [m]", *(f"{_TITLES[name]} [m]" for name in VARIANTS), "category", "found")
     rows = [heading]
     for record in records:
         found = [_metres(record[f"{name}_visibility_m"], float(str(record["visibility_m"]))) for name in VARIANTS]
@@ -161,7 +165,7 @@ def _picture(image: NDArray[np.uint8], estimate: Estimate) -> NDArray[np.uint8]:
     picture = Image.fromarray(image)
     draw = ImageDraw.Draw(picture)
     found = estimate.diagnostics
-    for key, colour in (("horizon_row", BLUE), ("inflection_row", PINK)):
+    for key, colour in (("horizon_row", _BLUE), ("inflection_row", _PINK)):
         row = found.get(key)
         if isinstance(row, int | float):
             draw.line([(0, row), (image.shape[1], row)], fill=colour, width=2)
@@ -169,8 +173,8 @@ def _picture(image: NDArray[np.uint8], estimate: Estimate) -> NDArray[np.uint8]:
     if isinstance(band, tuple) and isinstance(profile, np.ndarray):
         left, right, top, bottom = band
         for side in (left, right):
-            draw.line([(side, top), (side, bottom)], fill=BLUE, width=2)
-        draw.line([(float(value), top + i) for i, value in enumerate(profile)], fill=BLACK, width=2)
+            draw.line([(side, top), (side, bottom)], fill=_BLUE, width=2)
+        draw.line([(float(value), top + i) for i, value in enumerate(profile)], fill=_BLACK, width=2)
     text = f"V = {estimate.visibility:.1f} m" if estimate.valid else "no estimate"
-    draw.text((12, 12), text, fill=BLACK, font=font(22, bold=True))
+    draw.text((12, 12), text, fill=_BLACK, font=font(22, bold=True))
     return np.asarray(picture)

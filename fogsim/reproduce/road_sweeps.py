@@ -20,7 +20,7 @@ CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), mount_height=1.38, pitch=0.035,
 VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
 """Of every drive [m]."""
 
-DRIVES, FRAMES = 6, 3
+DRIVES, _FRAMES = 6, 3
 """Drives of each setting, and their frames; the last one's estimate counts."""
 
 GROWTHS = (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0)
@@ -43,7 +43,7 @@ class Setting:
     sensor: Sensor = SENSOR
 
 
-NOISY = replace(SENSOR, full_well=SENSOR.full_well / 16.0, read_noise=4.0 * SENSOR.read_noise)
+_NOISY = replace(SENSOR, full_well=SENSOR.full_well / 16.0, read_noise=4.0 * SENSOR.read_noise)
 """Four times the noise."""
 
 SETTINGS = (
@@ -54,7 +54,7 @@ SETTINGS = (
     Setting("linear response", replace(CAMERA, response=Response.LINEAR)),
     Setting("no wear", wear=0.0),
     Setting("wear 10 %", wear=0.1),
-    Setting("noise × 4", sensor=NOISY),
+    Setting("noise × 4", sensor=_NOISY),
 )
 """What is varied, one thing at a time."""
 
@@ -74,7 +74,7 @@ def driven(
     found = []
     for number in range(drives):
         rng = np.random.default_rng([2013, number])
-        moments = list(drive(renderer, setting.camera, FRAMES, lead=False, rng=rng, wear=setting.wear))
+        moments = list(drive(renderer, setting.camera, _FRAMES, lead=False, rng=rng, wear=setting.wear))
         for visibility in visibilities:
             seen = tuple(observed(moment, setting.camera, visibility, rng, setting.sensor) for moment in moments)
             found.append(Driven(visibility, seen))
@@ -82,14 +82,14 @@ def driven(
     return found
 
 
-def last_estimate(method: str, camera: Camera, form: Form, one: Driven) -> Estimate:
+def _last_estimate(method: str, camera: Camera, form: Form, one: Driven) -> Estimate:
     """Estimate of a form of a method after the last frame of a drive."""
     estimator = make(method, camera, **form)
     found = [estimator.update(observation) for observation in one.observations]
     return found[-1]
 
 
-def without_each(kind: type[Repair]) -> dict[str, Form]:
+def _without_each(kind: type[Repair]) -> dict[str, Form]:
     """Forms of a method with all repairs, and with all but each."""
     forms: dict[str, Form] = {"all repairs": {}}
     for left_out in kind:
@@ -125,15 +125,15 @@ def swept(
     records: list[dict[str, Cell]] = []
     for setting in SETTINGS:
         seen = driven(renderer, setting, VISIBILITIES, drives, steps)
-        forms = both | ({**without_each(kind), **left_open} if setting is SETTINGS[0] else {})
+        forms = both | ({**_without_each(kind), **left_open} if setting is SETTINGS[0] else {})
         for name, form in forms.items():
             for visibility in VISIBILITIES:
                 here = [one for one in seen if one.visibility == visibility]
-                estimates = [last_estimate(method, setting.camera, form, one) for one in here]
+                estimates = [_last_estimate(method, setting.camera, form, one) for one in here]
                 records.append(_record(method, setting, name, visibility, estimates))
     shown = {
         "Sweeps of {}": [(setting.name, name) for setting in SETTINGS for name in both],
-        "Repairs of {}, each switched off": [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))],
+        "Repairs of {}, each switched off": [(SETTINGS[0].name, name) for name in ("published", *_without_each(kind))],
         "What the paper of {} leaves open": [(SETTINGS[0].name, name) for name in left_open],
     }
     figures = "|error| of V_met, median [%], and share of drives where fog is found, by V_met"

@@ -51,22 +51,22 @@ VARIANTS: Mapping[str, Mapping[str, object]] = {
 }
 """Options of the estimator: as published, with a region over the whole image, and with all repairs."""
 
-TABLES = ("2", "figure 7")
+_TABLES = ("2", "figure 7")
 """Parts of the evaluation that can be run alone."""
 
-TOLERANCE = 10.0
+_TOLERANCE = 10.0
 """What the paper's figure 7 has all errors within [m]."""
 
 RIGHT = 90.0
 """Share of frames that the paper's section 4 says are classed rightly, at least [%]."""
 
-PICTURED_DRIVES = 2
+_PICTURED_DRIVES = 2
 """The picture is of the last of the first two drives, which has a vehicle ahead."""
 
 TITLES: Mapping[str, str] = {"published": "published", "whole_image": "whole image", "corrected": "corrected"}
 """Variants as the table calls them."""
 
-NOTES = (
+_NOTES = (
     "Columns of the second table: whether a vehicle drives ahead and is tracked; shares of frames with the right state"
     " [%] in the paper's table 2 and of each variant; share of corrected estimates within ±10 m [%], by the paper's"
     " figure 7 all; their error, median/95th percentile [%]. The paper prints 94.15 % for thick fog, where its counts"
@@ -100,15 +100,15 @@ class Size:
     sweeps: int = DRIVES
 
 
-QUICK = Size(4, 2, 4, 1)
+_QUICK = Size(4, 2, 4, 1)
 
 
 def reproduce(
     size: Size | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
     """Drive along a country road in each weather; records begin with the third frame of a drive."""
-    chosen = chosen_tables(TABLES, table)
-    size = size or (QUICK if quick else Size())
+    chosen = chosen_tables(_TABLES, table)
+    size = size or (_QUICK if quick else Size())
     drives, visibilities, frames, sweeps = size.drives, size.visibilities, size.frames, size.sweeps
     if min(drives, visibilities, sweeps) < 1 or frames < FRAMES:
         raise InputError(
@@ -125,7 +125,7 @@ def reproduce(
             rng = np.random.default_rng([2015, number])
             lead = number % 2 == 1
             moments = list(drive(renderer, CAMERA, frames, lead=lead, rng=rng))
-            pictured = moments if number < PICTURED_DRIVES else pictured
+            pictured = moments if number < _PICTURED_DRIVES else pictured
             for weather, visibility in _drawn(visibilities, rng):
                 observations = [observed(moment, CAMERA, visibility, rng) for moment in moments]
                 records += _records(weather, visibility, lead=lead, drive=number, observations=observations)
@@ -142,7 +142,7 @@ def reproduce(
     steps.advance()
     cells = tuple(cell for cell in paper_cells(records) if cell.place.removeprefix("table ") in chosen)
     return Reproduction(
-        "zhu2015", tuple(records), shown[0].rows, NOTES, drawing, tuple(shown), tuple(swept_records), cells
+        "zhu2015", tuple(records), shown[0].rows, _NOTES, drawing, tuple(shown), tuple(swept_records), cells
     )
 
 
@@ -156,7 +156,7 @@ def paper_cells(records: Sequence[Mapping[str, Cell]]) -> Iterator[PaperCell]:
     for weather in WEATHERS[1:]:
         here = [record for record in records if record["weather"] == weather.name]
         published, corrected = (_largest_error(here, name) for name in ("published", "corrected"))
-        yield PaperCell("figure 7", weather.name, "largest error [m]", TOLERANCE, published, corrected, "at_most")
+        yield PaperCell("figure 7", weather.name, "largest error [m]", _TOLERANCE, published, corrected, "at_most")
 
 
 def _shares(records: Sequence[Mapping[str, Cell]]) -> tuple[float, float]:
@@ -254,4 +254,4 @@ def _errors(records: Sequence[Mapping[str, Cell]]) -> tuple[float, NDArray[np.fl
     true = np.array([r["visibility_m"] for r in foggy], np.float64)
     found = np.array([np.inf if (v := r["corrected_visibility_m"]) is None else v for r in foggy], np.float64)
     valid = np.isfinite(found)
-    return float(np.mean(np.abs(found - true) <= TOLERANCE)), np.abs(found[valid] / true[valid] - 1.0)
+    return float(np.mean(np.abs(found - true) <= _TOLERANCE)), np.abs(found[valid] / true[valid] - 1.0)

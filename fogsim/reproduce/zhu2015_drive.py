@@ -16,7 +16,7 @@ from fogsim.values import Camera, CameraPose, LeadMeasurement, Observation, View
 
 Floats = NDArray[np.float64]
 
-SPEED, PERIOD = 20.0, 0.2
+SPEED, _PERIOD = 20.0, 0.2
 """Speed of the drive [m/s] and time between frames [s]."""
 
 SETBACK = 1.5
@@ -25,19 +25,19 @@ SETBACK = 1.5
 SENSOR = Sensor(saturation_luminance=AIRLIGHT * 255.0 / 200.0)
 """A sensor with noise, exposed such that the airlight has 200 of 255 linear levels."""
 
-PITCH_ERROR, PITCH_SWAY = math.radians(0.1), math.radians(0.05)
+_PITCH_ERROR, _PITCH_SWAY = math.radians(0.1), math.radians(0.05)
 """Standard deviations of the pitch about the assumed one: of a whole drive, and from frame to frame [rad]."""
 
-WEAR, WEAR_LENGTH = 0.03, 40.0
+_WEAR, WEAR_LENGTH = 0.03, 40.0
 """Change of the road's albedo along the way, uniform within ± this [-], and the way between two such values [m]."""
 
-NEAREST, FARTHEST = 20.0, 60.0
+_NEAREST, FARTHEST = 20.0, 60.0
 """Gaps that a vehicle ahead begins with [m]; it then drifts by up to 1 m a frame."""
 
-RANGE_ERROR = 0.3
+_RANGE_ERROR = 0.3
 """Standard deviation of a tracked range [m]."""
 
-START, END = 0.0, 500.0
+_START, _END = 0.0, 500.0
 """Where drives begin [m]: at least 900 m of road lie ahead."""
 
 
@@ -60,23 +60,23 @@ def drive(
     *,
     lead: bool,
     rng: np.random.Generator,
-    wear: float = WEAR,
-    period: float = PERIOD,
+    wear: float = _WEAR,
+    period: float = _PERIOD,
 ) -> Iterator[Moment]:
     """Drive along a road with a given wear [-], a frame every `period` [s], with or without a tracked vehicle ahead."""
-    front, error = rng.uniform(START, END), rng.normal(0.0, PITCH_ERROR)
-    gap, closing = rng.uniform(NEAREST, FARTHEST), rng.uniform(-1.0, 1.0)
+    front, error = rng.uniform(_START, _END), rng.normal(0.0, _PITCH_ERROR)
+    gap, closing = rng.uniform(_NEAREST, FARTHEST), rng.uniform(-1.0, 1.0)
     knots = 1.0 + wear * rng.uniform(-1.0, 1.0, 128)
     for _ in range(frames):
         pose = CameraPose(
-            (front - SETBACK, 0.0, camera.mount_height), heading=0.0, grade=error + rng.normal(0.0, PITCH_SWAY)
+            (front - SETBACK, 0.0, camera.mount_height), heading=0.0, grade=error + rng.normal(0.0, _PITCH_SWAY)
         )
         cars = [(front + gap, 0.0)] if lead else []
         view = renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose)
-        measured = LeadMeasurement(gap + rng.normal(0.0, RANGE_ERROR), closing / period) if lead else None
+        measured = LeadMeasurement(gap + rng.normal(0.0, _RANGE_ERROR), closing / period) if lead else None
         yield Moment(worn(view, camera, pose, knots), pose, measured)
         front += SPEED * period
-        gap = max(gap + closing, 0.5 * NEAREST)
+        gap = max(gap + closing, 0.5 * _NEAREST)
 
 
 def worn(view: View, camera: Camera, pose: CameraPose, knots: Floats) -> View:
@@ -93,7 +93,7 @@ def worn(view: View, camera: Camera, pose: CameraPose, knots: Floats) -> View:
 ROAD = 2
 """Instance id of road in a `View`."""
 
-FAR = 20_000.0
+_FAR = 20_000.0
 """What lies above the horizon is taken to lie at most this far ahead [m]."""
 
 
@@ -101,7 +101,7 @@ def _ahead(rows: Floats, camera: Camera, pose: CameraPose) -> Floats:
     """How far ahead the level road is that rows show; strictly falling from the top down [m]."""
     pitch = camera.pitch - pose.grade
     angle = pitch + np.arctan((rows - camera.principal_point[1]) / camera.focal_length)
-    ahead = camera.mount_height / np.maximum(np.tan(angle), camera.mount_height / FAR)
+    ahead = camera.mount_height / np.maximum(np.tan(angle), camera.mount_height / _FAR)
     # Above the horizon all rows lie equally far: a trifle keeps them apart.
     return np.asarray(ahead + 1e-3 * (rows[-1] - rows), np.float64)
 

@@ -13,23 +13,23 @@ from fogsim.values import Camera, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION
 from fogsim.vision.region.road_region import region_medians
 
-PICTURED = (60.0, 200.0, 600.0, float("inf"))
+_PICTURED = (60.0, 200.0, 600.0, float("inf"))
 """Visibilities of the picture [m], one of each class."""
 
-SHOWN = 10_000
+_SHOWN = 10_000
 """Visibility beyond which a number would say nothing [m]."""
 
-TITLE, SKY = 25, 65
+_TITLE, _SKY = 25, 65
 """Height of the words, and rows above the horizon that are shown, the words among them [px]."""
 
-WHITE, BLACK = (255, 255, 255), (0, 0, 0)
-RED, BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 210, 0)
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
+RED, _BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 210, 0)
 
 
 def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
     """Draw an instant in four fogs, as published on the left and corrected on the right: (rows, cols, 3) uint8."""
     rows = []
-    for visibility in PICTURED:
+    for visibility in _PICTURED:
         seen = observed(moment, camera, visibility, np.random.default_rng(0))
         rows.append(
             np.hstack([_panel(seen, camera, visibility, as_published=published) for published in (True, False)])
@@ -45,20 +45,20 @@ def _panel(seen: Observation, camera: Camera, visibility: float, *, as_published
     drawing = Image.fromarray(_with_region(image, road))
     draw = ImageDraw.Draw(drawing)
     _draw_lines_and_curve(draw, road, camera.height - 1)
-    for key, colour in (("horizon_row", BLACK), ("inflection_row", BLUE)):
+    for key, colour in (("horizon_row", _BLACK), ("inflection_row", _BLUE)):
         row = estimate.diagnostics.get(key)
         if isinstance(row, int | float):
             draw.line([(0, row), (camera.width, row)], fill=colour, width=2)
     name = "published" if as_published else "corrected"
     text = f"{_metres(estimate.visibility)}, {estimate.diagnostics['class']}" if estimate.valid else "no estimate"
-    top = max(round(camera.horizon_row) - SKY, 0)
-    draw.rectangle((0, top, camera.width, top + TITLE), fill=WHITE)
-    draw.text((10, top + 2), f"{name}: {text} (true: {_metres(visibility)})", fill=BLACK, font=font(18, bold=True))
+    top = max(round(camera.horizon_row) - _SKY, 0)
+    draw.rectangle((0, top, camera.width, top + _TITLE), fill=_WHITE)
+    draw.text((10, top + 2), f"{name}: {text} (true: {_metres(visibility)})", fill=_BLACK, font=font(18, bold=True))
     return np.asarray(drawing)[top:]
 
 
 def _metres(visibility: float) -> str:
-    return f"{visibility:.0f} m" if visibility < SHOWN else f"over {SHOWN} m"
+    return f"{visibility:.0f} m" if visibility < _SHOWN else f"over {_SHOWN} m"
 
 
 def _with_region(image: NDArray[np.uint8], road: SeenRoad) -> NDArray[np.uint8]:

@@ -9,13 +9,13 @@ from fogsim.restoration.guided_filter import guided_filter
 from fogsim.restoration.picture import Floats, FoggyPicture
 from fogsim.units import LUMINANCE_WEIGHTS
 
-PATCH = 15
+_PATCH = 15
 """Side of the patches that the darkest value is taken of [px] (section 4)."""
 
-KEPT = 0.95
+_KEPT = 0.95
 """ω: share of the haze that is taken away (section 4.1)."""
 
-RADIUS, REGULARISER = 60, 1e-3
+_RADIUS, _REGULARISER = 60, 1e-3
 """Of the guided filter that takes the place of soft matting [px, squared pixel values of 1] (He, Sun & Tang 2010)."""
 
 
@@ -29,10 +29,10 @@ def dark_channel(picture: FoggyPicture) -> Floats:
     """
     tables = picture.relative_tables()
     light = light_kernels.relative_light(picture.pixels, tables)
-    dark = cv2.erode(least_channel(light), np.ones((PATCH, PATCH), np.uint8))
-    coarse = np.float32(1.0) - np.float32(KEPT) * np.asarray(dark, np.float32)
+    dark = cv2.erode(least_channel(light), np.ones((_PATCH, _PATCH), np.uint8))
+    coarse = np.float32(1.0) - np.float32(_KEPT) * np.asarray(dark, np.float32)
     grey = light[..., 0] if light.shape[2] == 1 else matrix_product(light, np.array(LUMINANCE_WEIGHTS, np.float32))
-    refined = guided_filter(grey, coarse, RADIUS, REGULARISER)
+    refined = guided_filter(grey, coarse, _RADIUS, _REGULARISER)
     return np.asarray(np.clip(refined, 1.0 / picture.most_gain, 1.0), np.float32)
 
 

@@ -12,11 +12,11 @@ def guided_filter(guide: Floats, source: Floats, radius: int, regulariser: float
 
     Returns the filtered image (rows, cols). Takes `guide`, `source` (rows, cols), `radius` [px].
     """
-    slope, offset = guided_coefficients(guide, source, radius, regulariser)
+    slope, offset = _guided_coefficients(guide, source, radius, regulariser)
     return slope * guide + offset
 
 
-def guided_coefficients(guide: Floats, source: Floats, radius: int, regulariser: float) -> tuple[Floats, Floats]:
+def _guided_coefficients(guide: Floats, source: Floats, radius: int, regulariser: float) -> tuple[Floats, Floats]:
     """Coefficients a and b of the guided filter's q = a I + b, averaged over windows."""
     mean_guide, mean_source = box_mean(guide, radius), box_mean(source, radius)
     covariance = box_mean(guide * source, radius) - mean_guide * mean_source

@@ -17,7 +17,7 @@ Light = NDArray[np.float64]
 ToneCurve = Callable[[Light], Light]
 """From light to light that is shown, both relative to full scale."""
 
-STEPS = 2**14
+_STEPS = 2**14
 """Steps of linear light in which 8 bits are written again; the darkest are a fifth of a pixel value."""
 
 
@@ -78,7 +78,7 @@ def _pixel_table(response: Response, full: int, black_level: float) -> Pixels:
 
 
 def _steps(full: int) -> int:
-    return STEPS if full < 256 else 2**16
+    return _STEPS if full < 256 else 2**16
 
 
 def _values_of(light: Light, response: Response, full: int, black_level: float) -> Pixels:

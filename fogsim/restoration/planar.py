@@ -15,17 +15,17 @@ from fogsim.values.pinhole import camera_axes
 FARTHEST = 1e6
 """Distance that stands for the sky's [m]."""
 
-BLOCK = 4
+_BLOCK = 4
 """Side of the blocks searched for things that stand on the road [px]: noise makes single pixels meaningless."""
 
-DARK, SURE = 0.5, 0.04
+_DARK, _SURE = 0.5, 0.04
 """Share of the road's luminance below which the foot of something may be, and how far below black, relative to the
 airlight, something must come out to be no road [-]; chosen on pool 0 of benchmarks/restoration.py."""
 
-BRIGHT_HEIGHT = 1.0
+_BRIGHT_HEIGHT = 1.0
 """Height over which something dark may be bright and still one [m]: a boot between shadow and rear window."""
 
-SEEN, USUAL_ROAD, DARKEST_ROAD = 0.5, 0.25, 0.05
+_SEEN, _USUAL_ROAD, _DARKEST_ROAD = 0.5, 0.25, 0.05
 """Least transmission at which road shows its luminance; its luminance relative to the airlight where no road does, and
 its lower limit [-]."""
 
@@ -52,24 +52,24 @@ def _standing(picture: FoggyPicture, tables: Floats, far: Floats, least: float) 
     """By how much the transmission of what stands on the road is more than the road's, and the road's luminance."""
     more = np.zeros(picture.pixels.shape[:2], np.float32)
     if min(far.shape) == 0:
-        return more, USUAL_ROAD
-    light = light_kernels.least_block_means(picture.pixels, tables, BLOCK)
+        return more, _USUAL_ROAD
+    light = light_kernels.least_block_means(picture.pixels, tables, _BLOCK)
     plane = np.hypot(np.exp(np.float32(-(picture.extinction or 0.0)) * far), np.float32(least))
     road = _road_luminance(light, plane)
-    tall = BRIGHT_HEIGHT * picture.camera.focal_length / BLOCK
-    stands = planar_kernels.standing_transmission(light, plane, far, tall, least, road, DARK, SURE)
+    tall = _BRIGHT_HEIGHT * picture.camera.focal_length / _BLOCK
+    stands = planar_kernels.standing_transmission(light, plane, far, tall, least, road, _DARK, _SURE)
     raised = np.maximum(cv2.dilate(stands, np.ones((3, 3), np.uint8)) - plane, np.float32(0.0))
-    rows, cols = (BLOCK * side for side in raised.shape)
+    rows, cols = (_BLOCK * side for side in raised.shape)
     more[:rows, :cols] = cv2.resize(raised, (cols, rows), interpolation=cv2.INTER_LINEAR)
     return more, road
 
 
 def _road_luminance(light: Floats, road: Floats) -> float:
     """Median luminance of what is near below the horizon, restored as road, relative to the airlight."""
-    near = road > SEEN
+    near = road > _SEEN
     if not near.any():
-        return USUAL_ROAD
-    return max(float(np.median(1.0 + (light[near] - 1.0) / road[near])), DARKEST_ROAD)
+        return _USUAL_ROAD
+    return max(float(np.median(1.0 + (light[near] - 1.0) / road[near])), _DARKEST_ROAD)
 
 
 @lru_cache(maxsize=4)
@@ -80,7 +80,8 @@ def road_distance(camera: Camera) -> tuple[Floats, Floats]:
     """
     whole = _distance(camera, np.arange(camera.height, dtype=np.float64), np.arange(camera.width, dtype=np.float64))
     rows, cols = (
-        np.arange(side // BLOCK, dtype=np.float64) * BLOCK + 0.5 * (BLOCK - 1) for side in (camera.height, camera.width)
+        np.arange(side // _BLOCK, dtype=np.float64) * _BLOCK + 0.5 * (_BLOCK - 1)
+        for side in (camera.height, camera.width)
     )
     blocks = _distance(camera, rows, cols)
     for array in (whole, blocks):

@@ -8,7 +8,7 @@ from fogsim.core.jit import kernel
 Floats = NDArray[np.float32]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
-MIXED = 0.8
+_MIXED = 0.8
 """Share of the road's luminance below which a block under something is partly that [-]."""
 
 
@@ -51,7 +51,7 @@ def _fill(out: Floats, light: Floats, plane: Floats, col: int, foot: int, last: 
         below = min(foot + 1, len(plane) - 1)
         restored = 1.0 + (light[below, col] - 1.0) / plane[below, col]
         # It stands within the block below, which is partly road, or at that block's upper edge.
-        share = np.float32(1.0 if restored < MIXED * road else 0.5)
+        share = np.float32(1.0 if restored < _MIXED * road else 0.5)
         stands = share * plane[below, col] + (np.float32(1.0) - share) * plane[foot, col]
     for row in range(last, foot + 1):
         out[row, col] = max(stands, np.float32(1.0) - light[row, col])

@@ -28,12 +28,12 @@ from fogsim.values.camera_response import exposure_of, respond
 KEY = 0.18
 """Luminance that the middle of what is seen gets, relative to full scale [-] (Reinhard et al. 2002)."""
 
-BRIGHT, WHITE, DARKEST = 0.99, 1.25, 0.01
+BRIGHT, _WHITE, _DARKEST = 0.99, 1.25, 0.01
 """White is so many times what this share of the picture is darker than; what is darker than that share of the airlight
 counts as that [-]."""
 
 
-def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
+def _tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
     """Curve that brings out what the fog lets through: L (1 + L / L_w²) / (1 + L) (Reinhard et al. 2002, eq. 4).
 
     L is light over its logarithmic mean, times 0.18. Unlike the paper's, the mean is weighted by transmission: the sky
@@ -43,11 +43,11 @@ def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> To
     """
     some = light.astype(np.float64) * picture.airlight
     luminance = some[..., 0] if some.shape[2] == 1 else (some * LUMINANCE_WEIGHTS).sum(axis=2)
-    luminance = np.maximum(luminance, DARKEST * float(picture.airlight.max()))
+    luminance = np.maximum(luminance, _DARKEST * float(picture.airlight.max()))
     weights = transmission.astype(np.float64)
     middle = float(np.exp((weights * np.log(luminance)).sum() / weights.sum()))
     exposure = KEY / middle
-    white = max(exposure * WHITE * float(np.quantile(luminance, BRIGHT)), 1.0)
+    white = max(exposure * _WHITE * float(np.quantile(luminance, BRIGHT)), 1.0)
 
     def curve(shown: Light) -> Light:
         scaled = exposure * shown
@@ -56,15 +56,15 @@ def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> To
     return curve
 
 
-STRIDE = 4
+_STRIDE = 4
 """Every how manyeth pixel of every how manyeth row is looked at for noise and tones."""
 
-RADIUS, MORE_NOISE, COLOUR_NOISE = 2, 4.0, 2.0
+_RADIUS, _MORE_NOISE, _COLOUR_NOISE = 2, 4.0, 2.0
 """Windows in which noise is smoothed are 2 r + 1 wide [px]; what counts as noise, in its variance: local variances
 scatter, and three channels have more of it than their mean. Chosen on pool 0 of benchmarks/restoration.py."""
 
 
-def without_veil(picture: FoggyPicture, transmission: Floats, *, smooths: bool, tone_map: bool) -> Pixels:
+def _without_veil(picture: FoggyPicture, transmission: Floats, *, smooths: bool, tone_map: bool) -> Pixels:
     """Undo Koschmieder's law, R = A + (I − A) / t, in pixel values.
 
     Returns like the picture's (rows, cols, channels) uint8. Takes `transmission` (rows, cols).
@@ -73,8 +73,8 @@ def without_veil(picture: FoggyPicture, transmission: Floats, *, smooths: bool, 
     smoothing = _smoothing(picture, tables, transmission) if smooths else _no_smoothing()
     curve = None
     if tone_map:
-        light = light_kernels.restored_light(picture.pixels, tables, transmission, smoothing, STRIDE)
-        curve = tone_curve(light, transmission[::STRIDE, ::STRIDE], picture)
+        light = light_kernels.restored_light(picture.pixels, tables, transmission, smoothing, _STRIDE)
+        curve = _tone_curve(light, transmission[::_STRIDE, ::_STRIDE], picture)
     values = written_values(picture, curve)
     scale = ((len(values) - 1) * picture.airlight).astype(np.float32)
     return light_kernels.restored_pixels(picture.pixels, tables, transmission, smoothing, scale, values)
@@ -84,13 +84,13 @@ def _smoothing(picture: FoggyPicture, tables: Floats, transmission: Floats) -> S
     """Local statistics of the luminance, and its noise where least light comes through: the median variance there."""
     weights = np.array(LUMINANCE_WEIGHTS if len(tables) == 3 else (1.0,), np.float32)
     light = light_kernels.luminance(picture.pixels, tables * weights[:, None])
-    mean, square = box_mean(light, RADIUS), box_mean(light * light, RADIUS)
-    some = (slice(None, None, STRIDE), slice(None, None, STRIDE))
+    mean, square = box_mean(light, _RADIUS), box_mean(light * light, _RADIUS)
+    some = (slice(None, None, _STRIDE), slice(None, None, _STRIDE))
     veiled = transmission[some] < 1.5 / picture.most_gain
     if not veiled.any():
         return _no_smoothing()
     noise = max(float(np.median((square[some] - mean[some] ** 2)[veiled])), 0.0)
-    return Smoothing(light, mean, square, np.float32(MORE_NOISE * noise), np.float32(COLOUR_NOISE))
+    return Smoothing(light, mean, square, np.float32(_MORE_NOISE * noise), np.float32(_COLOUR_NOISE))
 
 
 def _no_smoothing() -> Smoothing:
@@ -102,10 +102,10 @@ MOST_GAIN = 5.0
 """Most by which light, and with it noise, is amplified if nothing else is asked for [-]; chosen on pool 0 of
 benchmarks/restoration.py: more shows vehicles farther away, and more that is none."""
 
-LARGEST_GAIN = 1000.0
+_LARGEST_GAIN = 1000.0
 """Largest bound of the gain [-]; from 255 on, a single step of 8 bits spans the whole range."""
 
-LEAST_LIGHT = 1e-12
+_LEAST_LIGHT = 1e-12
 """Least light that an airlight can have, relative to full scale [-]; no pixel value but black has less."""
 
 
@@ -150,8 +150,8 @@ def restore_contrast(
     """
     chosen = METHODS.find(method)
     pixels, full = _checked(image, camera)
-    if not 1.0 <= most_gain <= LARGEST_GAIN:
-        raise InputError(f"most_gain must lie within 1 … {LARGEST_GAIN:g}, got {most_gain!r}")
+    if not 1.0 <= most_gain <= _LARGEST_GAIN:
+        raise InputError(f"most_gain must lie within 1 … {_LARGEST_GAIN:g}, got {most_gain!r}")
     if extinction is not None and not (extinction >= 0.0 and math.isfinite(extinction)):
         raise InputError(f"extinction must be a finite number of 1/m, at least 0, got {extinction!r}")
     light = _airlight(pixels, camera, full, airlight, chosen)
@@ -160,7 +160,7 @@ def restore_contrast(
         return Restoration(image.copy(), np.ones(image.shape[:2], np.float32), shown, method)
     picture = FoggyPicture(pixels, camera, full, light, extinction, most_gain)
     transmission = chosen.transmission(picture)
-    restored = without_veil(picture, transmission, smooths=chosen.smooths, tone_map=tone_map)
+    restored = _without_veil(picture, transmission, smooths=chosen.smooths, tone_map=tone_map)
     return Restoration(restored.reshape(image.shape), transmission, shown, method)
 
 
@@ -193,7 +193,7 @@ def _airlight(
     if values.shape not in ((1,), (channels,)):
         raise InputError(f"airlight must be one pixel value or {channels}, got {values.size}")
     light = exposure_of(values / full, camera.response, camera.black_level)
-    if not ((light >= LEAST_LIGHT).all() and (values <= full).all()):
+    if not ((light >= _LEAST_LIGHT).all() and (values <= full).all()):
         listed = ", ".join(f"{value:g}" for value in values)
         raise InputError(
             f"airlight must be brighter than black and at most {full:g}, the largest pixel value, got {listed}"

@@ -8,13 +8,13 @@ from fogsim.restoration.dark_channel import least_channel
 from fogsim.restoration.picture import Floats, FoggyPicture
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
-WHITE_OBJECTS = 11
+_WHITE_OBJECTS = 11
 """s_v: side of the window of both medians, the largest white object [px]."""
 
-KEPT = 0.95
+_KEPT = 0.95
 """p: share of the veil that is taken away."""
 
-LEAST_VISIBILITY = 50.0
+_LEAST_VISIBILITY = 50.0
 """V_min: the densest fog that the planar assumption allows for [m]."""
 
 
@@ -33,7 +33,7 @@ def tarel2009(picture: FoggyPicture) -> Floats:
     least = least_channel(light_kernels.relative_light(picture.pixels, tables))
     middle = _median(least)
     bounded = np.minimum(least, middle - _median(np.abs(least - middle)))
-    veil = np.float32(KEPT) * np.maximum(np.minimum(bounded, _road_veil(picture)[:, None]), np.float32(0.0))
+    veil = np.float32(_KEPT) * np.maximum(np.minimum(bounded, _road_veil(picture)[:, None]), np.float32(0.0))
     return np.asarray(np.clip(1.0 - veil, 1.0 / picture.most_gain, 1.0), np.float32)
 
 
@@ -41,11 +41,11 @@ def _road_veil(picture: FoggyPicture) -> Floats:
     """Planar assumption c(v) of each row; it knows no roll."""
     camera = picture.camera
     below = np.maximum(np.arange(camera.height) - camera.horizon_row, 1e-9)
-    depth = OPTICAL_DEPTH_AT_VISIBILITY * camera.row_distance / (LEAST_VISIBILITY * below)
+    depth = OPTICAL_DEPTH_AT_VISIBILITY * camera.row_distance / (_LEAST_VISIBILITY * below)
     return np.asarray(-np.expm1(-depth), np.float32)
 
 
 def _median(values: Floats) -> Floats:
     """Median over windows, in 8 bits."""
     levels = np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
-    return np.asarray(cv2.medianBlur(levels, WHITE_OBJECTS), np.float32) / np.float32(255.0)
+    return np.asarray(cv2.medianBlur(levels, _WHITE_OBJECTS), np.float32) / np.float32(255.0)

@@ -8,7 +8,7 @@ from fogsim.camera import Metering
 from fogsim.scenario.section import Distance, Flag, Luminance, Number, PixelPlace, Pixels, Section, Share, Time, Whole
 from fogsim.values import Response
 
-MOST_SAMPLES = 16_384
+_MOST_SAMPLES = 16_384
 """Columns and rows of samples that every OpenGL of today can draw."""
 
 
@@ -205,9 +205,9 @@ class CameraSection(Section):
             raise ValueError(
                 "saturation_luminance_cdpm2 is that of a fixed exposure, but exposure.mode is auto; leave one out"
             )
-        if max(self.width, self.height) * self.samples > MOST_SAMPLES:
+        if max(self.width, self.height) * self.samples > _MOST_SAMPLES:
             raise ValueError(
-                f"width and height times samples must be at most {MOST_SAMPLES}, "
+                f"width and height times samples must be at most {_MOST_SAMPLES}, "
                 f"got {self.width} × {self.height} px with {self.samples} samples a pixel side"
             )
         return self

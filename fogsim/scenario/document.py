@@ -12,7 +12,7 @@ from fogsim.openscenario import is_openscenario, read_openscenario, read_paramet
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
-TAKES_THE_PLACE_OF = {
+_TAKES_THE_PLACE_OF = {
     ("fog", "visibility_m"): ("outside_visibility_m", "banks"),
     ("fog", "outside_visibility_m"): ("visibility_m",),
     ("fog", "banks"): ("visibility_m",),
@@ -66,7 +66,7 @@ def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str,
         _set(result, path, value, text)
         parent = result.get(path[0])
         if isinstance(parent, dict):
-            for sibling in TAKES_THE_PLACE_OF.get((path[0], path[1] if len(path) > 1 else ""), ()):
+            for sibling in _TAKES_THE_PLACE_OF.get((path[0], path[1] if len(path) > 1 else ""), ()):
                 parent.pop(sibling, None)
     return result
 

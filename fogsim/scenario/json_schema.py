@@ -16,7 +16,7 @@ from fogsim.scenario.system_under_test import BLOCK, KEYS
 from fogsim.scenario.variation import VariationKeys
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 """Which JSON Schema it is."""
 
 _METHODS: Mapping[str, Registry[Any]] = {
@@ -60,7 +60,7 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
     for block in blocks:
         if "properties" in block:
             _open(block)
-    return {"$schema": DIALECT, **schema}
+    return {"$schema": _DIALECT, **schema}
 
 
 def _open(block: dict[str, Any]) -> None:

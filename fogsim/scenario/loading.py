@@ -73,10 +73,10 @@ def _is_file(path: Path) -> bool:
     return _exists(path) and path.is_file()
 
 
-BESIDE = (BLOCK, *KEYS)
+_BESIDE = (BLOCK, *KEYS)
 """Blocks of scenario files in addition to the keys of the schema."""
 
-LONG_RUN = 600.0
+_LONG_RUN = 600.0
 """Longest run of the user's own simulation [s]."""
 
 DAY = 86_400.0
@@ -225,7 +225,7 @@ def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
 
 
 def _bare(name: str, traffic: dict[str, Any]) -> dict[str, Any]:
-    return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": LONG_RUN, "traffic": traffic}
+    return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": _LONG_RUN, "traffic": traffic}
 
 
 @checked_parameters
@@ -328,7 +328,7 @@ def _checked_scenario(
         scenario = Scenario.model_validate(data, context={**context, "is_shortened": _is_shortened(document, context)})
         scenario = scenario.model_copy(update={"directory": context["folder"]})
     except ValidationError as error:
-        raise InputError(mistake_lines(document, Scenario, error, mistakes, BESIDE)) from error
+        raise InputError(mistake_lines(document, Scenario, error, mistakes, _BESIDE)) from error
     # A running simulation, or one of another simulator, keeps its own time.
     uncountable = step_mistake(scenario.clocks) if named_files else None
     if uncountable:

@@ -12,10 +12,10 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
 
-MOST_LISTED = 50
+_MOST_LISTED = 50
 """Maximum number of mistakes that are listed one by one."""
 
-WORDED = {
+_WORDED = {
     "model_type": "must be a block of keys",
     "dict_type": "must be a block of keys",
     "tuple_type": "must be a list",
@@ -56,10 +56,11 @@ def mistake_lines(
     """One line for each mistake, followed by `further` lines; `beside` are top-level keys outside the schema."""
     found = mistakes_in(model, error, document.data, beside)
     lines = [
-        ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_LISTED]
+        ": ".join((document.where(path), *([dotted(path)] if path else []), text))
+        for path, text in found[:_MOST_LISTED]
     ]
-    if len(found) > MOST_LISTED:
-        lines.append(f"{document.path}: and {len(found) - MOST_LISTED} more mistakes")
+    if len(found) > _MOST_LISTED:
+        lines.append(f"{document.path}: and {len(found) - _MOST_LISTED} more mistakes")
     return "\n".join([*lines, *further])
 
 
@@ -125,7 +126,7 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
 
 
 def _message(detail: ErrorDetails) -> str:
-    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+    message = _WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
     return printable(f"{message[0].lower()}{message[1:]}", in_one_line=True)
 
 

@@ -19,11 +19,11 @@ MOST_NODES = 20_000
 DEEPEST = 40
 """Maximum depth of blocks and lists."""
 
-MOST_DIGITS = 300
+_MOST_DIGITS = 300
 """Maximum length of a number."""
 
-MERGE = "tag:yaml.org,2002:merge"
-TEXT = "tag:yaml.org,2002:str"
+_MERGE = "tag:yaml.org,2002:merge"
+_TEXT = "tag:yaml.org,2002:str"
 
 
 class PlainYamlError(Exception):
@@ -54,8 +54,8 @@ class _Loader(yaml.SafeLoader):
 
 
 def _whole_number(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
-    if len(node.value) > MOST_DIGITS:
-        raise PlainYamlError(f"a number has at most {MOST_DIGITS} digits, got {shown(node.value)}", _line(node))
+    if len(node.value) > _MOST_DIGITS:
+        raise PlainYamlError(f"a number has at most {_MOST_DIGITS} digits, got {shown(node.value)}", _line(node))
     return int(node.value)
 
 
@@ -65,7 +65,7 @@ _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:bool", re.compile(r"(?i:yes|no|true|false|on|off)\Z"), list("yYnNtTfFoO")
 )
 _Loader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"(?:~|null|Null|NULL|)\Z"), ["~", "n", "N", ""])
-_Loader.add_implicit_resolver(MERGE, re.compile(r"<<\Z"), ["<"])
+_Loader.add_implicit_resolver(_MERGE, re.compile(r"<<\Z"), ["<"])
 _Loader.add_implicit_resolver("tag:yaml.org,2002:int", re.compile(r"[-+]?[0-9]+(?:_[0-9]+)*\Z"), list("-+0123456789"))
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
@@ -121,8 +121,8 @@ class _Walk:
     def _note(self, key: yaml.Node, at: KeyPath) -> None:
         if not isinstance(key, yaml.ScalarNode):
             raise PlainYamlError("a key must be text, got a list or a block", _line(key))
-        if key.tag != MERGE:
-            key.tag = TEXT
+        if key.tag != _MERGE:
+            key.tag = _TEXT
         here = (*at, key.value)
         if here in self._lines:
             message = f"{dotted(here)}: duplicate key, first on line {self._lines[here]}"

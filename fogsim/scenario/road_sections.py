@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fogsim.scenario.schema import Scenario
 from fogsim.values import Display, Stretch
 
-IN_CAR_SECTION = 100.0
+_IN_CAR_SECTION = 100.0
 """Length of the sections for which advice in cars, and drivers who apply a law, go each by one visibility [m]."""
 
-SHORTEST = 10.0
+_SHORTEST = 10.0
 """No section begins nearer to the end of the route than this [m], which two ways of measuring it agree about."""
 
 EYES = (0.0, 0.0, 1.2)
@@ -26,13 +26,13 @@ def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
     drivers = scenario.drivers
     if drivers.advised not in DISPLAYS:
         return ()
-    first, end, spacing = 0.0, length, IN_CAR_SECTION
+    first, end, spacing = 0.0, length, _IN_CAR_SECTION
     if drivers.advised == "signs":
         first, end, spacing = drivers.signs.from_m, min(drivers.signs.to_m, length), drivers.signs.spacing_m
         starts = list(drivers.signs.at_m) or np.arange(first, end, spacing).tolist()
     else:
         starts = np.arange(first, end, spacing).tolist()
-    starts = [start for start in starts if start < end and start <= length - SHORTEST]
+    starts = [start for start in starts if start < end and start <= length - _SHORTEST]
     # What ends with the route has no end of its own: whoever is there has not left it.
     last = math.inf if end >= length else end
     return tuple(

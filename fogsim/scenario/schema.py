@@ -77,7 +77,7 @@ class Light(Section):
     lamps light the road and the fog."""
 
 
-DUSK, NIGHT = 100.0, 0.1
+_DUSK, _NIGHT = 100.0, 0.1
 """Horizontal illuminance below which methods for the night are of use, and those for the day are not [lx]."""
 
 
@@ -85,8 +85,8 @@ def estimators_by_light(read: Mapping[str, Any]) -> tuple[Method, ...]:
     """Estimators for the light that there may be in a run, by what was read of a scenario."""
     light, timeline = read.get("light", Light()), read.get("timeline", ())
     darkest, brightest = light_range(timeline, light.illuminance_lx)
-    by_day = ("joint_road", "lead_contrast") if brightest >= NIGHT else ()
-    by_night = ("night_road",) if darkest < DUSK else ()
+    by_day = ("joint_road", "lead_contrast") if brightest >= _NIGHT else ()
+    by_night = ("night_road",) if darkest < _DUSK else ()
     return tuple(Method(method=name) for name in (*by_day, *by_night))
 
 

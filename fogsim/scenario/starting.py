@@ -19,7 +19,7 @@ _HEAD = """\
 # `fogsim validate {folder}` checks them, `fogsim run {folder}` runs them.
 """
 
-SCHEMA_FILE = "fogsim.schema.json"
+_SCHEMA_FILE = "fogsim.schema.json"
 """File with which editors complete and check a scenario's keys."""
 
 
@@ -37,7 +37,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
-    head = _HEAD.format(source=source, folder=folder, schema=SCHEMA_FILE)
+    head = _HEAD.format(source=source, folder=folder, schema=_SCHEMA_FILE)
     made = [folder / SCENARIO_FILE]
     folder.mkdir(parents=True)
     try:
@@ -47,8 +47,8 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
                 shutil.copyfile(old.directory / path, folder / path)
                 made.append(folder / path)
         write_text(made[0], head + _NAME_KEY.sub(f"name: {name}", text, count=1))
-        write_json(folder / SCHEMA_FILE, scenario_json_schema())
+        write_json(folder / _SCHEMA_FILE, scenario_json_schema())
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    return (*made, folder / SCHEMA_FILE)
+    return (*made, folder / _SCHEMA_FILE)

@@ -73,7 +73,7 @@ def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in found]
 
 
-MOST_SHOWN = 10
+_MOST_SHOWN = 10
 """Maximum number of names in a message."""
 
 
@@ -175,7 +175,7 @@ def _named_signals(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _unknown_vehicle(vehicle: str, demand: Demand) -> str:
-    files = ", ".join(file.name for file in demand.files[:MOST_SHOWN])
+    files = ", ".join(file.name for file in demand.files[:_MOST_SHOWN])
     return f"there is no vehicle {shown(vehicle)} in {files}; {_suggested(vehicle, demand.names)}"
 
 
@@ -262,5 +262,5 @@ def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
 def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:
     """The nearest of many names, and some others."""
     near = nearest(name, known)
-    some = [*([near] if near else []), *(one for one in known if one != near)][:MOST_SHOWN]
+    some = [*([near] if near else []), *(one for one in known if one != near)][:_MOST_SHOWN]
     return suggest(name, some) + (f", … ({len(known)} in all)" if len(known) > len(some) else "")

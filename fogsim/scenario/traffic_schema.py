@@ -32,7 +32,7 @@ from fogsim.values import Display
 
 _ROUNDING = 1e-6
 
-NEAREST_SIGNS = 10.0
+_NEAREST_SIGNS = 10.0
 """Smallest distance between two message signs [m]."""
 
 
@@ -342,8 +342,8 @@ class Signs(Section):
         placed = {"from_m", "spacing_m"} & self.model_fields_set
         if self.at_m and placed and not {"from_m", "spacing_m", "to_m", "at_m"} <= self.model_fields_set:
             raise ValueError(f"give at_m, or from_m with spacing_m, not both: got at_m and {min(placed)}")
-        if any(following - one < NEAREST_SIGNS for one, following in itertools.pairwise(self.at_m)):
-            raise ValueError(f"at_m must ascend by at least {NEAREST_SIGNS:g} m, got {list(self.at_m)!r}")
+        if any(following - one < _NEAREST_SIGNS for one, following in itertools.pairwise(self.at_m)):
+            raise ValueError(f"at_m must ascend by at least {_NEAREST_SIGNS:g} m, got {list(self.at_m)!r}")
         if not max((self.from_m, *self.at_m)) < self.to_m:
             raise ValueError(f"to_m must be more than the position of every sign, got {self.to_m:g}")
         return self

@@ -15,7 +15,7 @@ from fogsim.scene.solids import GLASS, Material, merge, polygon, quad
 from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import FAR, TINY, Batch, Mesh
 
-HOUSE_RADIUS = 9.0
+_HOUSE_RADIUS = 9.0
 """Nothing else stands nearer to the middle of a house [m]."""
 
 _PLOT = 21.0  # length of street for each house [m]
@@ -96,11 +96,11 @@ def houses(
 ) -> list[Batch]:
     """Houses that face the streets, where there is room (`buildings` (n, 3) [m])."""
     found: dict[str, list[tuple[Points, float, float]]] = {}
-    taken = Spacing(1.8 * HOUSE_RADIUS)
+    taken = Spacing(1.8 * _HOUSE_RADIUS)
     plots = [_plots(edge) for edge in edges if edge.speed_limit <= TOWN]
     places = np.concatenate([np.zeros((0, 3)), *(own for own, _ in plots)])
     facing = np.concatenate([np.zeros(0), *(turn for _, turn in plots)])
-    room = (index.clearance(places) > HOUSE_RADIUS) & apart(places, buildings, _PLOT)
+    room = (index.clearance(places) > _HOUSE_RADIUS) & apart(places, buildings, _PLOT)
     for place, turn, free in zip(places, facing.tolist(), room.tolist(), strict=True):
         built, kind, size = rng.random() < 0.8, int(rng.integers(len(_KINDS))), rng.uniform(0.9, 1.12)
         if built and free and taken.takes(place):

@@ -40,16 +40,16 @@ from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVA
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState, with_pieces
 
-FARTHEST_VEHICLE = 1500.0
+_FARTHEST_VEHICLE = 1500.0
 """Distance beyond which lamps of vehicles are left out [m]."""
 
-FARTHEST_STREET_LAMP = 400.0
+_FARTHEST_STREET_LAMP = 400.0
 """Distance beyond which street lamps are left out [m]."""
 
 _RED, _AMBER = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015)
 _WHITE, _WARM = (1.0, 0.97, 0.90), (1.0, 0.90, 0.72)
 
-SIGNAL_LAMPS: Mapping[tuple[Surface, bool], tuple[Lamp, float, tuple[float, float, float]]] = {
+_SIGNAL_LAMPS: Mapping[tuple[Surface, bool], tuple[Lamp, float, tuple[float, float, float]]] = {
     (Surface.LAMP_POSITION_REAR, False): (Lamp.POSITION, 8.0, _RED),
     (Surface.LAMP_STOP, False): (Lamp.STOP, 100.0, _RED),
     (Surface.LAMP_REAR_FOG, False): (Lamp.REAR_FOG, 200.0, _RED),
@@ -118,7 +118,7 @@ def _of_vehicles(
         lamps[skip] = 0
     position = np.ascontiguousarray(state.position, np.float64)
     vehicles = LampCarriers(position, turned, size, lamps, numbers)
-    count = find_lamps(vehicles, table.lamps, eye, FARTHEST_VEHICLE, found, lit)
+    count = find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
@@ -170,7 +170,7 @@ def _add_beams(
 def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSources:
     offset = eye - heads
     distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-    near = np.flatnonzero((distance < FARTHEST_STREET_LAMP) & (offset[:, 2] < 0))
+    near = np.flatnonzero((distance < _FARTHEST_STREET_LAMP) & (offset[:, 2] < 0))
     down = -offset[near, 2] / distance[near]
     intensity = np.interp(np.arccos(down), STREET_ANGLES, STREET_INTENSITIES)
     length, width, depth = SIZE
@@ -238,7 +238,7 @@ def _rows_of(
     body_lamp: BodyLamp, box_area: float
 ) -> list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]]:
     """A lamp, and below a head lamp the front fog lamp."""
-    known = SIGNAL_LAMPS.get((body_lamp.surface, body_lamp.front))
+    known = _SIGNAL_LAMPS.get((body_lamp.surface, body_lamp.front))
     if known is None:
         return []
     lamp, intensity, colour = known

@@ -24,7 +24,7 @@ KERB = 0.12
 
 ASPHALT = Material((0.088, 0.088, 0.090), Surface.ROAD)
 FLAGSTONES = Material((0.155, 0.152, 0.146))
-KERBSTONE = Material((0.21, 0.208, 0.20))
+_KERBSTONE = Material((0.21, 0.208, 0.20))
 
 LINE_CODE = {LaneMarking.NONE: 0, LaneMarking.SOLID: 1, LaneMarking.DASHED: 2, LaneMarking.DOUBLE: 1}
 """Lines by their number in the road attributes of a mesh."""
@@ -32,7 +32,7 @@ LINE_CODE = {LaneMarking.NONE: 0, LaneMarking.SOLID: 1, LaneMarking.DASHED: 2, L
 LONGEST = 40.0
 """Longest piece of a strip [m]: short enough to be culled in pieces."""
 
-LINE_WIDTH = 0.2
+_LINE_WIDTH = 0.2
 """Width of the line that road attributes stand for [m]."""
 
 _LOOK = 2.0  # whether a side is free is looked at every so many metres
@@ -96,7 +96,7 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
     rows = np.stack([parallel(line, offset, lift) for offset, lift in profile])
     side = parallel(line, 1.0)[0, :2] - line[0, :2]
     toward = np.array([[*(s * side), u] for s, u in ((-1, 0), (0, 1), (0, 1), (0, 1), (1, 0))])
-    return folds(rows, (KERBSTONE, KERBSTONE, FLAGSTONES, KERBSTONE, KERBSTONE), toward)
+    return folds(rows, (_KERBSTONE, _KERBSTONE, FLAGSTONES, _KERBSTONE, _KERBSTONE), toward)
 
 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:
@@ -169,7 +169,7 @@ def _painted(corners: Points) -> Mesh:
     lifted = middle + 1.5 * (corners - middle) + np.array([0.0, 0.0, _LIFT])
     road = np.zeros((*corners.shape[:3], 4))
     road[:, 1, :, 0] = np.array([math.dist(near[0], far[0]) for near, far in corners.tolist()])[:, None]
-    road[..., 1] = 1.0 + 0.75 * LINE_WIDTH * np.array([-1.0, 1.0])
+    road[..., 1] = 1.0 + 0.75 * _LINE_WIDTH * np.array([-1.0, 1.0])
     road[..., 2], road[..., 3] = 1.0, 3.0
     normals = np.stack([grid_normals(patch, (0, 0, 1)) for patch in lifted])
     faces = grid_faces(2, 2) + 4 * np.arange(len(corners))[:, None, None]

@@ -16,7 +16,7 @@ from fogsim.scene.solids import Material, box, merge
 from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import Batch, Instance, Mesh, Surface
 
-TREE_CLEARANCE = 9.0
+_TREE_CLEARANCE = 9.0
 """Least distance of a tree's trunk from the edge of any lane [m]."""
 
 Points = NDArray[np.float64]
@@ -115,7 +115,7 @@ def trees(
 ) -> list[Batch]:
     """Trees near the road and woods behind them, clear of every lane (`free` (n, 3), `taken` (n, 3) [m])."""
     near = _scatter(free, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
-    near = near[(index.clearance(near) > TREE_CLEARANCE) & apart(near, taken, 11.0)]
+    near = near[(index.clearance(near) > _TREE_CLEARANCE) & apart(near, taken, 11.0)]
     conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
@@ -208,5 +208,5 @@ def _fitting(
     along = np.column_stack((np.cos(turn), np.sin(turn), np.zeros(len(turn)))) * wide[:, None]
     fits = np.ones(len(places), np.bool_)
     for share in np.linspace(-0.5, 0.5, 9).tolist():
-        fits &= index.clearance(places + share * along) > TREE_CLEARANCE
+        fits &= index.clearance(places + share * along) > _TREE_CLEARANCE
     return fits

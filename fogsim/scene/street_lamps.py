@@ -12,7 +12,7 @@ from fogsim.scene.roadside import Spacing, placed, stations, tube
 from fogsim.scene.solids import Material, box, merge
 from fogsim.values.scene import FAR, TINY, Batch, Mesh, Scene, Surface
 
-STREET_LAMP = "street_lamp"
+_STREET_LAMP = "street_lamp"
 """Name of the shape of a lamp with its pole."""
 
 HEIGHT = 8.0
@@ -37,7 +37,7 @@ def street_lamp_shapes() -> dict[str, Mesh]:
     arm = box((-0.04, 0.0, HEIGHT + 0.02), (0.04, _ARM - 0.3, HEIGHT + 0.1), _POLE)
     near = merge((tube(-0.3, 1.2, 0.09, 0.09, _POLE), tube(1.2, HEIGHT + 0.1, 0.06, 0.06, _POLE), arm, head, lamp))
     far = merge((tube(-0.3, HEIGHT, 0.06, 0.06, _POLE), head, lamp))
-    return {STREET_LAMP: near, STREET_LAMP + FAR: far, STREET_LAMP + TINY: far}
+    return {_STREET_LAMP: near, _STREET_LAMP + FAR: far, _STREET_LAMP + TINY: far}
 
 
 def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
@@ -55,7 +55,7 @@ def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
             if spacing.takes(place):
                 places.append(place)
                 turns.append(turn)
-    return [placed(STREET_LAMP, np.array(places), np.array(turns))] if places else []
+    return [placed(_STREET_LAMP, np.array(places), np.array(turns))] if places else []
 
 
 def _outer_side(edges: Sequence[Edge]) -> int:
@@ -66,7 +66,7 @@ def _outer_side(edges: Sequence[Edge]) -> int:
 
 def street_lamp_heads(scene: Scene) -> Points:
     """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m]."""
-    batches = [batch.transforms for batch in scene.scenery if batch.shape == STREET_LAMP]
+    batches = [batch.transforms for batch in scene.scenery if batch.shape == _STREET_LAMP]
     if not batches:
         return np.zeros((0, 3))
     head = np.array([0.0, _ARM, HEIGHT - SIZE[2] / 2, 1.0])

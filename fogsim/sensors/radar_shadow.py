@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from fogsim.obstruction import obstructions_of
 from fogsim.values import Structure, StructureKind
 
-FREQUENCY = 77.0
+_FREQUENCY = 77.0
 """Carrier of long-range automotive radars [GHz]."""
 
 HEIGHT = 0.6
@@ -19,7 +19,7 @@ _DENSE_WOOD = 14.0
 """Way through leaves from which each further metre weakens less [m]."""
 
 
-def foliage_loss(way: float, frequency: float = FREQUENCY) -> float:
+def foliage_loss(way: float, frequency: float = _FREQUENCY) -> float:
     """What leaves take from a wave on a single way through them [dB].
 
     Source: Weissberger, M. A. (1982), An initial critical summary of models for predicting the attenuation of radio

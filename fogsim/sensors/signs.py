@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.values import SignMap, SignSighting
 
-FACING = math.cos(math.radians(60.0))
+_FACING = math.cos(math.radians(60.0))
 """A sign speaks to those who drive within 60° of its direction."""
 
 
@@ -30,7 +30,7 @@ def signs_ahead(
         dx, dy = sign.position[0] - float(position[0]), sign.position[1] - float(position[1])
         distance = dx * forward[0] + dy * forward[1]
         lateral = dy * forward[0] - dx * forward[1]
-        faces = math.cos(sign.heading - heading) > FACING
+        faces = math.cos(sign.heading - heading) > _FACING
         if faces and 0.0 < distance <= reach and abs(lateral) <= corridor:
             height = (sign.position[2] - float(position[2])) * math.cos(grade) - distance * math.sin(grade)
             facing = math.remainder(sign.heading - heading, 2.0 * math.pi)

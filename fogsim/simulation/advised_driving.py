@@ -32,13 +32,13 @@ class AdvisedDriving:
         previous = step.command if previous is None else previous
         if step.index % self._frames:
             return previous
-        lit = known_fog(step, self._scenario.lighting)
+        lit = _known_fog(step, self._scenario.lighting)
         chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
         command = warned(Command(lamps=chosen.lamps, lamp_wish=chosen.wish), step, previous)
         if self._road is not None:
             advice, stretches = self._road.advise(step)
             return dataclasses.replace(command, advice=advice, stretches=stretches)
-        known = known_fog(step, self._scenario.advice)
+        known = _known_fog(step, self._scenario.advice)
         advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
         return spread_advice(dataclasses.replace(command, advice=advice), self._scenario)
 
@@ -71,7 +71,7 @@ def _lighting_questions(
     return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
 
 
-def known_fog(step: Step, method: InformedMethod) -> Belief:
+def _known_fog(step: Step, method: InformedMethod) -> Belief:
     """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it."""
     return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
 

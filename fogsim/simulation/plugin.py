@@ -23,7 +23,7 @@ from fogsim.units import clock_time
 from fogsim.values import NOTHING_UNPLAYED, Begun, Command, Step
 from fogsim.values.result_checks import checked_command
 
-DECISION_PERIOD = 0.5
+_DECISION_PERIOD = 0.5
 """Time between two decisions, as far as the simulation's step allows [s]."""
 
 
@@ -135,7 +135,7 @@ def attach(
     return AttachedSession(scenario, AttachedTraffic(setup, api), drivers, seed)
 
 
-def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
+def _clocks(step: float, decision_period: float = _DECISION_PERIOD) -> list[str]:
     decision = step * max(1, round(decision_period / step))
     return clock_settings(step, step, decision)
 

@@ -30,7 +30,7 @@ from fogsim.values import Begun, Cohort, Command, Ending, NetworkSnapshot, Traff
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command
 
-METER_SPACING = 100.0
+_METER_SPACING = 100.0
 """Distance between visibility meters along a road [m]."""
 
 
@@ -260,5 +260,5 @@ def _axis_along(edges: Sequence[str], net: Path) -> tuple[NDArray[np.float64], N
 def _places_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places of visibility meters on the ground along a polyline (n, 3) [m], its beginning and end among them."""
     station = stations(axis)
-    at = np.linspace(0.0, station[-1], 1 + math.ceil(station[-1] / METER_SPACING))
+    at = np.linspace(0.0, station[-1], 1 + math.ceil(station[-1] / _METER_SPACING))
     return np.stack([np.interp(at, station, axis[:, i]) for i in range(3)], axis=1)

@@ -19,16 +19,16 @@ from fogsim.study.table import Row
 RESAMPLES = 9_999
 """Resamples of bootstraps and permutation tests."""
 
-DENOMINATORS = (
+_DENOMINATORS = (
     *("traffic_vehicle_distance_in_fog_m", "traffic_vehicle_distance_m", "traffic_vehicle_time_s"),
     *("distance_in_fog_m", "traffic_cohort_vehicles"),
 )
 """Metrics that others are divided by."""
 
-MOVED_SHARE = 0.05
+_MOVED_SHARE = 0.05
 """Change of a denominator, and share of unfinished vehicles of a cohort, from which the report says so [-]."""
 
-SATURATED_SHARE = 0.9
+_SATURATED_SHARE = 0.9
 """Share of runs at a metric's extreme value above which it shows little about the rest [-]."""
 
 
@@ -111,13 +111,13 @@ def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
     """Sentences on where a policy moves a denominator by more than 5 %, or leaves as much of a cohort unfinished."""
     said = []
     pairs = [(" · ".join(levels.values()), both) for levels, both in _paired_rows(study, rows)]
-    for metric in DENOMINATORS:
+    for metric in _DENOMINATORS:
         words = metric_words(metric)
         for policy, both in pairs:
             values = words.scale * _paired_values(both, metric)
             baseline, here = values.mean(axis=0) if len(values) else (0.0, 0.0)
             change = here / baseline - 1.0 if baseline > 0.0 else 0.0
-            if abs(change) > MOVED_SHARE:
+            if abs(change) > _MOVED_SHARE:
                 said.append(
                     f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} {words.unit} under the "
                     f"baseline ({signed(100.0 * change, 2)} %). Metrics divided by it compare different amounts of "
@@ -132,7 +132,7 @@ def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
         f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left when the run ends with {cell}; "
         "their later conflicts are not counted. Raise duration_s."
         for cell, (unfinished, vehicles) in cohorts.items()
-        if unfinished > MOVED_SHARE * vehicles
+        if unfinished > _MOVED_SHARE * vehicles
     ]
     return said
 
@@ -229,6 +229,6 @@ def uninformative(rows: Sequence[Row], metrics: Sequence[str]) -> dict[str, str]
             continue
         for end, word in ((values.min(), "least"), (values.max(), "highest")):
             share = float(np.mean(np.isclose(values, end, rtol=1e-3, atol=1e-9)))
-            if share >= SATURATED_SHARE:
+            if share >= _SATURATED_SHARE:
                 said[metric] = f"saturated: {share:.0%} of the runs have the {word} value, {end:.4g}"
     return said

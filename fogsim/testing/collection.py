@@ -15,10 +15,10 @@ from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
 
-PATTERN = "*.fog.yaml"
+_PATTERN = "*.fog.yaml"
 """Names of test files; a folder's scenario.yaml is also one, if it has expectations."""
 
-EXPECT = "expect"
+_EXPECT = "expect"
 """The block that makes a file a test."""
 
 
@@ -70,9 +70,9 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
-    files = {*folder.rglob(PATTERN), *folder.rglob(SCENARIO_FILE)}
+    files = {*folder.rglob(_PATTERN), *folder.rglob(SCENARIO_FILE)}
     for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
-        if file.name != SCENARIO_FILE or EXPECT in read_scenario_document(file).data:
+        if file.name != SCENARIO_FILE or _EXPECT in read_scenario_document(file).data:
             yield file
 
 
@@ -119,8 +119,8 @@ def collect(
             continue
         name = loaded.cases[0][1].name
         lines = {
-            one: loaded.document.where((EXPECT, one))
-            for one in loaded.document.data.get(EXPECT) or {}
+            one: loaded.document.where((_EXPECT, one))
+            for one in loaded.document.data.get(_EXPECT) or {}
             if keywords is None or keywords.match(f"{file} {name} {one}")
         }
         if lines:

@@ -17,7 +17,7 @@ from fogsim.testing.session import FileOutcome
 from fogsim.testing.wording import command_text
 from fogsim.units.quantities import split_quantity
 
-HALVINGS = 5
+_HALVINGS = 5
 """Maximum number of bisection steps between a number and its first value."""
 
 Values = Mapping[str, str]
@@ -126,7 +126,7 @@ def _nearer(values: Values, name: str, first: str, variation: Variation, fails: 
     if bad is None or good is None or bad[1] != good[1]:
         return None
     failing, passing = bad[0], good[0]
-    for _ in range(HALVINGS):
+    for _ in range(_HALVINGS):
         middle = value_text(number_with_unit((failing + passing) / 2, bad[1]))
         found = fails({**values, name: middle})
         if found is None:

@@ -14,7 +14,7 @@ from fogsim.study.drawing import INK, MUTED, WIDTH, dress, svg_of
 from fogsim.units.quantities import parse_quantity
 from fogsim.values import TrafficStep
 
-MOST_PANELS = 6
+_MOST_PANELS = 6
 """Maximum number of signals in a figure."""
 
 _ALARM, _LIMIT = "#cf3a34", "#9a6700"
@@ -50,7 +50,7 @@ def _limits(condition: Condition) -> list[tuple[Reference, Quantity]]:
 
 def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
     """Draw signals over time as SVG, with marks where something failed [s]."""
-    shown = list(log.values)[:MOST_PANELS]
+    shown = list(log.values)[:_MOST_PANELS]
     figure = Figure(figsize=(WIDTH, 0.7 + _PANEL_HEIGHT * len(shown)), layout="constrained")
     panels = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
     for axes, signal in zip(panels, shown, strict=True):

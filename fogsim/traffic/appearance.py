@@ -55,10 +55,10 @@ SHAPE_KINDS = {
 }
 """Body kind of a SUMO ``guiShape``, or of what stands before its stroke, where the class is that of a car."""
 
-CAR_SECTION, LARGE_SECTION = (1.8, 1.5), (2.5, 3.4)
+_CAR_SECTION, LARGE_SECTION = (1.8, 1.5), (2.5, 3.4)
 """Width and height of SUMO's cars, and of trucks and buses whose type leaves them at that [m]."""
 
-LONGEST_CAR = 7.5
+_LONGEST_CAR = 7.5
 """Vehicles of a car's class that are longer than this are trucks [m]."""
 
 SUMO_DEFAULT_COLOUR = (255, 255, 0)
@@ -93,7 +93,7 @@ OTHERS_LAMPS = Lamp.POSITION | Lamp.LOW_BEAM
 def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
     """Body kind of a SUMO vehicle (`length` [m])."""
     known = BODY_KINDS.get(vehicle_class) or SHAPE_KINDS.get(shape) or SHAPE_KINDS.get(shape.split("/", maxsplit=1)[0])
-    return known or ("truck" if length > LONGEST_CAR else "car")
+    return known or ("truck" if length > _LONGEST_CAR else "car")
 
 
 def cross_section(kind: str, width: float, height: float) -> tuple[float, float]:
@@ -101,7 +101,7 @@ def cross_section(kind: str, width: float, height: float) -> tuple[float, float]
 
     Takes `width`, `height` [m].
     """
-    large = kind in {"truck", "bus"} and math.isclose(width, CAR_SECTION[0]) and math.isclose(height, CAR_SECTION[1])
+    large = kind in {"truck", "bus"} and math.isclose(width, _CAR_SECTION[0]) and math.isclose(height, _CAR_SECTION[1])
     return LARGE_SECTION if large else (width, height)
 
 

@@ -7,11 +7,11 @@ from numbers import Real
 
 from fogsim.errors import InputError, shown, suggest
 
-BIT_DEPTHS = (8, 10, 12)
+_BIT_DEPTHS = (8, 10, 12)
 """Bit depths that a camera can have."""
 
 
-MOST_BLACK = 0.25
+_MOST_BLACK = 0.25
 """Largest black level that a camera can have, as a share of full scale [-]."""
 
 
@@ -90,10 +90,10 @@ class Camera:
             raise InputError(f"camera pitch must lie within ±π/2 rad, got {shown(self.pitch)}")
         if not (_finite(self.roll) and abs(self.roll) <= math.pi):
             raise InputError(f"camera roll must lie within ±π rad, got {shown(self.roll)}")
-        if not (_whole(self.bits) and self.bits in BIT_DEPTHS):
+        if not (_whole(self.bits) and self.bits in _BIT_DEPTHS):
             raise InputError(f"camera bits must be 8, 10 or 12, got {shown(self.bits)}")
-        if not (_finite(self.black_level) and 0 <= self.black_level <= MOST_BLACK):
-            raise InputError(f"camera black_level must lie in 0 … {MOST_BLACK:g}, got {shown(self.black_level)}")
+        if not (_finite(self.black_level) and 0 <= self.black_level <= _MOST_BLACK):
+            raise InputError(f"camera black_level must lie in 0 … {_MOST_BLACK:g}, got {shown(self.black_level)}")
         for name in ("width", "height", "bits"):
             object.__setattr__(self, name, int(getattr(self, name)))
 

@@ -10,10 +10,10 @@ from fogsim.errors import InputError
 LEAST_LUMINANCE = 1e-6
 """Luminance below which the formulas are read at this value [cd/m²]."""
 
-SMALLEST_ANGLE = math.radians(0.1)
+_SMALLEST_ANGLE = math.radians(0.1)
 """Angle from which on the general formula is known, to 100° [rad]; below it is read at this angle."""
 
-LEAST_ANGLE = math.radians(1.0)
+_LEAST_ANGLE = math.radians(1.0)
 """Angle below which the formula is read at this angle [rad]; it is known from 1° to 30°."""
 
 
@@ -57,7 +57,7 @@ def veiling_luminance(illuminance: ArrayLike, angle: ArrayLike, age: float = 25.
         If an illuminance or the age is negative or not finite, or an angle is not in 0 … π.
     """
     light, theta = _checked_glare(illuminance, angle, age)
-    degrees = np.degrees(np.maximum(theta, LEAST_ANGLE))
+    degrees = np.degrees(np.maximum(theta, _LEAST_ANGLE))
     return np.asarray(10.0 * light * (1.0 + (age / 70.0) ** 4) / degrees**2)
 
 
@@ -71,7 +71,7 @@ def disability_glare(
     light, theta = _checked_glare(illuminance, angle, age)
     if not 0.0 <= pigmentation <= 1.2:
         raise InputError(f"pigmentation of the eye must lie in 0 … 1.2, got {pigmentation!r}")
-    degrees = np.degrees(np.maximum(theta, SMALLEST_ANGLE))
+    degrees = np.degrees(np.maximum(theta, _SMALLEST_ANGLE))
     by_age = (5.0 / degrees**2 + 0.1 * pigmentation / degrees) * (1.0 + (age / 62.5) ** 4)
     return np.asarray(light * (10.0 / degrees**3 + by_age + 0.0025 * pigmentation))
 

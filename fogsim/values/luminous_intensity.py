@@ -13,7 +13,7 @@ from fogsim.values import Beam
 FALL_OFF = 0.07
 """How fast intensity falls beyond a measured table [decades per degree]; laboratory reports show 0.04 … 0.12."""
 
-FLOOR = 0.01
+_FLOOR = 0.01
 """Least intensity that logarithms are taken of [cd]."""
 
 
@@ -100,7 +100,7 @@ def luminous_intensity(beam: Beam, azimuth: ArrayLike, elevation: ArrayLike) -> 
     Takes `azimuth`, `elevation` [rad].
     """
     right, up = np.asarray(azimuth, dtype=np.float64), np.asarray(elevation, dtype=np.float64)
-    table = np.log(np.maximum(beam.intensity, FLOOR))
+    table = np.log(np.maximum(beam.intensity, _FLOOR))
     column, column_share, beyond_sides = _place(beam.azimuth, right)
     row, row_share, beyond_ends = _place(beam.elevation, up)
     below = (1 - column_share) * table[row, column] + column_share * table[row, column + 1]

@@ -14,7 +14,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.image import Frame, read_only
 from fogsim.values.light import Lamp
 
-SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
+_SIGN_MAP_REACH, _SIGN_MAP_SIZE = 255.0, 2.0
 """Distance at which a sign's distance is 1 in the picture of the map, and size at which its size is 255 [m]."""
 
 Measured = Annotated[float, NUMBER_OR_NAN]
@@ -247,8 +247,8 @@ def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, i
 
     Takes `distance` [m], `diameter` [m].
     """
-    nearness = min(max(round(SIGN_MAP_REACH - distance), 1), 255)
-    return sign_kind_code(kind), nearness, min(round(255.0 * diameter / SIGN_MAP_SIZE), 255)
+    nearness = min(max(round(_SIGN_MAP_REACH - distance), 1), 255)
+    return sign_kind_code(kind), nearness, min(round(255.0 * diameter / _SIGN_MAP_SIZE), 255)
 
 
 def sign_coordinates(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float]:

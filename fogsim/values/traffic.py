@@ -102,7 +102,7 @@ class BodyPieces:
     length: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
-NO_PIECES = BodyPieces()
+_NO_PIECES = BodyPieces()
 """Where every body is in one piece."""
 
 
@@ -182,7 +182,7 @@ class TrafficState:
     persons: PersonState = NO_PERSONS
     course: tuple[str, ...] = ()
     across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    pieces: BodyPieces = NO_PIECES
+    pieces: BodyPieces = _NO_PIECES
 
     def __post_init__(self) -> None:
         """Put vehicles on the level, on lanes and along these where nothing else is given."""
@@ -427,7 +427,7 @@ def with_pieces(state: TrafficState, skip: int | None) -> tuple[TrafficState, ND
         grade=column(state.grade, pieces.grade),
         length=column(state.length, pieces.length),
         lamps=np.concatenate((lamps, lit[further])).astype(np.int32),
-        pieces=NO_PIECES,
+        pieces=_NO_PIECES,
         speed=state.speed[body],
         acceleration=state.acceleration[body],
         width=state.width[body],

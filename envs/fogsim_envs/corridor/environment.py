@@ -73,13 +73,13 @@ try:
 except ImportError as error:  # pragma: no cover - the tests have it
     raise MissingDependencyError(f"FogCorridor needs PettingZoo ({error}): pip install 'fogsim[rl]'") from error
 
-MOTORWAY = Path(__file__).with_name("motorway.yaml")
+_MOTORWAY = Path(__file__).with_name("motorway.yaml")
 """The road of the default task."""
 
-CORRIDOR_FOG = FogDistribution(ahead=(500.0, 2500.0), reach=4000.0)
+_CORRIDOR_FOG = FogDistribution(ahead=(500.0, 2500.0), reach=4000.0)
 """Fog anywhere along the default road."""
 
-DEMANDS = (600.0, 1200.0, 1800.0, 2400.0)
+_DEMANDS = (600.0, 1200.0, 1800.0, 2400.0)
 """Demand of the default task, each as likely [1/h]."""
 
 
@@ -149,7 +149,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         checked_timeout(timeout)
         self._timeout, self._weights = timeout, reward_weights or CorridorWeights()
         drawn = _default_scenarios() if scenario is None else None
-        fog = CORRIDOR_FOG if scenario is None and fog_distribution is None else fog_distribution
+        fog = _CORRIDOR_FOG if scenario is None and fog_distribution is None else fog_distribution
         self._source = EpisodeSource(scenario, drawn, fog, tuple(overrides), split)
         self._road = signed_road(self._source.first_scenario())
         self.possible_agents = [f"sign_{number}" for number in range(len(self._road.starts))]
@@ -376,5 +376,5 @@ def _by_start(rule: RoadAdvice, step: TrafficStep) -> dict[float, float]:
 
 @functools.cache
 def _default_scenarios() -> tuple[Scenario, ...]:
-    base = load_scenario(MOTORWAY)
-    return tuple(override(base, [f"demand.same_way_vph={demand!r}"]) for demand in DEMANDS)
+    base = load_scenario(_MOTORWAY)
+    return tuple(override(base, [f"demand.same_way_vph={demand!r}"]) for demand in _DEMANDS)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.scene.polyline import project
 from fogsim.values import TrafficState
 
-SECONDS_PER_HOUR = 3600.0
+_SECONDS_PER_HOUR = 3600.0
 
 
 class LoopReading(NamedTuple):
@@ -43,7 +43,7 @@ class InductionLoops:
 
     def read(self) -> tuple[LoopReading, ...]:
         """Return what was counted since the last reading, loop by loop, and start again."""
-        hours = self._time / SECONDS_PER_HOUR
+        hours = self._time / _SECONDS_PER_HOUR
         counted = zip(self._count.tolist(), self._speeds.tolist(), strict=True)
         readings = tuple(
             LoopReading(count / hours if hours > 0.0 else 0.0, speeds / count if count else None)

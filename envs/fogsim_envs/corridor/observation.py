@@ -17,13 +17,13 @@ from fogsim_envs.spaces import SPEED_SCALE, scaled_visibility
 SHOWN_SPEEDS = (*(kmh / KMH_PER_MPS for kmh in (40, 60, 80, 100, 120)), math.inf)
 """Speed that each level shows [m/s]; the last shows none."""
 
-FLOW_SCALE = 2500.0
+_FLOW_SCALE = 2500.0
 """Vehicles per hour and lane that are 1: about what a motorway lane carries [1/h]."""
 
-METER_RANGE = 2000.0
+_METER_RANGE = 2000.0
 """Largest visibility that a meter reports [m], as forward scatter sensors of roads do."""
 
-METER_DEVIATION = 0.1
+_METER_DEVIATION = 0.1
 """Standard deviation of a meter's value, in ln V [-]; FogSim's own choice."""
 
 CORRIDOR_FEATURES = (
@@ -71,9 +71,9 @@ def loop_places(starts: Sequence[float], length: float) -> tuple[float, ...]:
 
 def measured_visibilities(sections: Sequence[RoadSection], rng: np.random.Generator) -> list[float]:
     """Readings of the meters at the signs [m]."""
-    errors = rng.normal(0.0, METER_DEVIATION, len(sections)).tolist()
+    errors = rng.normal(0.0, _METER_DEVIATION, len(sections)).tolist()
     true = (visibility_from_extinction(section.extinction) for section in sections)
-    return [min(visibility * math.exp(error), METER_RANGE) for visibility, error in zip(true, errors, strict=True)]
+    return [min(visibility * math.exp(error), _METER_RANGE) for visibility, error in zip(true, errors, strict=True)]
 
 
 def sign_observation(sign: int, known: RoadKnowledge, section: RoadSection, length: float) -> NDArray[np.float32]:
@@ -92,7 +92,7 @@ def sign_observation(sign: int, known: RoadKnowledge, section: RoadSection, leng
 
 
 def _loop(reading: LoopReading, lanes: int) -> tuple[float, float, float]:
-    flow = reading.flow / (FLOW_SCALE * lanes)
+    flow = reading.flow / (_FLOW_SCALE * lanes)
     return (flow, 0.0, 0.0) if reading.speed is None else (flow, reading.speed / SPEED_SCALE, 1.0)
 
 

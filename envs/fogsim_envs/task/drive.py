@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 from fogsim.values import Command, EgoControl
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 
-ACCELERATIONS = (-8.0, -4.0, -2.0, 0.0, 1.0, 2.0)
+_ACCELERATIONS = (-8.0, -4.0, -2.0, 0.0, 1.0, 2.0)
 """Acceleration of each level [m/s²]: an emergency, hard and gentle braking, none, and a car's usual ones."""
 
-HARDEST_BRAKING, LARGEST_ACCELERATION = 8.0, 2.5
+_HARDEST_BRAKING, _LARGEST_ACCELERATION = 8.0, 2.5
 """What −1 and 1 of a continuous action stand for [m/s²]; 0 is 0, and between them it is proportional."""
 
-LANE_CHANGES = (-1, 0, 1)
+_LANE_CHANGES = (-1, 0, 1)
 """Lanes to the left of each choice."""
 
 
@@ -40,14 +40,14 @@ class FogDriveEnv(FogAdvisoryV1Env):
     """
 
     def _action_levels(self) -> tuple[int, int]:
-        return len(ACCELERATIONS), len(LANE_CHANGES)
+        return len(_ACCELERATIONS), len(_LANE_CHANGES)
 
     def _commanded(self, action: NDArray[Any]) -> Command:
         if self._continuous:
             pedal, wheel = action.tolist()
-            acceleration = pedal * (LARGEST_ACCELERATION if pedal > 0.0 else HARDEST_BRAKING)
-            lanes = LANE_CHANGES[min(int((wheel + 1.0) / 2.0 * len(LANE_CHANGES)), len(LANE_CHANGES) - 1)]
+            acceleration = pedal * (_LARGEST_ACCELERATION if pedal > 0.0 else _HARDEST_BRAKING)
+            lanes = _LANE_CHANGES[min(int((wheel + 1.0) / 2.0 * len(_LANE_CHANGES)), len(_LANE_CHANGES) - 1)]
         else:
             level, choice = action.tolist()
-            acceleration, lanes = ACCELERATIONS[level], LANE_CHANGES[choice]
+            acceleration, lanes = _ACCELERATIONS[level], _LANE_CHANGES[choice]
         return Command(lamps=self._built_in.lamps, control=EgoControl(acceleration, lanes))

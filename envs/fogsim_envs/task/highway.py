@@ -28,13 +28,13 @@ from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
 
-HIGHWAY_FOG = FogDistribution(ahead=(100.0, 500.0), reach=1000.0, bank_length=(300.0, 800.0))
+_HIGHWAY_FOG = FogDistribution(ahead=(100.0, 500.0), reach=1000.0, bank_length=(300.0, 800.0))
 """Banks that begin on the first kilometre of the way."""
 
-WAY = 1500.0
+_WAY = 1500.0
 """Way that the ego has to go [m]."""
 
-DURATION = 150.0
+_DURATION = 150.0
 """Longest time that it has for it, where the configuration sets none [s]."""
 
 _DRAWN = ("light.", "camera.told.")
@@ -104,9 +104,9 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         environment: str = "highway-fast-v0",
         config: Mapping[str, Any] | None = None,
         *,
-        way: Annotated[float, NUMBER] = WAY,
+        way: Annotated[float, NUMBER] = _WAY,
         scenario_distribution: HighwayDistribution | None = None,
-        fog_distribution: FogDistribution = HIGHWAY_FOG,
+        fog_distribution: FogDistribution = _HIGHWAY_FOG,
         split: str = "train",
         observation: str = "dict",
         overrides: Iterable[str] = (),
@@ -122,7 +122,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         if not way > 0.0:
             raise InputError(f"way: expected more than 0 m, got {way!r}")
         self._way_length = way
-        self._environment = highway_environment(environment, {"duration": DURATION, **(config or {})})
+        self._environment = highway_environment(environment, {"duration": _DURATION, **(config or {})})
         settings = highway_config(self._environment)
         super().__init__(
             functools.partial(_scenario, settings),

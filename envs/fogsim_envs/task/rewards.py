@@ -8,7 +8,7 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard
 from fogsim.values import Ending, Lamp, Step
 
-COMFORTABLE_DECELERATION = 2.0
+_COMFORTABLE_DECELERATION = 2.0
 """Decelerations up to this are comfortable [m/s²] (ISO 15622: 2–3.5)."""
 
 REAR_FOG_LAMP_VISIBILITY = 50.0
@@ -93,7 +93,7 @@ def task_terms(
         "arrival": float(after.ending is Ending.ARRIVED),
         "overdriving": -share * unseen_share(after, standard),
         "conflict": -duration * conflict(after, standard.time_to_collision),
-        "discomfort": -duration * max(-_acceleration(after) - COMFORTABLE_DECELERATION, 0.0),
+        "discomfort": -duration * max(-_acceleration(after) - _COMFORTABLE_DECELERATION, 0.0),
         "collision": -float(strikes(after)),
         "rear_fog_lamp": -share * _amiss(after, Lamp.REAR_FOG, REAR_FOG_LAMP_VISIBILITY),
         "front_fog_lamp": -share * _amiss(after, Lamp.FRONT_FOG, FRONT_FOG_LAMP_VISIBILITY),

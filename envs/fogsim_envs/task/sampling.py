@@ -17,7 +17,7 @@ from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribu
 MOTORWAY = Path(__file__).with_name("motorway.yaml")
 """The road of the default task."""
 
-SPLITS = ("train", "test")
+_SPLITS = ("train", "test")
 """Streams of random numbers that never overlap."""
 
 AnyScenario = str | Path | Scenario | Callable[[Sequence[str]], Scenario]
@@ -80,9 +80,9 @@ class EpisodeSource:
         overrides: tuple[str, ...],
         split: str,
     ) -> None:
-        if split not in SPLITS:
-            raise UnknownNameError("split", split, SPLITS)
-        self._split = SPLITS.index(split)
+        if split not in _SPLITS:
+            raise UnknownNameError("split", split, _SPLITS)
+        self._split = _SPLITS.index(split)
         self._drawn = ScenarioDistribution() if scenario is None and distribution is None else distribution
         self._fog = FogDistribution() if fog is None and is_own_motorway(scenario, distribution) else fog
         self._overrides = overrides

@@ -12,7 +12,7 @@ from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.values import FogField
 from fogsim.values.fog import AIRLIGHT_SHARE
 
-AIRLIGHT_TINT = (0.98, 1.0, 1.02)
+_AIRLIGHT_TINT = (0.98, 1.0, 1.02)
 """Airlight per channel relative to its luminance: fog droplets are grey, the overcast sky slightly bluish."""
 
 _DEEPEST = 2000.0
@@ -43,7 +43,7 @@ def airlight_from_illuminance(illuminance: float, share: float = AIRLIGHT_SHARE)
     if not (illuminance >= 0 and math.isfinite(illuminance)):
         raise ValueError(f"illuminance must be finite and not negative, got {illuminance!r}")
     luminance = share * illuminance / math.pi
-    red, green, blue = (luminance * tint for tint in AIRLIGHT_TINT)
+    red, green, blue = (luminance * tint for tint in _AIRLIGHT_TINT)
     return (red, green, blue)
 
 

@@ -15,16 +15,16 @@ from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 
-COARSE = 16
+_COARSE = 16
 """Pixels between two rays of a large image; across a small one there are not fewer than 15, nor more than 30 rows."""
 
-FINER = 4
+_FINER = 4
 """How much denser the rays are at the horizon, where layers of fog are seen edge-on."""
 
 _WIDER = 1.6
 """How much farther apart the rays are across the image, where fog changes less than with height."""
 
-NODES = 32
+_NODES = 32
 """Nodes along a ray, with the eye and the end of the ray."""
 
 FARTHEST = 20_000.0
@@ -107,7 +107,7 @@ def frustum_grid(
 
 def _spacing(camera: Camera) -> float:
     """Pixels between rays far from the horizon."""
-    return camera.height / min(max(camera.height / COARSE, 15.0), 30.0)
+    return camera.height / min(max(camera.height / _COARSE, 15.0), 30.0)
 
 
 def _grid_columns(camera: Camera) -> NDArray[np.float32]:
@@ -122,7 +122,7 @@ def _grid_rows(camera: Camera, ray_map: NDArray[np.float64]) -> NDArray[np.float
     crossings = [-(ray_map[2, 2] + ray_map[2, 0] * u) / slope for u in (0, camera.width - 1)]
     high, low = min(crossings), max(crossings)
     coarse = _spacing(camera)
-    fine = coarse / FINER
+    fine = coarse / _FINER
     rows = [0.0]
     while rows[-1] < camera.height - 1:
         off = max(high - rows[-1] - fine, rows[-1] - low, 0.0)
@@ -159,7 +159,7 @@ def _node_distances(eye: NDArray[np.float64], directions: NDArray[np.float64], m
     even = step[:last] / (_PROBES[1 : last + 1] + 5.0)
     weight = _EVEN_SHARE * even / even.sum() + (1.0 - _EVEN_SHARE) * uneven / max(uneven.sum(), 1e-30)
     growth = np.concatenate(([0.0], np.cumsum(weight)))
-    inner = np.interp(np.linspace(0.0, growth[-1], NODES - 2), growth, _PROBES[: last + 1])
+    inner = np.interp(np.linspace(0.0, growth[-1], _NODES - 2), growth, _PROBES[: last + 1])
     return np.append(inner, (FARTHEST, ENDLESS))
 
 

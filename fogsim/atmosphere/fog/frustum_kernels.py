@@ -18,7 +18,7 @@ from fogsim.atmosphere.fog.medium import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, 
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.core.jit import kernel
 
-OPAQUE = 60.0
+_OPAQUE = 60.0
 """Optical depth beyond which nothing is distinguished [-]."""
 
 _OUT_OF_FOG = 1e-9
@@ -111,7 +111,7 @@ def grid_depths(
             total += pieces[n]
             pieces[n] = total
         for n in range(last + 1):
-            depth[m, n] = min(pieces[n], OPAQUE)
+            depth[m, n] = min(pieces[n], _OPAQUE)
         pieces[0] = 0.0
 
 

@@ -31,7 +31,7 @@ _DARK = 1e-12
 _NONE, _HALF = np.float32(0.0), np.float32(0.5)
 
 
-def add_forward_scatter(
+def _add_forward_scatter(
     luminance: NDArray[np.float32],
     airlight: tuple[float, float, float],
     transmittance: NDArray[np.float32],
@@ -69,7 +69,7 @@ def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
     return np.ascontiguousarray(means, dtype=np.float32)
 
 
-def pixel_width(angle: float, focal_length: float) -> float:
+def _pixel_width(angle: float, focal_length: float) -> float:
     """Width of a blur on the image [px]: at least half a pixel, so that it can be drawn.
 
     Takes `angle` [rad], `focal_length` [px].
@@ -130,13 +130,13 @@ def exchange(
                 luminance[v, u, c] += share * (above + (below - above) * b - difference[v, u, c])
 
 
-def is_sheltered(shelters: tuple[FogShelter, ...], place: tuple[float, float, float]) -> bool:
+def _is_sheltered(shelters: tuple[FogShelter, ...], place: tuple[float, float, float]) -> bool:
     """Whether a place is in a tunnel (`place` [m])."""
     above = (place[0], place[1], place[2] + 0.01)
     return bool(Obstructions(_boxes(shelters)).way_through([place], [above])[0] > 0.0)
 
 
-def sheltered_pixels(
+def _sheltered_pixels(
     shelters: tuple[FogShelter, ...], view: View, camera: Camera, pose: CameraPose
 ) -> NDArray[np.bool_]:
     """Pixels whose rays pass through a tunnel before they end (rows, cols)."""
@@ -162,12 +162,12 @@ def _portals(shelters: tuple[FogShelter, ...]) -> NDArray[np.float64]:
     return np.array(rows)
 
 
-USUAL_DROPLETS = "moderate_radiation"
+_USUAL_DROPLETS = "moderate_radiation"
 """Small droplets, as `Droplets` calls them."""
 
 
 def daytime_luminance(
-    view: View, field: FogField, camera: Camera, pose: CameraPose, droplets: str = USUAL_DROPLETS
+    view: View, field: FogField, camera: Camera, pose: CameraPose, droplets: str = _USUAL_DROPLETS
 ) -> NDArray[np.float32]:
     """Luminance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
 
@@ -177,9 +177,9 @@ def daytime_luminance(
         return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose), droplets)
     radiance = _through_fog(view, field, camera, pose)
     if field.forward_scatter > 0:
-        width = pixel_width(field.forward_scatter_width, camera.focal_length)
+        width = _pixel_width(field.forward_scatter_width, camera.focal_length)
         share = transmittance(view, field, camera, pose)
-        add_forward_scatter(radiance, field.airlight, share, field.forward_scatter, width)
+        _add_forward_scatter(radiance, field.airlight, share, field.forward_scatter, width)
     return radiance
 
 
@@ -201,10 +201,10 @@ def _through_fog(view: View, field: FogField, camera: Camera, pose: CameraPose) 
     pass through the tunnel itself are sheltered.
     """
     radiance = _through_field(view, field, camera, pose)
-    if not field.shelters or is_sheltered(field.shelters, pose.position):
+    if not field.shelters or _is_sheltered(field.shelters, pose.position):
         return radiance
     open_air = _through_field(view, dataclasses.replace(field, shelters=()), camera, pose)
-    within = sheltered_pixels(field.shelters, view, camera, pose)
+    within = _sheltered_pixels(field.shelters, view, camera, pose)
     open_air[within] = radiance[within]
     return open_air
 
@@ -222,7 +222,7 @@ def fogged_radiance(
     field: FogField,
     eye: tuple[float, float, float],
     ray_map: NDArray[np.float64],
-    droplets: str = USUAL_DROPLETS,
+    droplets: str = _USUAL_DROPLETS,
 ) -> NDArray[np.float32]:
     """Luminance that reaches the camera through daytime fog: L = L0 e^(−τ) + L∞ (1 − e^(−τ)) (Koschmieder 1924).
 

@@ -26,7 +26,7 @@ _TURN = 0.5
 PATCH_CELLS = 5
 """Cells of the patches' grid in one correlation length: between them, linear interpolation loses little."""
 
-PATCH_SHAPE = (32, 128, 128)
+_PATCH_SHAPE = (32, 128, 128)
 """Cells (z, y, x) of that grid before the pattern repeats: 25 correlation lengths horizontally, 6 vertically."""
 
 
@@ -82,7 +82,7 @@ def field_at(field: FogField, time: float) -> FogField:
     )
 
 
-SHORTEST_CHANGE = 1e-3
+_SHORTEST_CHANGE = 1e-3
 """Time that a change of the fog at once takes [s]."""
 
 
@@ -101,7 +101,7 @@ def with_change(field: FogField, time: float, density: float, duration: float) -
         Time that it takes [s].
     """
     now, base, top = _layer_at(field, time)
-    begun, done = FogChange(time, now, base, top), FogChange(time + max(duration, SHORTEST_CHANGE), density, base, top)
+    begun, done = FogChange(time, now, base, top), FogChange(time + max(duration, _SHORTEST_CHANGE), density, base, top)
     earlier = tuple(change for change in field.changes if change.time < time)
     return dataclasses.replace(field, changes=(*earlier, begun, done))
 
@@ -140,13 +140,13 @@ def patch_factors(strength: float, seed: int) -> NDArray[np.float32]:
 
     Returns positive factors over (z, y, x); read-only.
     """
-    white = np.random.default_rng(seed).standard_normal(PATCH_SHAPE, dtype=np.float32)
-    squares = [np.square(2.0 * np.pi * np.fft.fftfreq(n)) for n in PATCH_SHAPE[:2]]
-    squares.append(np.square(2.0 * np.pi * np.fft.rfftfreq(PATCH_SHAPE[2])))
+    white = np.random.default_rng(seed).standard_normal(_PATCH_SHAPE, dtype=np.float32)
+    squares = [np.square(2.0 * np.pi * np.fft.fftfreq(n)) for n in _PATCH_SHAPE[:2]]
+    squares.append(np.square(2.0 * np.pi * np.fft.rfftfreq(_PATCH_SHAPE[2])))
     wave_number_squared = squares[0][:, None, None] + squares[1][:, None] + squares[2]
     # The spectrum of e^(−(Δ/c)²) is e^(−(c κ/2)²); the filter of amplitudes is its root.
     amplitude = np.exp(-wave_number_squared * PATCH_CELLS**2 / 8.0)
-    smooth = np.fft.irfftn(np.fft.rfftn(white) * amplitude, s=PATCH_SHAPE, axes=(0, 1, 2))
+    smooth = np.fft.irfftn(np.fft.rfftn(white) * amplitude, s=_PATCH_SHAPE, axes=(0, 1, 2))
     factors = np.exp(strength * (smooth - smooth.mean()) / smooth.std())
     factors = np.ascontiguousarray(factors / factors.mean(), dtype=np.float32)
     factors.setflags(write=False)

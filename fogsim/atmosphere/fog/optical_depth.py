@@ -11,7 +11,7 @@ from fogsim.atmosphere.fog.medium import Medium, field_at, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
-HIGHEST_EYES = 4.0
+_HIGHEST_EYES = 4.0
 """No driver's eyes are higher above the road than this [m]."""
 
 
@@ -196,7 +196,7 @@ class FieldAccess:
         field = self.field
         bases = (field.base, *(change.base for change in field.changes))
         lowest_top = min((field.top, *(change.top for change in field.changes))) - 0.5 * field.top_edge
-        is_shallow = lowest_top < field.ground + HIGHEST_EYES
+        is_shallow = lowest_top < field.ground + _HIGHEST_EYES
         if field.shelters or math.isfinite(field.scale_height) or max(bases) > -math.inf or is_shallow:
             return 0.0
         thinnest = field.extinction + min((0.0, *(bank.extra_extinction for bank in field.banks)))

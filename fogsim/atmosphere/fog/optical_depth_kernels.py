@@ -18,7 +18,7 @@ from fogsim.core.jit import kernel
 MOST_PIECES = 400
 """A line is cut into no more pieces than this between two edges: very long lines see no single patch."""
 
-FADED = 20.0
+_FADED = 20.0
 """Scale heights above which nothing is left of ground fog."""
 
 _BESIDE_EDGE = 1e-3
@@ -221,7 +221,7 @@ def _edges_crossed(
             count = _mark(cuts, count, start[2], towards[2], layer[middle] + side * layer[edge], length)
     if layer[DECAY] > 0.0:
         count = _mark(cuts, count, start[2], towards[2], layer[GROUND], length)
-        count = _mark(cuts, count, start[2], towards[2], layer[GROUND] + FADED / layer[DECAY], length)
+        count = _mark(cuts, count, start[2], towards[2], layer[GROUND] + _FADED / layer[DECAY], length)
     for bank in medium.banks:
         here = (start[0] - bank[0]) * bank[2] + (start[1] - bank[1]) * bank[3]
         rate = towards[0] * bank[2] + towards[1] * bank[3]

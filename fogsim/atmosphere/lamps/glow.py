@@ -24,16 +24,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.atmosphere.lamps.phase_function import Droplets, PhaseFunction, blurred, phase_function
 
-SPREADS = (0.42, 0.91)
+_SPREADS = (0.42, 0.91)
 """Widths by which the phase functions p₂ and p₃ are blurred [rad]."""
 
-LOSS_ONCE_SPREAD = 0.70
+_LOSS_ONCE_SPREAD = 0.70
 """η₂: part of the extinction that light suffers which was spread a little [-]."""
 
-LOSS_OF_DIFFUSE_LIGHT = 1.5
+_LOSS_OF_DIFFUSE_LIGHT = 1.5
 """η₃ / (1 − g): light that was spread widely is lost by what droplets turn round, as in diffusion theory [-]."""
 
-FORWARD = math.radians(1.0)
+_FORWARD = math.radians(1.0)
 """Scattering angle below which light is not lost at all [rad]."""
 
 FOLD_CHORD = 0.15
@@ -91,8 +91,8 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
     first = 1.0 - forward_share(phase)
     sight = _lines_of_sight(depth, angle, _STEPS)
     total = _scattered(sight, phase(sight.scattering), first)
-    last = LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
-    for wide, loss in zip(_blurred_phases(droplets), (LOSS_ONCE_SPREAD, last), strict=True):
+    last = _LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
+    for wide, loss in zip(_blurred_phases(droplets), (_LOSS_ONCE_SPREAD, last), strict=True):
         turned = wide(sight.scattering)
         more = _scattered(sight, turned, loss) - _scattered(sight, turned, first)
         total = total + np.maximum(more, 0.0)
@@ -102,7 +102,7 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
 
 @cache
 def _blurred_phases(droplets: Droplets) -> tuple[PhaseFunction, ...]:
-    return tuple(blurred(phase_function(droplets), spread) for spread in SPREADS)
+    return tuple(blurred(phase_function(droplets), spread) for spread in _SPREADS)
 
 
 def mean_cosine(phase: PhaseFunction) -> float:
@@ -111,7 +111,7 @@ def mean_cosine(phase: PhaseFunction) -> float:
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta) * np.cos(theta), theta))
 
 
-def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:
+def forward_share(phase: PhaseFunction, angle: float = _FORWARD) -> float:
     """Share of light that droplets scatter by less than an angle (`angle` [rad])."""
     theta = np.linspace(0.0, angle, 400)
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta), theta))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 
-PLACE_U, PLACE_V, AHEAD, RANGE, DEPTH, STRENGTH, SHOWN, AREA, PIXELS = range(9)
+PLACE_U, PLACE_V, AHEAD, RANGE, DEPTH, STRENGTH, SHOWN, _AREA, PIXELS = range(9)
 COLOUR, TOWARDS = 9, 12
 NEARNESS = 15
 COLUMNS = 16
@@ -143,10 +143,10 @@ def select_lamps(
         lamp[DEPTH], lamp[STRENGTH] = depth[i], intensity[number] / square * fade
         lamp[SHOWN] = _shown(distance, lamp[PLACE_U], lamp[PLACE_V], lamp[RANGE] - _BEFORE)
         # A pixel sees the solid angle cos³ / f² of its direction off the axis.
-        lamp[AREA] = area[number] / square
-        lamp[PIXELS] = lamp[AREA] * focal**2 / max(lamp[AHEAD], BEHIND) ** 3
+        lamp[_AREA] = area[number] / square
+        lamp[PIXELS] = lamp[_AREA] * focal**2 / max(lamp[AHEAD], BEHIND) ** 3
         lamp[NEARNESS] = 1.0 / lamp[RANGE]
-        if lamp[AREA] > _EXTENDED:
+        if lamp[_AREA] > _EXTENDED:
             lamp[NEARNESS] *= _EXTENDED_NEARNESS
         for c in range(3):
             lamp[COLOUR + c] = colour[number, c]

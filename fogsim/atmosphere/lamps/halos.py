@@ -115,16 +115,16 @@ class LobeMemory:
         self._known |= unknown
 
 
-COARSE_PIXELS = 8
+_COARSE_PIXELS = 8
 """Pixels between two of the coarse image; it has 40 … 80 cells across, and the coarsest half as many."""
 
 FARTHEST = 16.0
 """Optical depth at which a lamp has faded from sight; it begins to fade at three quarters of that [-]."""
 
-SMALL = 2.25
+_SMALL = 2.25
 """Lamps that cover fewer pixels than this are completed [px²]."""
 
-FAINTEST = 1e-5
+_FAINTEST = 1e-5
 """What is fainter than this share of the image's mean is not drawn: a hundredth of what 8 bits and noise can show."""
 
 _SOFT_CELLS = 1.4
@@ -189,13 +189,13 @@ class Halos:
             return
         rows, columns = distance.shape
         image = luminance.reshape(rows, 3 * columns)
-        faintest = FAINTEST * mean_luminance(image, 16)
+        faintest = _FAINTEST * mean_luminance(image, 16)
         if np.any(lamps[:, DEPTH] > 0):
             light = self._lobes.light(lamps, chosen, np.array(pose.position, dtype=np.float64), sources)
             above = np.ascontiguousarray(camera_axes(camera, pose)[:, 2])
             self._add_glow(image, distance, camera, above, lamps, light, faintest)
         drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
-        add_direct_light(lamps, camera.focal_length, SMALL, faintest, drawn, image)
+        add_direct_light(lamps, camera.focal_length, _SMALL, faintest, drawn, image)
 
     def _add_glow(
         self,
@@ -272,7 +272,7 @@ def _lamps_in_view(
 
 
 def _plan(camera: Camera, droplets: Droplets) -> _Plan:
-    cells = min(max(round(camera.width / COARSE_PIXELS), 40), 80) // 2
+    cells = min(max(round(camera.width / _COARSE_PIXELS), 40), 80) // 2
     rows = max(1, math.ceil(cells * camera.height / camera.width))
     angle = camera.width / (2 * cells) / camera.focal_length
     wide, middle = np.empty((_DEPTHS, WIDE_SIZE), np.float32), np.empty((_DEPTHS, CORE_SIZE), np.float32)

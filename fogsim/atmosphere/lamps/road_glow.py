@@ -18,10 +18,10 @@ ROAD_ALBEDO = 0.1
 EDGES = (2.0, 5.0, 9.0, 16.0, 30.0, 60.0)
 """Distances ahead of the lamps between which the lit road counts as one source [m]."""
 
-MOST = 2
+_MOST = 2
 """Other vehicles' pairs of lamps, the nearest ones, whose lit road glows in the fog."""
 
-LIT_AREA = 60.0
+_LIT_AREA = 60.0
 """Area of the road before other vehicles from which most of its light comes [m²]."""
 
 _UNIT = 1000.0
@@ -29,7 +29,7 @@ _STEPS, _ASIDE = 8, 41
 _WIDEST = math.radians(50.0)
 _ELEVATIONS = np.radians([0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 90.0])
 
-LAMBERTIAN = Beam(
+_LAMBERTIAN = Beam(
     np.array([-math.pi, math.pi]), _ELEVATIONS, _UNIT * np.repeat(np.sin(_ELEVATIONS)[:, None], 2, axis=1)
 )
 """How a lit piece of road shines that gives 1000 cd straight up."""
@@ -70,7 +70,7 @@ class RoadGlow:
             colour=np.ones((count, 3)),
             area=4.0 * patches.spread[:, 0] * patches.spread[:, 1] * slant,
             lobes=LampLobes(
-                (LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, np.tile((1.0, 0.0, 0.0), (count, 1))
+                (_LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, np.tile((1.0, 0.0, 0.0), (count, 1))
             ),
         )
 
@@ -84,7 +84,7 @@ class RoadGlow:
 def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSources:
     """The lit road before other vehicles as sources of light, one a pair of lamps."""
     eye = np.asarray(pose.position, dtype=np.float64)
-    chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:MOST]
+    chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:_MOST]
     roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
     kept = np.exp(-LOSS_OF_SPREAD_LIGHT * fog.extinction * roads[0].range_)
     flux = np.stack([road.flux for road in roads]) * kept * beams.scale[chosen, None]
@@ -102,8 +102,8 @@ def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSou
         position=position,
         intensity=upward * slant,
         colour=np.ones((count, 3)),
-        area=LIT_AREA * slant,
-        lobes=LampLobes((LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, axes),
+        area=_LIT_AREA * slant,
+        lobes=LampLobes((_LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, axes),
     )
 
 

@@ -13,7 +13,7 @@ from fogsim.core.jit import kernel
 PIECES = 4
 """Pieces of a ray between two of its nodes."""
 
-LAMP_SIZE = 0.08
+_LAMP_SIZE = 0.08
 """Radius of a lamp's face [m]: seen from near, its beam is blurred by as much."""
 
 HIDDEN = 0.4
@@ -101,7 +101,7 @@ def add_scattered_light(
             i = int(place)
             share = place - i
             # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.
-            near = LAMP_SIZE / s
+            near = _LAMP_SIZE / s
             falling = length[n] / (square + HIDDEN * HIDDEN)
             once = (phase[i] + (phase[i + 1] - phase[i]) * share) * _intensity(table, forward, -left, up, near)
             wide = math.sqrt(near * near + spread * spread)

@@ -17,16 +17,16 @@ from fogsim.values.light import RoadBeams
 from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.pinhole import ray_from_pixel
 
-CELL, CELLS = 1.0, 160
+_CELL, CELLS = 1.0, 160
 """Side of the map's cells [m], and how many there are a side."""
 
-LOOKED_AHEAD = 60.0
+_LOOKED_AHEAD = 60.0
 """How far ahead of the camera the middle of the map is [m]."""
 
-REACH, HALF_WIDTH, STEP = 70.0, 20.0, 0.5
+REACH, _HALF_WIDTH, STEP = 70.0, 20.0, 0.5
 """How far ahead and to either side a lamp lights the road, and the step of its pattern [m]."""
 
-WHITEST = 0.95
+_WHITEST = 0.95
 """Reflectance above which a surface must be a lamp [-]."""
 
 _MIDDLE_OF_BEAM = 10.0
@@ -54,17 +54,17 @@ class TrafficLight:
         if self._lit.shape != view.radiance.shape:
             self._lit = np.empty(view.radiance.shape, np.float32)
         rows, columns = view.distance.shape
-        column, row = ((np.array(pose.position[:2]) - ground.origin) / CELL).astype(np.float32)
+        column, row = ((np.array(pose.position[:2]) - ground.origin) / _CELL).astype(np.float32)
         add_street_light(
             np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
             np.ascontiguousarray(view.distance, dtype=np.float32),
             ray_from_pixel(camera, pose).astype(np.float32),
             piece_length(camera.focal_length),
-            EyeOnMap(column, row, np.float32(1.0 / CELL), np.float32(pose.position[2])),
+            EyeOnMap(column, row, np.float32(1.0 / _CELL), np.float32(pose.position[2])),
             ground,
             Reflection(
                 np.full(3, 1.0 / beams.sky_illuminance, dtype=np.float32),
-                np.float32(WHITEST * beams.sky_illuminance / math.pi),
+                np.float32(_WHITEST * beams.sky_illuminance / math.pi),
             ),
             self._lit.reshape(rows, 3 * columns),
         )
@@ -73,8 +73,8 @@ class TrafficLight:
 
 def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
     ahead = np.array((math.cos(pose.heading), math.sin(pose.heading)))
-    origin = np.array(pose.position[:2]) + LOOKED_AHEAD * ahead - 0.5 * (CELLS - 1) * CELL
-    ground = GroundLight(origin, CELL, np.zeros((CELLS, CELLS), np.float32), np.zeros((CELLS, CELLS), np.float32))
+    origin = np.array(pose.position[:2]) + _LOOKED_AHEAD * ahead - 0.5 * (CELLS - 1) * _CELL
+    ground = GroundLight(origin, _CELL, np.zeros((CELLS, CELLS), np.float32), np.zeros((CELLS, CELLS), np.float32))
     dense = _extinction_before(fog, beams)
     for kind, beam in enumerate(beams.kinds):
         for height in np.unique(beams.height[beams.kind == kind]):
@@ -95,8 +95,8 @@ def _extinction_before(fog: FogField, beams: RoadBeams) -> NDArray[np.float64]:
 def _pattern(beam: Beam, height: float) -> NDArray[np.float64]:
     """Horizontal illuminance of the road by one lamp without fog [lx], fading towards the farthest."""
     along = np.arange(0.0, REACH + 0.5 * STEP, STEP)[:, None]
-    across = np.arange(-HALF_WIDTH, HALF_WIDTH + 0.5 * STEP, STEP)
+    across = np.arange(-_HALF_WIDTH, _HALF_WIDTH + 0.5 * STEP, STEP)
     way = np.sqrt(along**2 + across**2 + height**2)
     intensity = luminous_intensity(beam, np.arctan2(across, along), -np.arcsin(height / way))
-    share = np.maximum((along / REACH) ** 2, (across / HALF_WIDTH) ** 2)
+    share = np.maximum((along / REACH) ** 2, (across / _HALF_WIDTH) ** 2)
     return np.asarray(intensity * height / way**3 * np.minimum(1.0, 4.0 * np.maximum(1.0 - share, 0.0)))

@@ -21,7 +21,7 @@ from fogsim.atmosphere.surfaces.streetlight_kernels import (
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 
-CELL = 2.0
+_CELL = 2.0
 """Side of the map's cells [m]."""
 
 REACH = 48.0
@@ -68,13 +68,13 @@ class StreetLight:
             self._lit = np.empty(view.radiance.shape, np.float32)
         rows, columns = view.distance.shape
         eye = np.array(pose.position[:2])
-        column, row = ((eye - ground.middle) / CELL + 0.5 * (_CELLS - 1)).astype(np.float32)
+        column, row = ((eye - ground.middle) / _CELL + 0.5 * (_CELLS - 1)).astype(np.float32)
         add_street_light(
             np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
             np.ascontiguousarray(view.distance, dtype=np.float32),
             ray_from_pixel(camera, pose).astype(np.float32),
             piece_length(camera.focal_length),
-            EyeOnMap(column, row, np.float32(1.0 / CELL), np.float32(pose.position[2])),
+            EyeOnMap(column, row, np.float32(1.0 / _CELL), np.float32(pose.position[2])),
             ground.light,
             Reflection(
                 np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
@@ -91,7 +91,7 @@ class StreetLight:
             middle = known.middle
         else:
             middle, known = eye, None
-        near = lamps.position[np.abs(lamps.position[:, :2] - middle).max(axis=1) < 0.5 * _CELLS * CELL + REACH]
+        near = lamps.position[np.abs(lamps.position[:, :2] - middle).max(axis=1) < 0.5 * _CELLS * _CELL + REACH]
         dense = _extinction_at(fog, near - (0.0, 0.0, 0.5 * lamps.height))
         if known is None or np.any(np.abs(dense - known.extinction) > _CHANGED):
             known = self._map = _map_of(lamps, middle, near, dense)
@@ -109,6 +109,6 @@ def _map_of(
 ) -> _Map:
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
-    light = GroundLight(middle - 0.5 * (_CELLS - 1) * CELL, CELL, illuminance, tops)
+    light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops)
     add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
     return _Map(lamps, middle, dense, light)

@@ -22,7 +22,7 @@ from fogsim.values.pinhole import ray_from_pixel
 LAMPS_ON_ROAD = 150.0
 """Illuminance that the lamps of a tunnel give its road [lx]: 4 cd/m² on asphalt; FogSim's choice."""
 
-SPACING, SIZE, WIDTH = 8.0, 1.2, 0.3
+_SPACING, _SIZE, _WIDTH = 8.0, 1.2, 0.3
 """From one lamp to the next, and length and width of each [m]."""
 
 _UTILANCE = 0.6
@@ -88,8 +88,10 @@ def _space_and_lamps(tunnel: Tunnel, sky_illuminance: float) -> tuple[TunnelSpac
     boxes = tunnel.boxes()
     stations = np.concatenate([[0.0], np.cumsum(boxes[:-1, 6])])
     # What a lamp sends out, to all sides alike, lights its part of the road.
-    flux = LAMPS_ON_ROAD * SPACING * 2.0 * tunnel.half_width / _UTILANCE
-    lamps = Luminaires(LAMPS_ON_ROAD / sky_illuminance, flux / (math.pi * SIZE * WIDTH), SPACING, SIZE, 0.5 * WIDTH)
+    flux = LAMPS_ON_ROAD * _SPACING * 2.0 * tunnel.half_width / _UTILANCE
+    lamps = Luminaires(
+        LAMPS_ON_ROAD / sky_illuminance, flux / (math.pi * _SIZE * _WIDTH), _SPACING, _SIZE, 0.5 * _WIDTH
+    )
     length = float(boxes[:, 6].sum())
     places = np.arange(-BEFORE, length + BEFORE + 2.0 * STEP, STEP)
     daylight = np.array([daylight_share(place, length, boxes[0, 7], boxes[0, 9]) for place in places.tolist()])

@@ -12,7 +12,7 @@ from fogsim.errors import InputError
 from fogsim.values import Beam
 from fogsim.values.luminous_intensity import luminous_intensity
 
-PAPER_DEPTH_AT_VISIBILITY = 3.0
+_PAPER_DEPTH_AT_VISIBILITY = 3.0
 """k · V_met as gallen2014 rounds ln 20 [-]."""
 
 
@@ -100,7 +100,7 @@ def target_visibility_level(
     """
     at_target = _pair_intensity(beam, distance, 0.5 * pavement.target_size, observer)
     at_foot = _pair_intensity(beam, distance, 0.0, observer)
-    both_ways = np.exp(-2.0 * PAPER_DEPTH_AT_VISIBILITY / visibility * distance) / distance**2
+    both_ways = np.exp(-2.0 * _PAPER_DEPTH_AT_VISIBILITY / visibility * distance) / distance**2
     added = veil + glare
     return visibility_level(
         pavement.target_reflectance / math.pi * at_target * both_ways + added,

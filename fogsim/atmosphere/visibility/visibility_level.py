@@ -20,7 +20,7 @@ from fogsim.values.eye import LEAST_LUMINANCE, flux_root, luminance_root
 ALMOST_CERTAIN = 2.6
 """Threshold factor k for detection with 99.9 % probability [-]; 1 stands for 50 %."""
 
-LEAST_FOR_POLARITY = 0.004
+_LEAST_FOR_POLARITY = 0.004
 """Luminance below which no contrast polarity factor is known [cd/m²]; it is read at this value."""
 
 
@@ -98,12 +98,12 @@ def polarity_factor(luminance: ArrayLike, minutes: ArrayLike) -> NDArray[np.floa
 
     Takes `luminance` [cd/m²], `minutes` [minutes of arc].
     """
-    log = np.log10(np.maximum(luminance, LEAST_FOR_POLARITY))
+    log = np.log10(np.maximum(luminance, _LEAST_FOR_POLARITY))
     curvature = np.where(log >= -1.0, 0.125, 0.075)
     m = 10.0 ** -(10.0 ** -(curvature * (log + 1.0) ** 2 + 0.0245))
     beta = 0.6 * 10.0 ** (-0.1488 * log)
     size = np.asarray(minutes, dtype=np.float64)
-    positive = ALMOST_CERTAIN * _threshold_root(np.maximum(luminance, LEAST_FOR_POLARITY), size) ** 2
+    positive = ALMOST_CERTAIN * _threshold_root(np.maximum(luminance, _LEAST_FOR_POLARITY), size) ** 2
     return np.asarray(np.clip(1.0 - m * size**-beta / (2.4 * positive), 0.0, 1.0))
 
 

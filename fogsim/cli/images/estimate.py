@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fogsim.offline.clip_summary import Clip
     from fogsim.values import Camera
 
-PLOTS = (".png", ".svg", ".pdf")
+_PLOTS = (".png", ".svg", ".pdf")
 
 
 def estimate_command(
@@ -257,8 +257,8 @@ def _check_plot(outputs: _Outputs, source: "Source") -> None:
         return
     if not source.temporal:
         raise InputError("--plot draws over time, and stills have none: --sequence says that images follow one another")
-    if outputs.plot.suffix.lower() not in PLOTS:
-        raise InputError(f"--plot must end in {', '.join(PLOTS[:-1])} or {PLOTS[-1]}, got {outputs.plot}")
+    if outputs.plot.suffix.lower() not in _PLOTS:
+        raise InputError(f"--plot must end in {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}, got {outputs.plot}")
     refuse_unwritable(outputs.plot, "--plot", overwrite=outputs.overwrite, read=source.paths)
 
 

@@ -53,7 +53,7 @@ _index = arrayobj.basic_indexing
 _make_array = arrayobj.make_array
 
 
-def resolve_call(function: Any, context: Any, arguments: Any, keywords: Any) -> Any:
+def _resolve_call(function: Any, context: Any, arguments: Any, keywords: Any) -> Any:
     """Signature of a built-in function for types of arguments: looked for once, as its templates stay the same."""
     options = ConfigStack()
     known = vars(function).setdefault("_fogsim_signatures", {})
@@ -89,7 +89,7 @@ def hash_options(options: Any) -> int:
     return _hashes[kind]
 
 
-def reference_counts(runtime: Any, builder: Any, kind: Any, value: Any) -> list[tuple[Any, Any]]:
+def _reference_counts(runtime: Any, builder: Any, kind: Any, value: Any) -> list[tuple[Any, Any]]:
     """Types and counters of references in a value: only those of its parts are taken out that have any.
 
     numba takes out every number of every array of a named tuple, a fifth of all instructions, for LLVM to remove.
@@ -102,7 +102,7 @@ def reference_counts(runtime: Any, builder: Any, kind: Any, value: Any) -> list[
     for part, taken_from in model.traverse(builder):
         # Asked here too: what is not asked for is not taken out.
         if _counts_references(models, part):
-            found.extend(reference_counts(runtime, builder, part, taken_from(value)))
+            found.extend(_reference_counts(runtime, builder, part, taken_from(value)))
     return found
 
 
@@ -145,7 +145,7 @@ def variables_in(_: Any, value: Any) -> list[Any]:
     return found
 
 
-def index_element(
+def _index_element(
     context: Any, builder: Any, kind: Any, array: Any, index_types: Any, indices: Any, boundscheck: Any = None
 ) -> Any:
     """Where an element of an array is: its shape is read once for all indices, its strides where they are needed."""
@@ -180,15 +180,15 @@ def make_array(kind: Any) -> Any:
 
 SHORTCUTS = (
     UnobservedLock(),
-    Shortcut(BaseFunction, "get_call_type", resolve_call),
+    Shortcut(BaseFunction, "get_call_type", _resolve_call),
     Shortcut(TargetConfig, "__eq__", compare_options),
     Shortcut(TargetConfig, "__hash__", hash_options),
-    Shortcut(NRTContext, "get_meminfos", reference_counts),
+    Shortcut(NRTContext, "get_meminfos", _reference_counts),
     Shortcut(base.BaseContext, "get_abi_sizeof", size_of),
     Shortcut(base, "_has_loc", functools.lru_cache(4096)(base._has_loc)),
     Shortcut(cpu.CPUContext, "create_cfunc_wrapper", make_no_wrapper),
     Shortcut(ir.Inst, "_rec_list_vars", variables_in),
-    Shortcut(arrayobj, "basic_indexing", index_element),
+    Shortcut(arrayobj, "basic_indexing", _index_element),
     Shortcut(arrayobj, "make_array", make_array),
 )
 """All of them; each has `take`."""

@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from fogsim.errors import InputError
 
-PARTIAL_SUFFIX = ".part"
+_PARTIAL_SUFFIX = ".part"
 """Suffix of a file's name until it is complete."""
 
 _LEAST_RESERVE = 2**18
@@ -39,7 +39,7 @@ def final_path(path: Path) -> Path:
 def partial_path(path: Path) -> Path:
     """Temporary path of an incomplete file: its name, or that of its link's target, with ``.part`` appended."""
     final = final_path(path)
-    return final.with_name(final.name + PARTIAL_SUFFIX)
+    return final.with_name(final.name + _PARTIAL_SUFFIX)
 
 
 def publish(path: Path) -> None:

@@ -8,7 +8,7 @@ from fogsim.errors import InputError, shown, suggest
 MAPS = "FOGSIM_MAPS"
 """Environment variable with the user's folder of maps."""
 
-OPENDRIVE, SUMO = ".xodr", ".net.xml"
+_OPENDRIVE, SUMO = ".xodr", ".net.xml"
 """How names of maps end."""
 
 
@@ -17,23 +17,23 @@ def find_map(written: str, folder: Path) -> Path:
 
     It is `written` relative to a folder, or its name with one of the endings in the user's folder of maps.
     """
-    if is_map(folder / written):
+    if _is_map(folder / written):
         return folder / written
     name = Path(written.replace("\\", "/")).name
-    for ending in (OPENDRIVE, SUMO):
+    for ending in (_OPENDRIVE, SUMO):
         name = name.removesuffix(ending)
     maps = os.environ.get(MAPS, "")
     if not maps:
-        expected = f"expected an OpenDRIVE file ({OPENDRIVE}) that is there"
+        expected = f"expected an OpenDRIVE file ({_OPENDRIVE}) that is there"
         raise InputError(f"{expected}, or a map in a folder that --maps names; got {shown(written)}")
-    for ending in (OPENDRIVE, SUMO):
-        if name and is_map(Path(maps) / f"{name}{ending}"):
+    for ending in (_OPENDRIVE, SUMO):
+        if name and _is_map(Path(maps) / f"{name}{ending}"):
             return Path(maps) / f"{name}{ending}"
-    there = sorted(one.name for one in Path(maps).glob("*") if is_map(one))
-    what = suggest(f"{name}{OPENDRIVE}", there) if there else f"it contains no {OPENDRIVE} or {SUMO} file"
+    there = sorted(one.name for one in Path(maps).glob("*") if _is_map(one))
+    what = suggest(f"{name}{_OPENDRIVE}", there) if there else f"it contains no {_OPENDRIVE} or {SUMO} file"
     raise InputError(f"there is no map {shown(name)} in {maps}; {what}")
 
 
-def is_map(path: Path) -> bool:
+def _is_map(path: Path) -> bool:
     """Whether a file is there and is a map, by its name."""
-    return path.name.lower().endswith((OPENDRIVE, SUMO)) and path.is_file()
+    return path.name.lower().endswith((_OPENDRIVE, SUMO)) and path.is_file()

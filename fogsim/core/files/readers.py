@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from fogsim.errors import InputError, shown
 
-MOST_BYTES = 64 * 2**20
+_MOST_BYTES = 64 * 2**20
 """Default limit of files that are read whole [bytes]."""
 
 FARTHEST = 1e8
@@ -32,7 +32,7 @@ def open_regular(path: Path) -> BufferedReader:
     raise InputError(f"{path}: cannot be read: not a regular file")
 
 
-def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, most: int = _MOST_BYTES) -> bytes:
     """Content of a regular file of at most `most` bytes."""
     try:
         with open_regular(path) as file:
@@ -48,7 +48,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     return content
 
 
-def read_text(path: Path, most: int = MOST_BYTES) -> str:
+def read_text(path: Path, most: int = _MOST_BYTES) -> str:
     """Text of a regular file in UTF-8, with or without a byte order mark; errors name the line and the byte."""
     content = read_bytes(path, most)
     try:
@@ -60,7 +60,7 @@ def read_text(path: Path, most: int = MOST_BYTES) -> str:
         ) from error
 
 
-def read_json(path: Path, most: int = MOST_BYTES) -> Any:
+def read_json(path: Path, most: int = _MOST_BYTES) -> Any:
     """Value of a JSON file; NaN, Infinity and deep nesting raise InputError."""
     text = read_text(path, most)
     try:

@@ -17,13 +17,13 @@ from xml.parsers import expat
 from fogsim.core.files.readers import open_regular
 from fogsim.errors import InputError, shown
 
-MOST_BYTES = 2**28
+_MOST_BYTES = 2**28
 """Largest file that is kept as a tree, unpacked [bytes]."""
 
 MOST_ELEMENTS = 2_000_000
 """Most elements of a file that is kept as a tree; they take half a gigabyte."""
 
-DEEPEST, MOST_ATTRIBUTES = 100, 1000
+_DEEPEST, _MOST_ATTRIBUTES = 100, 1000
 """Maximum depth of elements, and of attributes per element."""
 
 LONGEST_TAG = 2**23
@@ -119,7 +119,7 @@ class XmlFile:
     def read_all(
         self,
         reader: ElementReader,
-        most_bytes: int = MOST_BYTES,
+        most_bytes: int = _MOST_BYTES,
         most_elements: int = MOST_ELEMENTS,
         text: Callable[[str], object] | None = None,
     ) -> None:
@@ -134,12 +134,12 @@ class XmlFile:
             nonlocal depth, elements
             depth += 1
             elements += 1
-            if depth > DEEPEST:
-                raise self._refusal(f"more than {DEEPEST} elements inside one another")
+            if depth > _DEEPEST:
+                raise self._refusal(f"more than {_DEEPEST} elements inside one another")
             if elements == most_elements:
                 raise self._refusal(f"{most_elements} elements or more")
-            if len(attributes) > MOST_ATTRIBUTES:
-                raise self._refusal(f"an element has more than {MOST_ATTRIBUTES} attributes")
+            if len(attributes) > _MOST_ATTRIBUTES:
+                raise self._refusal(f"an element has more than {_MOST_ATTRIBUTES} attributes")
             try:
                 reader.start(tag, attributes)
             except InputError:
@@ -183,7 +183,7 @@ def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
     return XmlFile(path).read(reader, most_bytes)
 
 
-def read_tree(path: Path, *roots: str, most_bytes: int = MOST_BYTES) -> ET.Element:
+def read_tree(path: Path, *roots: str, most_bytes: int = _MOST_BYTES) -> ET.Element:
     """Root of a file, which must be one of `roots` if any are given; tags lose their prefixes."""
     builder, file = _TreeBuilder(path, roots), XmlFile(path)
     file.read_all(builder, most_bytes, text=builder.tree.data)

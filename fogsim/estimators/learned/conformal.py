@@ -9,7 +9,7 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
 from fogsim.values.estimate import NORMAL_90_PERCENT
 
-HELD = 0.9
+_HELD = 0.9
 """Share of intervals that hold the truth [-]."""
 
 
@@ -44,7 +44,7 @@ def conformal_factor(
             f"{log_extinction.shape}, {deviation.shape} and {truth.shape}"
         )
     count = len(truth)
-    rank = math.ceil(HELD * (count + 1))
+    rank = math.ceil(_HELD * (count + 1))
     if rank > count:
         raise InputError(f"conformal_factor: expected at least 9 frames, got {count}")
     if not ((deviation > 0.0).all() and np.isfinite([log_extinction, deviation, truth]).all()):

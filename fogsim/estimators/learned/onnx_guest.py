@@ -16,7 +16,7 @@ from fogsim.values.observation import Observation
 FARTHEST = 20.0
 """Largest |ln k| that is an answer: k from 2e-9 to 5e8 per metre."""
 
-WIDEST = 10.0
+_WIDEST = 10.0
 """Largest deviation of ln k that is an answer [-]."""
 
 
@@ -80,7 +80,7 @@ class OnnxGuest:
         """
         image = self._check.image_of(observation)
         log_extinction, deviation = self._model.read(image, self._full, self.method, self._time_limit)
-        if not (abs(log_extinction) <= FARTHEST and 0.0 < deviation <= WIDEST):
+        if not (abs(log_extinction) <= FARTHEST and 0.0 < deviation <= _WIDEST):
             return Estimate.invalid(self.method, f"the network gives ln k = {log_extinction:g} ± {deviation:g}")
         extinction = math.exp(log_extinction)
         spread = extinction * math.expm1(NORMAL_90_PERCENT * deviation) / NORMAL_90_PERCENT

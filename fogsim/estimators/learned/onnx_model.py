@@ -17,23 +17,23 @@ from fogsim.core.registry.guard import guarded_call
 from fogsim.core.registry.user_code import described
 from fogsim.errors import InputError, MethodError, MissingDependencyError, shown
 
-CONFORMAL = "fogsim.conformal"
+_CONFORMAL = "fogsim.conformal"
 """Key of a model's metadata: factor for its deviations with which 90 % intervals hold (`conformal_factor`)."""
 
-STANDARD = ("", "ai.onnx", "ai.onnx.ml")
+_STANDARD = ("", "ai.onnx", "ai.onnx.ml")
 """Domains of ONNX's own operators; those of others may read files (``com.microsoft.EPContext``) or run anything."""
 
-MOST_PIXELS = 2**22
+_MOST_PIXELS = 2**22
 """Largest input of a model [px]."""
 
-MOST_MEMORY = 2**30
+_MOST_MEMORY = 2**30
 """Memory for the tensors of all models of a process [bytes]; a small file can ask for any amount."""
 
 LONGEST_TRIAL = 10.0
 """Time in which a model must answer when it is loaded [s]."""
 
-INPUT = f"one input, float32 of shape (1, 3, H, W) or (1, H, W, 3) with fixed H and W and at most {MOST_PIXELS} px"
-OUTPUT = "one output, float32 of shape (1, 2): ln k, with k in 1/m, and its standard deviation"
+_INPUT = f"one input, float32 of shape (1, 3, H, W) or (1, H, W, 3) with fixed H and W and at most {_MOST_PIXELS} px"
+_OUTPUT = "one output, float32 of shape (1, 2): ln k, with k in 1/m, and its standard deviation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class OnnxModel:
         # A partial, since the line of a function of FogSim's says nothing about a model's failure.
         (found,) = guarded_call(functools.partial(self.outputs), who, None, time_limit)(pixels)
         if found.size != 2:
-            raise MethodError(f"{who}: expected {OUTPUT}; got shape {found.shape}")
+            raise MethodError(f"{who}: expected {_OUTPUT}; got shape {found.shape}")
         log_extinction, deviation = found.ravel().tolist()
         return log_extinction, deviation * self.factor
 
@@ -102,9 +102,9 @@ def _libraries() -> tuple[Any, Any]:
 
 def _factor(path: Path, model: Any) -> float:
     metadata = {one.key: one.value for one in model.metadata_props}
-    if CONFORMAL not in metadata:
+    if _CONFORMAL not in metadata:
         return 1.0
-    return number_in_text(f"{path}: metadata", CONFORMAL, metadata[CONFORMAL], 1e-3, 1e3)
+    return number_in_text(f"{path}: metadata", _CONFORMAL, metadata[_CONFORMAL], 1e-3, 1e3)
 
 
 def _refuse_reach(path: Path, onnx: Any, model: Any) -> None:
@@ -117,7 +117,7 @@ def _refuse_reach(path: Path, onnx: Any, model: Any) -> None:
                 f"{path}: expected all weights in the file, got tensor {shown(part.name)} with external data in "
                 f"{shown(where)}; export it with external_data=False"
             )
-        if kind == "NodeProto" and part.domain not in STANDARD:
+        if kind == "NodeProto" and part.domain not in _STANDARD:
             raise InputError(
                 f"{path}: expected ONNX's own operators, got {shown(part.op_type)} of the domain {shown(part.domain)}"
             )
@@ -154,7 +154,7 @@ def _session(runtime: Any, content: bytes) -> Any:
 def _limit_memory() -> None:
     runtime = _libraries()[1]
     place = runtime.OrtMemoryInfo("Cpu", runtime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, runtime.OrtMemType.DEFAULT)
-    runtime.create_and_register_allocator(place, runtime.OrtArenaCfg({"max_mem": MOST_MEMORY}))
+    runtime.create_and_register_allocator(place, runtime.OrtArenaCfg({"max_mem": _MOST_MEMORY}))
 
 
 def _input(path: Path, session: Any) -> tuple[tuple[int, int], bool]:
@@ -165,10 +165,10 @@ def _input(path: Path, session: Any) -> tuple[tuple[int, int], bool]:
         channels_first = rest[0] == 3
         size = tuple(rest[1:] if channels_first else rest[:2])
         fits = all(isinstance(one, int) and one > 0 for one in size) and (batch == 1 or not isinstance(batch, int))
-        if fits and 3 in (rest[0], rest[2]) and math.prod(size) <= MOST_PIXELS:
+        if fits and 3 in (rest[0], rest[2]) and math.prod(size) <= _MOST_PIXELS:
             return size, channels_first
     given = ", ".join(f"{shown(one.name)}: {one.type} {one.shape}" for one in inputs) or "none"
-    raise InputError(f"{path}: expected {INPUT}; got {given}")
+    raise InputError(f"{path}: expected {_INPUT}; got {given}")
 
 
 def _check_outputs(model: OnnxModel, options: Any) -> None:
@@ -188,4 +188,4 @@ def _check_outputs(model: OnnxModel, options: Any) -> None:
         return
     else:
         given = f"{found[0].dtype} of shape {found[0].shape}"
-    raise InputError(f"{model.path}: expected {OUTPUT}; got {given}")
+    raise InputError(f"{model.path}: expected {_OUTPUT}; got {given}")

@@ -10,10 +10,10 @@ from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 
-CELLS_ACROSS = 80
+_CELLS_ACROSS = 80
 """About how many cells there are in a row."""
 
-DARK_SHARE = 0.06
+_DARK_SHARE = 0.06
 """Share of a cell's pixels that read no light from which on the mean of the rest's noise is not 0 [-]."""
 
 
@@ -28,7 +28,7 @@ class CellMeans(NamedTuple):
 
 def cell_size(camera: Camera) -> int:
     """Side of a cell [px]."""
-    return max(min(round(camera.width / CELLS_ACROSS), camera.height), 1)
+    return max(min(round(camera.width / _CELLS_ACROSS), camera.height), 1)
 
 
 def camera_of_cells(camera: Camera) -> Camera:
@@ -76,4 +76,4 @@ def _add_cells(
             luminance[i, j] += share * total
     for i in range(rows):
         for j in range(cols):
-            clipped[i, j] |= dark[i, j] > DARK_SHARE
+            clipped[i, j] |= dark[i, j] > _DARK_SHARE

@@ -29,10 +29,10 @@ from fogsim.vision.lines.horizon import levelled
 DENSE, LIGHT = 100.0, 300.0
 """Visibilities between the paper's classes of fog [m] (table I)."""
 
-SURELY_SEEN, HARDLY_SEEN = 200.0, 1000.0
+_SURELY_SEEN, _HARDLY_SEEN = 200.0, 1000.0
 """Visibilities of the thinnest fog that halos surely show, and of what they may take for fog at most [m]."""
 
-SOFTNESS = 0.3
+_SOFTNESS = 0.3
 """Standard deviation of these, in ln k [-]."""
 
 
@@ -186,12 +186,12 @@ class Gallen2014:
         if reading.is_fog:
             why, bounds = (
                 "halos show fog, but not how much",
-                ExtinctionBounds(least=extinction_from_visibility(HARDLY_SEEN), softness=SOFTNESS),
+                ExtinctionBounds(least=extinction_from_visibility(_HARDLY_SEEN), softness=_SOFTNESS),
             )
         else:
             why, bounds = (
                 "lamps have no halo: there is no dense fog",
-                ExtinctionBounds(most=extinction_from_visibility(SURELY_SEEN), softness=SOFTNESS),
+                ExtinctionBounds(most=extinction_from_visibility(_SURELY_SEEN), softness=_SOFTNESS),
             )
         return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
 

@@ -23,25 +23,25 @@ from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import levelled
 
-PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
+_PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
 """Visibilities of the simulated references (figure 12) next to that of a clear night [m]."""
 
 BANDS = ((50.0, 10.0), (100.0, 20.0), (200.0, 40.0), (np.inf, 100.0))
 """Published accuracy: up to a visibility, so much [m] (section IV-C)."""
 
-LIGHT_FOG = 300.0
+_LIGHT_FOG = 300.0
 """Visibility from which fog is light, and is not to be detected [m] (table I)."""
 
-MOST_CLIPPED = 0.3
+_MOST_CLIPPED = 0.3
 """Share of the cells that may be clipped."""
 
 LEAST_ROWS = 4
 """Rows that must be seen above and below the horizon."""
 
-LEAST_BRIGHT = 8.0
+_LEAST_BRIGHT = 8.0
 """Pixel value that something must have."""
 
-NORMAL_95_PERCENT = 1.645
+_NORMAL_95_PERCENT = 1.645
 
 
 @checked_parameters
@@ -143,7 +143,7 @@ class Gallen2014Veil:
         if self._templates is None or self._templates[0] != lit:
             self._earlier.clear()
             made = self._source.veil_references(without_noise(self._camera), lit, setback_of(observation))
-            self._templates = lit, VeilTemplates(replace(made, camera=self._camera), PUBLISHED)
+            self._templates = lit, VeilTemplates(replace(made, camera=self._camera), _PUBLISHED)
         self._earlier.append(means)
         return self._estimate(self._templates[1].scores(self._composed()))
 
@@ -151,9 +151,9 @@ class Gallen2014Veil:
         row = self._camera.horizon_row
         if not LEAST_ROWS <= row <= self._camera.height - 1 - LEAST_ROWS:
             return f"the horizon (row {row:.1f}) is outside the image, or at its border"
-        if float(means.luminance.max()) < LEAST_BRIGHT:
+        if float(means.luminance.max()) < _LEAST_BRIGHT:
             return "too dark: the head lamps light nothing"
-        if float((means.luminance > 250.0).mean()) > MOST_CLIPPED:
+        if float((means.luminance > 250.0).mean()) > _MOST_CLIPPED:
             return "the picture is saturated"
         if lit_by_lamps(levelled(image, self._camera), self._camera):
             return ""
@@ -169,11 +169,11 @@ class Gallen2014Veil:
         found: dict[str, object] = {"score": best, "scores": tuple(scores.score.tolist())}
         found["detected"] = best >= self._threshold and not scores.clear >= best
         if not found["detected"]:
-            least = extinction_from_visibility(LIGHT_FOG)
-            return Estimate(self.method, 0.0, least / NORMAL_95_PERCENT, diagnostics=found)
+            least = extinction_from_visibility(_LIGHT_FOG)
+            return Estimate(self.method, 0.0, least / _NORMAL_95_PERCENT, diagnostics=found)
         visibility = visibility_by_parabola(scores)
         if visibility is None:
             return Estimate.invalid(self.method, "the scores have no top between the references", **found)
         extinction = extinction_from_visibility(visibility)
-        accuracy = next(error for most, error in BANDS if visibility < most) / visibility / NORMAL_95_PERCENT
+        accuracy = next(error for most, error in BANDS if visibility < most) / visibility / _NORMAL_95_PERCENT
         return Estimate(self.method, extinction, extinction * accuracy, diagnostics=found)

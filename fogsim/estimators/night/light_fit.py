@@ -12,27 +12,27 @@ Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
 Terms = NDArray[np.int64]
 
-RATIOS = np.linspace(-1.8, 1.8, 7)
+_RATIOS = np.linspace(-1.8, 1.8, 7)
 """ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
 
-RATIO_DEVIATION = 0.7
+_RATIO_DEVIATION = 0.7
 """Standard deviation of that [-]."""
 
-SOFTNESS = 0.25
+_SOFTNESS = 0.25
 """Mean square of the deviations below which a fit is not better [-]."""
 
-SOFT, HARD = 2.5, 3.5
+_SOFT, _HARD = 2.5, 3.5
 """Deviations from which on a cell that is too bright or too dark counts less: others' lamps, things on the road [-]."""
 
-LAMPS, PEDESTAL, AIRLIGHT, DAY_ROAD, SLOPE, OTHERS = range(6)
+_LAMPS, _PEDESTAL, _AIRLIGHT, _DAY_ROAD, _SLOPE, _OTHERS = range(6)
 """Terms: lamplight, pedestal, airlight, the road by day, how the sky brightens upward, glow of others' lamps."""
 
-AIRLIGHT_MEAN, AIRLIGHT_DEVIATION = 0.7, 0.5
-DAY_ROAD_MEAN, DAY_ROAD_DEVIATION = 0.15, 0.12
-SLOPE_DEVIATION = 0.3
+_AIRLIGHT_MEAN, _AIRLIGHT_DEVIATION = 0.7, 0.5
+_DAY_ROAD_MEAN, _DAY_ROAD_DEVIATION = 0.15, 0.12
+_SLOPE_DEVIATION = 0.3
 """What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
 
-GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
+_GLOW_CLEAR, _GLOW_REACH = 0.05, 100.0
 """Standard deviation of the glow of others' lamps where it begins, over full scale: in clear air, where lenses make it
 [-], and the distance that times the extinction is what fog adds, up to 1 in all [m]."""
 
@@ -82,7 +82,7 @@ def log_likelihoods(
     power = (precision * seen * seen).sum()
     is_day = measured.sky_scale > 0.0 or measured.lamp_scale > 0.0
     terms = _terms(is_day, len(others) > 0)
-    even, gram, side = np.ones((4, cells)), np.zeros((OTHERS + 2, OTHERS + 2)), np.zeros(OTHERS + 2)
+    even, gram, side = np.ones((4, cells)), np.zeros((_OTHERS + 2, _OTHERS + 2)), np.zeros(_OTHERS + 2)
     matrix, right, used = np.zeros((len(terms), len(terms))), np.zeros(len(terms)), np.zeros(len(terms))
     known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
     highest = -np.inf
@@ -98,17 +98,17 @@ def log_likelihoods(
                 _sums_of_others(glow, veil[draw, place], road[draw, place], even, seen, precision, gram, side)
             if len(terms) > 2:
                 _combine(gram, side, 1.0, terms, matrix, right)
-                known[1, -1] = 1.0 / min(1.0, GLOW_CLEAR + GLOW_REACH * extinction[place]) ** 2
+                known[1, -1] = 1.0 / min(1.0, _GLOW_CLEAR + _GLOW_REACH * extinction[place]) ** 2
                 _set_known(terms, _daylight_scale(matrix, right, terms, measured, used, known, scratch), known)
             likelihood = 0.0
-            for ratio in RATIOS:
+            for ratio in _RATIOS:
                 _combine(gram, side, math.exp(ratio), terms, matrix, right)
                 if len(terms) > 2:
                     rest = power + _of_all_light(matrix, right, terms, known, used, scratch)
                 else:
                     rest = power + _of_lamps_alone(matrix, right, used)
                 square = max(rest, 0.0) / total
-                value = -0.5 * (independent * math.log(SOFTNESS + square) + (ratio / RATIO_DEVIATION) ** 2)
+                value = -0.5 * (independent * math.log(_SOFTNESS + square) + (ratio / _RATIO_DEVIATION) ** 2)
                 likelihood += math.exp(value)
                 if value > highest:
                     highest, best.summary[0] = value, square
@@ -122,10 +122,10 @@ def log_likelihoods(
 @kernel
 def _terms(is_day: bool, has_others: bool) -> Terms:
     """Terms that add up to the light."""
-    terms = np.arange(OTHERS + 1)
+    terms = np.arange(_OTHERS + 1)
     if is_day:
-        return terms if has_others else terms[:OTHERS].copy()
-    terms[2] = OTHERS
+        return terms if has_others else terms[:_OTHERS].copy()
+    terms[2] = _OTHERS
     return terms[:3].copy() if has_others else terms[:2].copy()
 
 
@@ -155,10 +155,10 @@ def _model(
         lit = used[0] * (factor * veil[cell] + road[cell])
         rest = used[1]
         for i in range(2, len(terms)):
-            if terms[i] == OTHERS:
+            if terms[i] == _OTHERS:
                 rest += used[i] * measured.others[draw % len(measured.others), cell]
             else:
-                rest += used[i] * even[terms[i] - PEDESTAL, cell]
+                rest += used[i] * even[terms[i] - _PEDESTAL, cell]
         best.luminance[cell] = lit + rest
         by_lamps += lit
         total += lit + rest
@@ -226,7 +226,7 @@ def _sums_of_others(
     side: Floats,
 ) -> None:
     """Normal equations of the glow of others' lamps."""
-    last = OTHERS + 1
+    last = _OTHERS + 1
     gram[:, last], side[last] = 0.0, 0.0
     for cell in range(len(seen)):
         g = precision[cell] * glow[cell]
@@ -278,12 +278,12 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
 @kernel
 def _set_known(terms: Terms, scale: float, known: Floats) -> None:
     """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
-    for i in range(2, len(terms) - (terms[-1] == OTHERS)):
-        mean, deviation = 0.0, SLOPE_DEVIATION * scale
-        if terms[i] == AIRLIGHT:
-            mean, deviation = AIRLIGHT_MEAN * scale, AIRLIGHT_DEVIATION * scale
-        elif terms[i] == DAY_ROAD:
-            mean, deviation = DAY_ROAD_MEAN * scale, DAY_ROAD_DEVIATION * scale
+    for i in range(2, len(terms) - (terms[-1] == _OTHERS)):
+        mean, deviation = 0.0, _SLOPE_DEVIATION * scale
+        if terms[i] == _AIRLIGHT:
+            mean, deviation = _AIRLIGHT_MEAN * scale, _AIRLIGHT_DEVIATION * scale
+        elif terms[i] == _DAY_ROAD:
+            mean, deviation = _DAY_ROAD_MEAN * scale, _DAY_ROAD_DEVIATION * scale
         known[0, i], known[1, i] = mean, 1.0 / deviation**2
 
 
@@ -302,7 +302,7 @@ def _of_all_light(matrix: Floats, right: Floats, terms: Terms, known: Floats, us
         fixed = False
         # But for the pedestal and the slope no light is negative.
         for i in range(count):
-            if terms[i] not in (PEDESTAL, SLOPE) and used[i] < 0.0 and not fixed:
+            if terms[i] not in (_PEDESTAL, _SLOPE) and used[i] < 0.0 and not fixed:
                 free[i], fixed = False, True
         if not fixed:
             return _form(matrix, right, known, used)
@@ -342,6 +342,6 @@ def robust_weights(seen: Floats, model: Floats, variance: Floats) -> Floats:
     weight = np.ones(len(seen))
     for cell in range(len(seen)):
         above = (seen[cell] - model[cell]) / math.sqrt(variance[cell])
-        limit = SOFT if above > 0.0 else HARD
+        limit = _SOFT if above > 0.0 else _HARD
         weight[cell] = min(1.0, (limit / max(abs(above), 1e-9)) ** 2)
     return weight

@@ -36,77 +36,77 @@ from fogsim.values.observation import Observation
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.pixel_kernels import Pixels
 
-DAYLIGHT, NIGHT = 100.0, 0.003
+DAYLIGHT, _NIGHT = 100.0, 0.003
 """Illuminance of the sky from which methods of the day take over, and below which it lights nothing [lx]."""
 
-LEAST_CELLS, LEAST_ROAD = 40, 6
+_LEAST_CELLS, _LEAST_ROAD = 40, 6
 """Fewer cells, and fewer of the road, show neither veil nor road."""
 
-LEAST_PEAK = 0.02
+_LEAST_PEAK = 0.02
 """Luminance that something must have for there to be head lamps' light, full scale being 1 [-]."""
 
-MOST_CLIPPED = 0.02
+_MOST_CLIPPED = 0.02
 """Share of a cell's pixels that may be clipped [-]."""
 
-ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
+_ROAD_TEXTURE, _SKY_TEXTURE, _LEVEL, _FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-INDEPENDENT = {True: 24.0, False: 6.0}
+_INDEPENDENT = {True: 24.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
-MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
+MOST_MISFIT, _LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
 
-PEDESTAL = 6e-4
+_PEDESTAL = 6e-4
 """Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale [-]."""
 
 LEAST_LAMPLIGHT = 0.5
 """Share of the light that the own lamps must give by night, and where no sensor reports the daylight [-]."""
 
-OUTSHONE = "lamps of others outshine what the own ones light"
+_OUTSHONE = "lamps of others outshine what the own ones light"
 
-ROUNDS, SETTLED = 4, 0.05
+_ROUNDS, _SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
+_CLEAR, _MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
 whether the beam is known."""
 
-GLOW_POWERS, GLOW_FLATNESS = (1.2, 1.4, 1.6, 1.8, 2.0), (1.0, 2.0**0.25, 2.0**0.5)
-GLOW_DISTANCES = (20.0, 36.3, 66.0, 120.0)
+_GLOW_POWERS, _GLOW_FLATNESS = (1.2, 1.4, 1.6, 1.8, 2.0), (1.0, 2.0**0.25, 2.0**0.5)
+_GLOW_DISTANCES = (20.0, 36.3, 66.0, 120.0)
 """Shapes of the glow of others' lamps: power of the angle by which it falls, how much faster it falls upward and
 downward than sideways, for head lamps shine little above the horizon, and distance of the lamps [m]."""
 
-GLOWS_KEPT, GLOW_SAMPLE, SAMPLE = 6, (15, 6), (5, 2)
+_GLOWS_KEPT, _GLOW_SAMPLE, _SAMPLE = 6, (15, 6), (5, 2)
 """How many shapes that are like an image are used; and the steps between the draws and visibilities that find
 these, and the weights of the cells."""
 
-LAMPS_FROM, HALO = 40.0, 0.03
+_LAMPS_FROM, HALO = 40.0, 0.03
 """Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
 chosen by `benchmarks/night_lamps.py --choose`."""
 
-HIGH_LAMPS, STREET_LIGHT = 0.07, 10.0
+_HIGH_LAMPS, _STREET_LIGHT = 0.07, 10.0
 """Slope upward beyond which lamps are those of a street [-], and daylight that is about as much as theirs [lx]."""
 
-MAY_BE_DENSER = 0.25
+_MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
 
-LEAD_HALF_WIDTH, LIT_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 1.2, 4.0, 0.4, 8.0
+_LEAD_HALF_WIDTH, _LIT_HALF_WIDTH, _LEAD_HEIGHT, _LEAD_MARGIN, _CLOSEST_LEAD = 1.5, 1.2, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, and half the width of its rear, below its wheels too, for they and the pitch are
 not known, and how near it leaves too little [m]."""
 
-COMMON, MOST_COMMON = 0.95, 0.5
+COMMON, _MOST_COMMON = 0.95, 0.5
 """Part of the deviation of ln V that is of own lamps, droplets and pavement, the same in all frames of a drive, and the
 most that it is where lamps of others shine, whose glow is another in each frame [-]."""
 
-MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
+_MOSTLY_DAYLIGHT, _BY_DAYLIGHT = 0.5, (4.0, 0.7)
 """Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
 draws is taken, for fog that hides what the lamps light fits with any lamps, which is no evidence for it; and what the
 result is raised to, for pavement and sky by day err in ways of their own: chosen on pool 0 of
 `benchmarks/night_estimators.py` and on rural_night_alone while night falls."""
 
-BOUND_SOFTNESS = 0.1
+_BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
 
 Floats = NDArray[np.float64]
@@ -202,8 +202,8 @@ class NightRoad:
             self._earlier.clear()
             self._lit = lit
         seen, beside, others = self._look(image, observation)
-        hidden = self._hidden(observation, self._below, self._aside, LEAD_HALF_WIDTH)
-        used = (seen.clipped < MOST_CLIPPED) & ~hidden & ~beside
+        hidden = self._hidden(observation, self._below, self._aside, _LEAD_HALF_WIDTH)
+        used = (seen.clipped < _MOST_CLIPPED) & ~hidden & ~beside
         if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
@@ -234,60 +234,60 @@ class NightRoad:
         if observation.lead is None:
             return np.zeros(len(below), np.bool_)
         height, depth = self._camera.mount_height, observation.lead.distance + observation.camera_setback
-        upright = (below * depth < height + LEAD_MARGIN) & (below * depth > height - LEAD_HEIGHT)
+        upright = (below * depth < height + _LEAD_MARGIN) & (below * depth > height - _LEAD_HEIGHT)
         return np.asarray(upright & (np.abs(aside) * depth < half_width))
 
     def _lamps_of_others(self, green: NDArray[Any], observation: Observation) -> tuple[NDArray[np.bool_], Floats, bool]:
         """Cells near lamps of others, which are clipped, shapes that their glow may have, and whether some are high."""
         camera = self._camera
-        end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
+        end = max(min(round(camera.horizon_row + camera.row_distance / _LAMPS_FROM), camera.height), 0)
         v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
         # Squares of some pixels are fine enough.
         step = max(camera.width // 80, 1)
         square, count = np.unique((v // step) * 4096 + u // step, return_counts=True)
         below = (step * (square // 4096 + 0.5) - camera.horizon_row) / camera.focal_length
         aside = (camera.principal_point[0] - step * (square % 4096 + 0.5)) / camera.focal_length
-        high = bool((below < -HIGH_LAMPS).any())
+        high = bool((below < -_HIGH_LAMPS).any())
         near = (np.hypot(self._below[:, None] - below, self._aside[:, None] - aside) < HALO).any(axis=1)
         # What the own lamps light of the vehicle ahead is clipped, but does not glow.
-        others = ~self._hidden(observation, below, aside, LIT_HALF_WIDTH)
+        others = ~self._hidden(observation, below, aside, _LIT_HALF_WIDTH)
         below, aside, count = below[others], aside[others], count[others]
         below, aside = self._below[:, None] - below, self._aside[:, None] - aside
         edge = np.sqrt(count / math.pi) / camera.focal_length
-        before = np.minimum(1.0, self._depth / np.array(GLOW_DISTANCES)[:, None])
+        before = np.minimum(1.0, self._depth / np.array(_GLOW_DISTANCES)[:, None])
         glow = []
-        for flatness in GLOW_FLATNESS:
+        for flatness in _GLOW_FLATNESS:
             fall = np.log(edge / np.maximum(np.hypot(flatness * below, aside), edge))
-            glow += [before * np.exp(power * fall).sum(axis=1) for power in GLOW_POWERS]
+            glow += [before * np.exp(power * fall).sum(axis=1) for power in _GLOW_POWERS]
         return near, np.concatenate(glow), high
 
     def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
         # The light of a street's lamps is alike that of the day, but no sensor reports it.
-        reported = light >= STREET_LIGHT if self._in_street else not math.isnan(light)
-        lamp_scale = light / math.pi if reported and light > NIGHT else 0.0
+        reported = light >= _STREET_LIGHT if self._in_street else not math.isnan(light)
+        lamp_scale = light / math.pi if reported and light > _NIGHT else 0.0
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
         sky_scale = 0.0 if reported else sky
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
-        scales = sky_scale, lamp_scale, PEDESTAL, INDEPENDENT[self._lamps != "unknown"] * seen_road
+        scales = sky_scale, lamp_scale, _PEDESTAL, _INDEPENDENT[self._lamps != "unknown"] * seen_road
         return Measured(luminance, self._up[used], others, *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
         is_sky, seen = self._cells.is_sky[used], measured.seen
-        variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
+        variance = (np.where(is_sky, _SKY_TEXTURE, _ROAD_TEXTURE) * seen) ** 2 + _FLOOR**2 + (_LEVEL * seen.mean()) ** 2
         weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
-        sample = _sample(own, extinction, *SAMPLE)
-        if len(measured.others) > GLOWS_KEPT:
-            measured = _with_likely_glows(measured, _sample(own, extinction, *GLOW_SAMPLE), variance)
-        for _ in range(ROUNDS):
+        sample = _sample(own, extinction, *_SAMPLE)
+        if len(measured.others) > _GLOWS_KEPT:
+            measured = _with_likely_glows(measured, _sample(own, extinction, *_GLOW_SAMPLE), variance)
+        for _ in range(_ROUNDS):
             log_likelihoods(measured, *sample, variance, weight, best)
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
-            if np.abs(weight - earlier).max() < SETTLED:
+            if np.abs(weight - earlier).max() < _SETTLED:
                 break
         found = log_likelihoods(measured, extinction, own.veil, own.road, own.depth, variance, weight, best)
         misfit, lamplight = best.summary.tolist()
-        power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
+        power, doubt = _BY_DAYLIGHT if lamplight < _MOSTLY_DAYLIGHT else (1.0, 1.0)
         likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
@@ -296,24 +296,24 @@ class NightRoad:
         if misfit > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **diagnostics)
         if measured.lamp_scale == 0.0 and lamplight < LEAST_LAMPLIGHT:
-            others = "light of the day, or of lamps all around" if measured.sky_scale > 0.0 else OUTSHONE
+            others = "light of the day, or of lamps all around" if measured.sky_scale > 0.0 else _OUTSHONE
             return Estimate.invalid(self.method, others, **diagnostics)
-        if weight.mean() < LEAST_WEIGHT:
-            return Estimate.invalid(self.method, OUTSHONE, **diagnostics)
-        widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
-        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR[self._lamps != "unknown"]:
-            bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
+        if weight.mean() < _LEAST_WEIGHT:
+            return Estimate.invalid(self.method, _OUTSHONE, **diagnostics)
+        widened = math.exp(NORMAL_90_PERCENT * _BOUND_SOFTNESS)
+        if share[VISIBILITIES > _CLEAR].sum() > _MAY_BE_CLEAR[self._lamps != "unknown"]:
+            bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=_BOUND_SOFTNESS)
             reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
-        if share[0] > MAY_BE_DENSER:
+        if share[0] > _MAY_BE_DENSER:
             reason = "fog so dense that only the densest of the model is like it"
-            bounds = ExtinctionBounds(least=extinction_from_visibility(high) * widened, softness=BOUND_SOFTNESS)
+            bounds = ExtinctionBounds(least=extinction_from_visibility(high) * widened, softness=_BOUND_SOFTNESS)
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
         common = COMMON * 0.5 * math.log(high / low) / NORMAL_90_PERCENT
         if len(measured.others) > 0:
-            common = min(common, MOST_COMMON)
+            common = min(common, _MOST_COMMON)
         return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 
@@ -323,7 +323,7 @@ def _why_not(observation: Observation, lit: Lamp, light: float) -> str:
         return "no head lamp is lit: this is a method for the night"
     if light > DAYLIGHT:
         return f"{light:.0f} lx of daylight: this is a method for the night"
-    if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
+    if observation.lead is not None and observation.lead.distance < _CLOSEST_LEAD:
         return "a vehicle close ahead hides the road"
     return ""
 
@@ -340,7 +340,7 @@ def _with_likely_glows(measured: Measured, sample: _Sample, variance: Floats) ->
     weight, unused = np.ones(len(variance)), Fit(np.empty(len(variance)), np.empty(2))
     alone = (measured._replace(others=one[None]) for one in measured.others)
     found = [np.exp(log_likelihoods(one, *sample, variance, weight, unused)).mean() for one in alone]
-    return measured._replace(others=measured.others[np.argsort(found)[-GLOWS_KEPT:]])
+    return measured._replace(others=measured.others[np.argsort(found)[-_GLOWS_KEPT:]])
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:
@@ -360,8 +360,8 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
 
 def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
     """Why the usable cells give no estimate; empty if they may."""
-    if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
+    if np.count_nonzero(used) < _LEAST_CELLS or np.count_nonzero(used & ~is_sky) < _LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
-    if float(seen.luminance[used].max()) < LEAST_PEAK:
+    if float(seen.luminance[used].max()) < _LEAST_PEAK:
         return "too dark: the head lamps light nothing"
     return ""

@@ -18,7 +18,7 @@ from fogsim.values.observation import Observation
 from fogsim.values.pinhole import OWN_FRAME, camera_axes, ray_from_pixel
 from fogsim.vision.light.pixel_kernels import Pixels
 
-HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
+_HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 """Lamps that throw light ahead."""
 
 _Known = Literal["usual", "unknown"]
@@ -28,7 +28,7 @@ HeadLamps = _Known | FileName
 KNOWN_HEAD_LAMPS: tuple[str, ...] = get_args(_Known)
 """Names of head lamps: a car's, and low beams of any pattern; every other name is that of a file."""
 
-USUAL_SETBACK = 1.9
+_USUAL_SETBACK = 1.9
 """Distance of the camera behind the front bumper where no vehicle reports it [m]."""
 
 VISIBILITIES = np.geomspace(8.0, 10_000.0, 37)
@@ -37,16 +37,16 @@ VISIBILITIES = np.geomspace(8.0, 10_000.0, 37)
 SKY = np.radians(np.geomspace(0.7, 18.0, 11)), np.radians((-12.0, -6.0, 0.0, 6.0, 12.0)), math.radians(2.0)
 """Elevations between which the fog above the road is measured, azimuths of the columns, half of their width [rad]."""
 
-ROAD = np.radians(np.geomspace(0.55, 10.5, 13)), (-0.9, 0.0, 0.9), 0.35
+_ROAD = np.radians(np.geomspace(0.55, 10.5, 13)), (-0.9, 0.0, 0.9), 0.35
 """Angles below the horizon between which the road is measured [rad]; middles of the strips and half their width [m]."""
 
 SUB_ROWS = 3
 """Rows of a cell for which the model is computed: near the horizon neither veil nor road is linear in a cell."""
 
-LEAST_DARK, MOST_DARK = 0.01, 0.95
+_LEAST_DARK, _MOST_DARK = 0.01, 0.95
 """Share of a cell's pixels that read no light from which on noise is cut off, and the largest that is used [-]."""
 
-LEAST_SEEN = 0.6
+_LEAST_SEEN = 0.6
 """Share of a cell that must be inside the image [-]."""
 
 
@@ -71,12 +71,12 @@ class OwnLight:
 
 def lit_head_lamps(observation: Observation) -> Lamp:
     """Own lamps that throw light ahead; low beams where an observation does not have lamps."""
-    return HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+    return _HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
 
 
 def setback_of(observation: Observation) -> float:
     """Distance of the camera behind the front bumper [m]."""
-    return round(observation.camera_setback or USUAL_SETBACK, 3)
+    return round(observation.camera_setback or _USUAL_SETBACK, 3)
 
 
 def without_noise(camera: Camera) -> Camera:
@@ -91,14 +91,14 @@ def cells_of(camera: Camera) -> Cells:
     looks = [
         (azimuth - half, azimuth + half, low, high) for low, high in itertools.pairwise(edges) for azimuth in azimuths
     ]
-    edges, sides, half = ROAD
+    edges, sides, half = _ROAD
     for high, low in itertools.pairwise(-edges):
         away = camera.mount_height / math.tan(math.sqrt(low * high))
         looks += [(math.atan((side - half) / away), math.atan((side + half) / away), low, high) for side in sides]
     boxes = np.array([_box(camera, *look) for look in looks])
     size = np.array((camera.height, camera.height, camera.width, camera.width))
     inside = np.clip(boxes, 0, size)
-    seen = _areas(inside) >= LEAST_SEEN * np.maximum(_areas(boxes), 1)
+    seen = _areas(inside) >= _LEAST_SEEN * np.maximum(_areas(boxes), 1)
     is_sky = np.array([low > 0.0 for _, _, low, _ in looks])
     box = np.ascontiguousarray(inside[seen])
     return Cells(box, _rays(camera, box), is_sky[seen])
@@ -147,9 +147,9 @@ class Seen(NamedTuple):
 def without_cut_noise(seen: Seen) -> Seen:
     """Cells with the luminance that they would have were noise about the dark not cut off, if it is normal."""
     luminance, normal = seen.luminance.copy(), NormalDist()
-    for cell in np.flatnonzero(seen.dark > LEAST_DARK).tolist():
+    for cell in np.flatnonzero(seen.dark > _LEAST_DARK).tolist():
         # Of a normal variable, the share below 0 and the mean of what is above, with 0 in place of the rest.
-        place = normal.inv_cdf(1.0 - min(float(seen.dark[cell]), MOST_DARK))
+        place = normal.inv_cdf(1.0 - min(float(seen.dark[cell]), _MOST_DARK))
         luminance[cell] *= max(place, 0.0) / (place * normal.cdf(place) + normal.pdf(place))
     return seen._replace(luminance=luminance)
 

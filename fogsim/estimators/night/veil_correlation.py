@@ -12,9 +12,9 @@ from fogsim.estimators.night.references import VeilReferences
 from fogsim.values.camera import Camera, Response
 from fogsim.values.camera_response import respond
 
-OTSU_BINS = 256
+_OTSU_BINS = 256
 
-LEAST_SCORES = 3
+_LEAST_SCORES = 3
 """Scores that a parabola goes through."""
 
 
@@ -80,7 +80,7 @@ def otsu_threshold(image: NDArray[np.float64]) -> float:
 
     Takes `image` (rows, cols).
     """
-    count, edges = np.histogram(image, bins=OTSU_BINS, range=(0.0, 255.0))
+    count, edges = np.histogram(image, bins=_OTSU_BINS, range=(0.0, 255.0))
     middle = 0.5 * (edges[:-1] + edges[1:])
     below, weight = np.cumsum(count * middle), np.cumsum(count).astype(np.float64)
     total, all_of_it = weight[-1], below[-1]
@@ -97,7 +97,7 @@ def visibility_by_parabola(scores: VeilScores) -> float | None:
     Returns None where the parabola has no top above 0.
     """
     some = np.nan_to_num(scores.score, nan=-1.0) > 0.0
-    if np.count_nonzero(some) < LEAST_SCORES:
+    if np.count_nonzero(some) < _LEAST_SCORES:
         return None
     # In units of the largest visibility, so that powers are of one size.
     scale = float(scores.visibility[some].max())

@@ -22,41 +22,41 @@ from fogsim.vision.vehicle.vehicle_crop import VehicleCrop, daytime_crop
 
 Floats = NDArray[np.float64]
 
-CELLS, NEAREST, FARTHEST = 141, 10.0, 10_000.0
+CELLS, _NEAREST, FARTHEST = 141, 10.0, 10_000.0
 """Cells of ln k, and visibilities at the ends of the grid [m]."""
 
-USUAL_CONTRAST, CONTRAST_DEVIATION = -0.45, 0.35
+_USUAL_CONTRAST, _CONTRAST_DEVIATION = -0.45, 0.35
 """Mean and standard deviation of the ln of a vehicle's contrast to its surroundings, over the airlight."""
 
-LIGHT_SHARE, LEAST_CONTRAST = 0.1, 0.05
+_LIGHT_SHARE, _LEAST_CONTRAST = 0.1, 0.05
 """Share of vehicles with an unknown contrast, since light paint in front of light airlight may vanish at any range [-],
 and its least value then [-]."""
 
-SLOPE = 0.25
+_SLOPE = 0.25
 """Deviation, in ln of the contrast, of the threshold at which a vehicle is found [-]."""
 
-ASTRAY = 0.03
+_ASTRAY = 0.03
 """Share of looks that go astray either way: clutter that looks like a vehicle, something that hides it [-]."""
 
-SUREST = 4.0
+_SUREST = 4.0
 """Largest logarithm of a ratio of likelihoods that is kept [-]: fog changes, and then what contradicts counts."""
 
-END = 0.25
+_END = 0.25
 """Likelihood at both ends of the grid, over the largest, up to which there is an estimate [-]."""
 
 KNOWN = 0.35
 """The same at one end up to which there is a bound [-]."""
 
-WIDEST, LEAST_DEVIATION = 0.5, 0.1
+_WIDEST, _LEAST_DEVIATION = 0.5, 0.1
 """Largest and least standard deviation of an estimate, and of a bound, in ln k [-]."""
 
-EXTINCTION = np.geomspace(extinction_from_visibility(FARTHEST), extinction_from_visibility(NEAREST), CELLS)
-LOG_EXTINCTION, LOG_CONTRAST = np.log(EXTINCTION), np.linspace(math.log(LEAST_CONTRAST), 0.0, 16)
+EXTINCTION = np.geomspace(extinction_from_visibility(FARTHEST), extinction_from_visibility(_NEAREST), CELLS)
+_LOG_EXTINCTION, _LOG_CONTRAST = np.log(EXTINCTION), np.linspace(math.log(_LEAST_CONTRAST), 0.0, 16)
 
 
 def _contrast_prior() -> Floats:
-    usual = np.exp(-0.5 * ((LOG_CONTRAST - USUAL_CONTRAST) / CONTRAST_DEVIATION) ** 2)
-    return np.asarray((1.0 - LIGHT_SHARE) * usual / usual.sum() + LIGHT_SHARE / LOG_CONTRAST.size)
+    usual = np.exp(-0.5 * ((_LOG_CONTRAST - _USUAL_CONTRAST) / _CONTRAST_DEVIATION) ** 2)
+    return np.asarray((1.0 - _LIGHT_SHARE) * usual / usual.sum() + _LIGHT_SHARE / _LOG_CONTRAST.size)
 
 
 class LossLikelihood:
@@ -68,7 +68,7 @@ class LossLikelihood:
     def __init__(self) -> None:
         self._prior = np.log(_contrast_prior())
         self._past = np.zeros(CELLS)
-        self._present = np.zeros((CELLS, LOG_CONTRAST.size))
+        self._present = np.zeros((CELLS, _LOG_CONTRAST.size))
         self._reach = 0.0
 
     def fade(self, ages: float) -> None:
@@ -80,17 +80,17 @@ class LossLikelihood:
     def meet_another(self) -> None:
         """Look at another vehicle from now on."""
         learnt = self._learnt()
-        self._past = np.maximum(learnt - learnt.max(), -SUREST)
+        self._past = np.maximum(learnt - learnt.max(), -_SUREST)
         self._present = np.zeros_like(self._present)
 
     def learn(self, distance: float, threshold: float, weight: float, *, found: bool) -> None:
         """Take in a look (`distance` [m])."""
-        contrast = LOG_CONTRAST - distance * EXTINCTION[:, None]
-        above = np.clip((contrast - math.log(threshold)) / SLOPE, -40.0, 40.0)
+        contrast = _LOG_CONTRAST - distance * EXTINCTION[:, None]
+        above = np.clip((contrast - math.log(threshold)) / _SLOPE, -40.0, 40.0)
         # A logistic curve is a normal distribution's within 0.01.
-        share = ASTRAY + (1.0 - 2.0 * ASTRAY) / (1.0 + np.exp(-1.702 * above))
+        share = _ASTRAY + (1.0 - 2.0 * _ASTRAY) / (1.0 + np.exp(-1.702 * above))
         self._present += weight * np.log(share if found else 1.0 - share)
-        self._present = np.maximum(self._present - self._present.max(), -SUREST)
+        self._present = np.maximum(self._present - self._present.max(), -_SUREST)
         self._reach = distance
 
     def _learnt(self) -> Floats:
@@ -103,18 +103,18 @@ class LossLikelihood:
         """k, its standard deviation and how far all looks reached [1/m, 1/m, m]; bounds; or nothing."""
         learnt = self._learnt()
         likelihood = np.exp(learnt - learnt.max())
-        if max(likelihood[0], likelihood[-1]) < END:
+        if max(likelihood[0], likelihood[-1]) < _END:
             # Tails are by looks that go astray: a normal distribution has e^(−½) of its height one deviation aside.
-            near = LOG_EXTINCTION[likelihood >= math.exp(-0.5)]
+            near = _LOG_EXTINCTION[likelihood >= math.exp(-0.5)]
             mean, deviation = 0.5 * float(near[0] + near[-1]), 0.5 * float(near[-1] - near[0])
-            deviation = math.hypot(deviation, LEAST_DEVIATION)
-            if deviation <= WIDEST:
+            deviation = math.hypot(deviation, _LEAST_DEVIATION)
+            if deviation <= _WIDEST:
                 return math.exp(mean), deviation * math.exp(mean), self._reach
-        most, above = _fall(likelihood, LOG_EXTINCTION)
-        least, below = _fall(likelihood[::-1], -LOG_EXTINCTION[::-1])
+        most, above = _fall(likelihood, _LOG_EXTINCTION)
+        least, below = _fall(likelihood[::-1], -_LOG_EXTINCTION[::-1])
         if math.isinf(most) and math.isinf(least):
             return None
-        softness = min(max(above, below, LEAST_DEVIATION), WIDEST)
+        softness = min(max(above, below, _LEAST_DEVIATION), _WIDEST)
         return ExtinctionBounds(math.exp(most), math.exp(-least), softness)
 
 
@@ -127,26 +127,26 @@ def _fall(likelihood: Floats, place: Floats) -> tuple[float, float]:
     return float(place[half]), float(place[max(tail, half)] - place[half])
 
 
-LARGE_ENOUGH = 5.0
+_LARGE_ENOUGH = 5.0
 """Width of the narrowest vehicle from which on it would be found in clear air [px]."""
 
-SHARPEST_BEND = 600.0
+_SHARPEST_BEND = 600.0
 """Radius of a bend on which a vehicle that is not found may be [m]: none must be found up to that far aside."""
 
-SEEN_BEFORE, NEARLY_AHEAD = 10.0, 2.0
+_SEEN_BEFORE, _NEARLY_AHEAD = 10.0, 2.0
 """Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone next to it."""
 
-DENSEST, ABRUPT = 0.1, 3.0
+_DENSEST, _ABRUPT = 0.1, 3.0
 """Extinction of the densest fog in which a vehicle fades [1/m], and what must then be left of its contrast for it to be
 hidden and not lost, over the threshold [-]."""
 
-JUMP, SURPRISE = 15.0, 5.0
+_JUMP, _SURPRISE = 15.0, 5.0
 """Changes of range, as such and against what the relative speed says, that together mean another vehicle [m]."""
 
-LOST_AFTER = 2.0
+_LOST_AFTER = 2.0
 """Time without a range after which the next one is another vehicle's [s]."""
 
-NEW_RANGE, NEW_TIME = 5.0, 3.0
+_NEW_RANGE, _NEW_TIME = 5.0, 3.0
 """Change of range [m], and time [s], after which a look is as good as another one: texture and clutter stay before."""
 
 
@@ -257,8 +257,8 @@ class Gabb2014:
         if self._lead is not None:
             before, earlier = self._lead
             expected = earlier.distance + earlier.relative_speed * (time - before)
-            jumped = abs(lead.distance - earlier.distance) > JUMP and not abs(lead.distance - expected) <= SURPRISE
-            if jumped or time - before > LOST_AFTER:
+            jumped = abs(lead.distance - earlier.distance) > _JUMP and not abs(lead.distance - expected) <= _SURPRISE
+            if jumped or time - before > _LOST_AFTER:
                 self._learnt.meet_another()
                 self._looked, self._ahead_until, self._last = None, -math.inf, None
         self._lead = time, lead
@@ -280,14 +280,14 @@ class Gabb2014:
         light = crop.sky.luminance, crop.noise
         seen = vehicle_presence(crop.luminance, crop.origin, self._camera, depth, ASIDE, light)
         found |= {"distance": depth, "threshold": seen.threshold}
-        if seen.found and abs(seen.aside) <= NEARLY_AHEAD:
-            self._ahead_until = observation.time + SEEN_BEFORE
+        if seen.found and abs(seen.aside) <= _NEARLY_AHEAD:
+            self._ahead_until = observation.time + _SEEN_BEFORE
         if not seen.found and not self._is_lost(level, crop, observation.time):
             return "the vehicle ahead may be outside the searched area, or too small"
         left = self._left(depth, observation.time)
         if seen.found and seen.step >= left:
             self._last = observation.time, depth, seen.step
-        if not seen.found and left > ABRUPT * seen.threshold:
+        if not seen.found and left > _ABRUPT * seen.threshold:
             return "the vehicle ahead went out of sight faster than fog hides it"
         found["found"] = seen.found
         self._learn(seen, depth, observation.time)
@@ -295,11 +295,11 @@ class Gabb2014:
 
     def _is_lost(self, level: NDArray[np.uint8] | NDArray[np.uint16], crop: VehicleCrop, time: float) -> bool:
         """Whether a vehicle that was not found would be in clear air, and none is aside on what may be a bend."""
-        if WIDTHS[0] * crop.scale < LARGE_ENOUGH:
+        if WIDTHS[0] * crop.scale < _LARGE_ENOUGH:
             return False
         if time <= self._ahead_until:
             return True
-        aside = ASIDE + 0.5 * crop.depth**2 / SHARPEST_BEND
+        aside = ASIDE + 0.5 * crop.depth**2 / _SHARPEST_BEND
         middle, half = self._camera.principal_point[0], (aside + WIDTHS[1]) * crop.scale
         columns = slice(max(math.floor(middle - half), 0), min(math.ceil(middle + half), self._camera.width))
         rows = slice(crop.origin[1], crop.origin[1] + crop.luminance.shape[0])
@@ -310,15 +310,15 @@ class Gabb2014:
 
     def _left(self, depth: float, time: float) -> float:
         """What even the densest fog must have left of the contrast that the vehicle had a moment ago [-]."""
-        if self._last is None or time - self._last[0] > SEEN_BEFORE:
+        if self._last is None or time - self._last[0] > _SEEN_BEFORE:
             return 0.0
-        return self._last[2] * math.exp(-DENSEST * max(depth - self._last[1], 0.0))
+        return self._last[2] * math.exp(-_DENSEST * max(depth - self._last[1], 0.0))
 
     def _learn(self, seen: Presence, depth: float, time: float) -> None:
         weight = 1.0
         if self._looked is not None:
             before, earlier = self._looked
-            weight = min(abs(depth - earlier) / NEW_RANGE + (time - before) / NEW_TIME, 1.0)
+            weight = min(abs(depth - earlier) / _NEW_RANGE + (time - before) / _NEW_TIME, 1.0)
         self._looked = time, depth
         self._learnt.learn(depth, seen.threshold, weight, found=seen.found)
 

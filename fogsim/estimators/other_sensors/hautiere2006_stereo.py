@@ -16,10 +16,10 @@ from fogsim.vision.lines.horizon import levelled, why_no_road
 from fogsim.vision.stereo.contrast_decay import ContrastClass, ContrastDecay, contrast_classes, fit_decay
 from fogsim.vision.stereo.matching import Pixels, seen_edges
 
-VISIBLE = 0.05
+_VISIBLE = 0.05
 """Contrast from which on something is visible, by CIE [-]."""
 
-TRUSTED = 0.07
+_TRUSTED = 0.07
 """Contrast of the best edges of a class below which noise counts among them [-]."""
 
 FARTHEST = 0.6
@@ -29,10 +29,10 @@ NEAR = 30.0
 """Distance within which the best contrasts are those of road marks and vehicles' edges, and of nothing dark enough, if
 there is contrast at twice that [m]."""
 
-DEEP_ENOUGH = 0.5
+_DEEP_ENOUGH = 0.5
 """Least optical depth to the farthest class at which contrasts determine k [-]."""
 
-LEAST_DEVIATION = 0.08
+_LEAST_DEVIATION = 0.08
 """Relative standard deviation that no fit comes below: what scenes have of dark things [-]."""
 
 
@@ -109,9 +109,9 @@ class Hautiere2006Stereo:
         second = for_kernels(checked_image(right.image, self._camera))
         if why := self._why_no_day(image, observation):
             return Estimate.invalid(self.method, why)
-        edges = seen_edges(image, second, self._camera, right.baseline, VISIBLE)
+        edges = seen_edges(image, second, self._camera, right.baseline, _VISIBLE)
         classes = contrast_classes(edges, self._scale(right), self._deviation, FARTHEST)
-        sure = [one for one in classes if one.contrast >= TRUSTED]
+        sure = [one for one in classes if one.contrast >= _TRUSTED]
         sure = [one for one in sure if one.distance >= min(NEAR, 0.5 * sure[-1].distance)]
         if not sure:
             return Estimate.invalid(self.method, "nothing that both cameras show has contrast")
@@ -138,8 +138,8 @@ class Hautiere2006Stereo:
             k = OPTICAL_DEPTH_AT_VISIBILITY / last.distance
             return Estimate(self.method, k, k * max(last.relative_deviation, 0.2), diagnostics=found)
         farthest = sure[-1].distance
-        deviation = math.hypot(fit.standard_deviation, LEAST_DEVIATION * fit.extinction)
-        if fit.extinction * farthest < DEEP_ENOUGH:
+        deviation = math.hypot(fit.standard_deviation, _LEAST_DEVIATION * fit.extinction)
+        if fit.extinction * farthest < _DEEP_ENOUGH:
             return self._nothing_far_enough(fit, deviation, farthest, found)
         return Estimate(self.method, fit.extinction, deviation, diagnostics=found, reach=farthest)
 

@@ -15,7 +15,7 @@ from fogsim.values.observation import Observation
 REACH = 10.0
 """How far its estimates speak of the fog [m]: a tenth of a litre of air at the bumper, and what is like it."""
 
-LEAST_DEVIATION = extinction_from_visibility(20_000.0)
+_LEAST_DEVIATION = extinction_from_visibility(20_000.0)
 """Standard deviation of k in clear air [1/m]: the end of a PWD22's range."""
 
 
@@ -88,7 +88,7 @@ class Scatterometer:
                 f"Observation.scattering must be a finite extinction coefficient ≥ 0 [1/m], got {scattering!r}"
             )
         change = self._change(observation.time, scattering)
-        deviation = math.hypot(self._deviation * scattering, change, LEAST_DEVIATION)
+        deviation = math.hypot(self._deviation * scattering, change, _LEAST_DEVIATION)
         return Estimate(self.method, scattering, deviation, diagnostics={"change": change}, reach=REACH)
 
     def _change(self, time: float, scattering: float) -> float:

@@ -20,24 +20,24 @@ GRID = OPTICAL_DEPTH_AT_VISIBILITY / np.geomspace(8000.0, 10.0, 900)
 SIGN_DEVIATION = 0.015
 """Relative deviation of k that a sign has to itself, whatever its looks agree on [-]."""
 
-AIRLIGHT, CLIPPED_AIRLIGHT = 0.008, 0.05
+_AIRLIGHT, _CLIPPED_AIRLIGHT = 0.008, 0.05
 """Relative deviation of the airlight at the sign from the sky's, and where the sky is clipped [-]."""
 
-DARKNESS = 0.02
+_DARKNESS = 0.02
 """Deviation of what a sign's black sends, over the airlight [-]: gloss, dirt, and red that is not as red."""
 
-REGISTRATION = 0.012
+_REGISTRATION = 0.012
 """Relative deviation of a single look's contrast by what is not noise: its layout, its place within the pixels [-]."""
 
-SMALL_FACE = 0.05
+_SMALL_FACE = 0.05
 """Relative deviation of the contrast of faces too small for their areas to be distinguished, which the looks at a sign
 share: how far their light spreads, how large they are taken to be [-]."""
 
-BRIGHTNESS, BRIGHTNESS_DEVIATION = 1.0, 0.5
+_BRIGHTNESS, _BRIGHTNESS_DEVIATION = 1.0, 0.5
 """What a white face would send without fog over the airlight, divided by its reflectance, and its deviation [-]: a
 vertical surface gets about half of a level one's light, the airlight has 0.37 over woods and 0.87 over snow."""
 
-HUBER, ROUNDS, COARSE = 2.0, 2, 6
+_HUBER, _ROUNDS, _COARSE = 2.0, 2, 6
 """Standard deviations from which on a look counts less [-], rounds of weighing, and every how manieth k they need."""
 
 MAX_MISFIT = 2.5
@@ -77,13 +77,13 @@ def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachF
     seen[:, 0] -= 1.0
     small = np.array([float(one.face.is_mean) for one in looks])
     noise = np.array([one.face.variance for one in looks]) / airlight[:, None] ** 2
-    unsure = CLIPPED_AIRLIGHT if any(one.clipped for one in looks) else AIRLIGHT
+    unsure = _CLIPPED_AIRLIGHT if any(one.clipped for one in looks) else _AIRLIGHT
     measured = _Measured(distance, seen, noise, small, unsure, range_deviation)
     weight = np.ones(len(looks))
-    for _ in range(ROUNDS):
-        squares, residuals = _profile(GRID[::COARSE], measured, weight)
+    for _ in range(_ROUNDS):
+        squares, residuals = _profile(GRID[::_COARSE], measured, weight)
         square = residuals[int(np.argmin(squares))]
-        weight = np.minimum(1.0, HUBER / np.sqrt(np.maximum(square, 1e-9)))
+        weight = np.minimum(1.0, _HUBER / np.sqrt(np.maximum(square, 1e-9)))
     squares, residuals = _profile(GRID, measured, weight)
     at = int(np.argmin(squares))
     misfit = float((weight * residuals[at]).sum() / max(2 * len(looks) - 3, 1))
@@ -122,17 +122,17 @@ def _profile(grid: Floats, measured: _Measured, weight: Floats) -> tuple[Floats,
     k = grid[:, None]
     fall = np.exp(-k * distance)
     # What is not noise scales a contrast; taken along the usual face, so that what was seen decides no weights.
-    relative = (REGISTRATION**2 + (k * range_deviation) ** 2) * fall**2
+    relative = (_REGISTRATION**2 + (k * range_deviation) ** 2) * fall**2
     a = noise[:, 0] + relative
-    b = noise[:, 1] + BRIGHTNESS**2 * relative
-    c = noise[:, 2] - BRIGHTNESS * relative * 0.5
+    b = noise[:, 1] + _BRIGHTNESS**2 * relative
+    c = noise[:, 2] - _BRIGHTNESS * relative * 0.5
     determinant = np.maximum(a * b - c * c, 1e-30)
     aa, bb, ab = b / determinant, a / determinant, -c / determinant
-    first, second = seen[:, 0] + fall, np.broadcast_to(seen[:, 1], fall.shape) - BRIGHTNESS * fall
+    first, second = seen[:, 0] + fall, np.broadcast_to(seen[:, 1], fall.shape) - _BRIGHTNESS * fall
     # Linear unknowns: g, ε and what small faces share in the first, the brightness beyond the usual in the second.
     none = np.zeros_like(fall)
     rows = ((fall, none), (np.ones_like(fall), none), (small * fall, none), (none, fall))
-    priors = (DARKNESS**-2.0, unsure**-2.0, SMALL_FACE**-2.0, BRIGHTNESS_DEVIATION**-2.0)
+    priors = (_DARKNESS**-2.0, unsure**-2.0, _SMALL_FACE**-2.0, _BRIGHTNESS_DEVIATION**-2.0)
     matrix, right = np.zeros((len(grid), 4, 4)), np.zeros((len(grid), 4))
     for i, (p, q) in enumerate(rows):
         left_p, left_q = weight * (aa * p + ab * q), weight * (ab * p + bb * q)

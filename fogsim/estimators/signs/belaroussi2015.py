@@ -20,22 +20,22 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.observation import Observation
 
-FORGOTTEN = 0.05
+_FORGOTTEN = 0.05
 """p(c) below which a sign does not count any more [-]."""
 
-SYSTEMATIC = 0.08
+_SYSTEMATIC = 0.08
 """Deviation of a drive's visibility that all of its signs share, relative to it: how the picture is exposed [-]."""
 
-SOFTNESS = 0.1
+_SOFTNESS = 0.1
 """Standard deviation of a bound, in ln k [-]."""
 
-MISSES = 3
+_MISSES = 3
 """Looks at which a sign should have been seen and was not, from which on it was missed."""
 
-MISSED_SIGNS = 2
+_MISSED_SIGNS = 2
 """Signs that must have been missed: one alone may be missing in the world, or hidden."""
 
-LIKE = 0.1
+_LIKE = 0.1
 """Largest difference of the calibrated focal length from the camera's, relative to it [-]."""
 
 
@@ -133,7 +133,7 @@ class Belaroussi2015:
         InputError
             If it is of a camera of another focal length.
         """
-        if abs(measured.focal_length / self._camera.focal_length - 1.0) > LIKE:
+        if abs(measured.focal_length / self._camera.focal_length - 1.0) > _LIKE:
             raise InputError(
                 f"the operating range was calibrated for a focal length of {measured.focal_length:g} px, and the "
                 f"camera has {self._camera.focal_length:g} px: calibrate it for this camera"
@@ -220,7 +220,7 @@ class Belaroussi2015:
                 self._map_holds = True
                 self._missed.pop(sign_id, None)
             elif (
-                track.misses >= MISSES
+                track.misses >= _MISSES
                 and track.unseen_before is not None
                 and (measured := self._range_of(track)) is not None
             ):
@@ -245,7 +245,7 @@ class Belaroussi2015:
 
     def _estimate(self, found: dict[str, object]) -> Estimate:
         weighted = [(one, self._weight(one)) for one in self._seen]
-        weighted = [(one, weight) for one, weight in weighted if weight >= FORGOTTEN]
+        weighted = [(one, weight) for one, weight in weighted if weight >= _FORGOTTEN]
         self._seen = [one for one, _ in weighted]
         if self._least is not None and self._time - self._least[1] < self._fading_time:
             found["visibility_at_least"] = self._least[0]
@@ -264,7 +264,7 @@ class Belaroussi2015:
         mean, deviation = reduced([v for v, _ in kept], [w for _, w in kept])
         single = [one.deviation for (one, _), keep in zip(weighted, chosen, strict=True) if keep]
         # Signs of one drive share exposure and told pitch, so what the calibration scatters by does not average out.
-        deviation = max(deviation, math.hypot(sum(single) / len(single), SYSTEMATIC * mean))
+        deviation = max(deviation, math.hypot(sum(single) / len(single), _SYSTEMATIC * mean))
         k = extinction_from_visibility(mean)
         found |= {"signs": len(kept), "single_visibilities": tuple(values)}
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
@@ -277,17 +277,17 @@ class Belaroussi2015:
         """
         least = found.get("visibility_at_least")
         if isinstance(least, float):
-            return ExtinctionBounds(most=extinction_from_visibility(least), softness=SOFTNESS)
-        if not self._map_holds or len(self._missed) < MISSED_SIGNS:
+            return ExtinctionBounds(most=extinction_from_visibility(least), softness=_SOFTNESS)
+        if not self._map_holds or len(self._missed) < _MISSED_SIGNS:
             return None
         most = [
             measured.visibility_at(max(nearest, measured.reach[0])) for measured, nearest, _ in self._missed.values()
         ]
         lowest = sorted(one for one in most if one is not None)
-        if len(lowest) < MISSED_SIGNS:
+        if len(lowest) < _MISSED_SIGNS:
             return None
-        found_at_most, deviation = lowest[MISSED_SIGNS - 1]
-        softness = math.hypot(SOFTNESS, deviation / found_at_most)
+        found_at_most, deviation = lowest[_MISSED_SIGNS - 1]
+        softness = math.hypot(_SOFTNESS, deviation / found_at_most)
         return ExtinctionBounds(least=extinction_from_visibility(found_at_most), softness=softness)
 
     def _weight(self, one: _Seen) -> float:

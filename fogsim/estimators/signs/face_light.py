@@ -11,23 +11,23 @@ from fogsim.estimators.signs.layout import Layout, face_maps
 
 Floats = NDArray[np.float64]
 
-ROUNDS, MARGIN = 2, 1.35
+_ROUNDS, MARGIN = 2, 1.35
 """Rounds in which the place is refined, and how far around the face the background is seen, over its radius [-]."""
 
-LEAST_NOISE = 0.15
+_LEAST_NOISE = 0.15
 """Least standard deviation of a pixel [linear grey levels]."""
 
-MOST_PIXELS = 1600
+_MOST_PIXELS = 1600
 """Pixels that are compared, about; larger faces are sampled."""
 
 
 EDGES = 0.3
 """Standard deviation of where an edge is seen in single pixels: sampling, sharpening, compression [px]."""
 
-FIRST_NOISE = 1.0
+_FIRST_NOISE = 1.0
 """Standard deviation of a pixel before it is measured [linear grey levels]."""
 
-SYMBOL = 0.12
+_SYMBOL = 0.12
 """Standard deviation of a symbol's mean light, relative to the picture's there [-]."""
 
 UNKNOWN = 1e6
@@ -39,13 +39,13 @@ LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
 """Place [px], relative size and blur [px] by detection, map and distance, and their standard deviations. The blur has
 the pixels' own size in it."""
 
-PLACED = np.array([0.15, 0.15, 0.015, 0.1])
+_PLACED = np.array([0.15, 0.15, 0.015, 0.1])
 """Their standard deviations once the face has been fitted."""
 
-SEPARABLE = 8.0
+_SEPARABLE = 8.0
 """Radius from which the areas of a face are distinguished [px]; of smaller ones only the mean luminance counts."""
 
-LAYOUT = 0.005
+_LAYOUT = 0.005
 """Deviation of a face's reflectance from its layout's, over that of white [-]."""
 
 
@@ -77,7 +77,7 @@ class Face:
         """Inverse variances of the columns' shares before the picture is seen."""
         known = np.zeros(columns.shape[1])
         if self.layout.symbol is not None:
-            known[-1] = (SYMBOL * max(float(np.median(seen)), 1.0)) ** -2.0
+            known[-1] = (_SYMBOL * max(float(np.median(seen)), 1.0)) ** -2.0
         return known
 
 
@@ -109,20 +109,20 @@ def face_light(
     reach = MARGIN * radius + 2.0
     # Below the face stands its post.
     near = (np.hypot(right, down) < reach) & ~((np.abs(right) < 0.25 * radius + 1.0) & (down > 0.9 * radius))
-    picked = np.flatnonzero(near)[:: max(1, round(near.sum() / MOST_PIXELS))]
+    picked = np.flatnonzero(near)[:: max(1, round(near.sum() / _MOST_PIXELS))]
     if picked.size < 20:
         return None
     right, down, seen = right[picked], down[picked], light.ravel()[picked].astype(np.float64)
-    state, weight = LOOSE[0], np.full(picked.size, FIRST_NOISE**-2.0)
+    state, weight = LOOSE[0], np.full(picked.size, _FIRST_NOISE**-2.0)
     face = Face(layout, radius, narrowed)
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         fit = _placed(seen, right, down, face, state, weight, LOOSE)
         weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep), fit.state
     weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep)
-    fit = _placed(seen, right, down, face, state, weight, (state, PLACED))
+    fit = _placed(seen, right, down, face, state, weight, (state, _PLACED))
     columns = face.columns(right, down, state)
     # An error of the layout is the same in many pixels: it does not average out as noise does.
-    unsure = LAYOUT * abs(float(fit.solved[1] - fit.solved[0] if face.is_even else fit.solved[4]))
+    unsure = _LAYOUT * abs(float(fit.solved[1] - fit.solved[0] if face.is_even else fit.solved[4]))
     wider = 1.0 + unsure**2 * float((weight * columns[:, 0]).sum())
     return _line(face, columns, fit.solved, wider * fit.covariance)
 
@@ -130,7 +130,7 @@ def face_light(
 def _weights(residual: Floats, reach: Floats, steep: Floats) -> Floats:
     """Inverse variances of the pixels: what lies behind a sign is less even than its face, and edges are not sharp."""
     inner, outer = (reach < 0.9) & (steep < np.median(steep)), reach > 1.1
-    noise = max(float(np.sqrt(np.mean(residual[inner] ** 2))) if inner.any() else 0.0, LEAST_NOISE)
+    noise = max(float(np.sqrt(np.mean(residual[inner] ** 2))) if inner.any() else 0.0, _LEAST_NOISE)
     behind = max(float(np.sqrt(np.mean(residual[outer] ** 2))) if outer.any() else noise, noise)
     return np.asarray(1.0 / (np.where(reach > 1.0, behind, noise) ** 2 + (EDGES * steep) ** 2))
 
@@ -174,7 +174,7 @@ def _placed(
 
 def _line(face: Face, columns: Floats, solved: Floats, covariance: Floats) -> FaceLight:
     """Line of luminance over reflectance; only a point of it for even faces, or those too small to separate areas."""
-    is_small = face.radius < SEPARABLE
+    is_small = face.radius < _SEPARABLE
     if not face.is_even and not is_small:
         return FaceLight(float(solved[0]), float(solved[4]), tuple(covariance[[0, 4, 0], [0, 4, 4]].tolist()))
     # What its areas send together: the mean over all that the face covers.

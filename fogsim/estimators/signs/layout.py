@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-WHITE, RED, DARK, YELLOW, BLUE = 0.66, 0.107, 0.022, 0.42, 0.076
+_WHITE, RED, _DARK, YELLOW, _BLUE = 0.66, 0.107, 0.022, 0.42, 0.076
 """Luminous reflectance of the sheeting of signs by day [-]."""
 
 
@@ -37,32 +37,32 @@ class Layout:
 
 
 def _disc(
-    symbol: tuple[float, float, float], *, field: float = WHITE, frame: float = RED, ring: float = 0.78
+    symbol: tuple[float, float, float], *, field: float = _WHITE, frame: float = RED, ring: float = 0.78
 ) -> Layout:
-    return Layout(Outline.DISC, ((1.0, WHITE), (0.965, frame), (ring, field)), symbol)
+    return Layout(Outline.DISC, ((1.0, _WHITE), (0.965, frame), (ring, field)), symbol)
 
 
 def _warning(symbol: tuple[float, float, float]) -> Layout:
-    return Layout(Outline.TIP_UP, ((1.0, WHITE), (0.965, RED), (0.72, WHITE)), symbol)
+    return Layout(Outline.TIP_UP, ((1.0, _WHITE), (0.965, RED), (0.72, _WHITE)), symbol)
 
 
 LAYOUTS = {
     "speed_limit": _disc((0.62, 0.46, -0.28)),
-    "end_of_speed_limit": _disc((0.64, 0.64, -0.3), frame=DARK, ring=0.93),
-    "end_of_limits": _disc((0.64, 0.64, -0.25), frame=DARK, ring=0.93),
+    "end_of_speed_limit": _disc((0.64, 0.64, -0.3), frame=_DARK, ring=0.93),
+    "end_of_limits": _disc((0.64, 0.64, -0.25), frame=_DARK, ring=0.93),
     "no_overtaking": _disc((0.57, 0.22, -0.45)),
-    "no_entry": _disc((0.74, 0.16, WHITE - RED), field=RED, ring=0.93),
-    "variable_speed_limit": Layout(Outline.SQUARE, ((1.0, DARK),), (0.92, 0.92, 0.3)),
-    "stop": Layout(Outline.OCTAGON, ((1.0, WHITE), (0.94, RED)), (0.8, 0.34, 0.22)),
-    "yield": Layout(Outline.TIP_DOWN, ((1.0, WHITE), (0.965, RED), (0.6, WHITE))),
-    "priority_road": Layout(Outline.DIAMOND, ((1.0, DARK), (0.97, WHITE), (0.72, YELLOW))),
-    "motorway": Layout(Outline.SQUARE, ((1.0, WHITE), (0.92, BLUE)), (0.7, 0.7, 0.15)),
+    "no_entry": _disc((0.74, 0.16, _WHITE - RED), field=RED, ring=0.93),
+    "variable_speed_limit": Layout(Outline.SQUARE, ((1.0, _DARK),), (0.92, 0.92, 0.3)),
+    "stop": Layout(Outline.OCTAGON, ((1.0, _WHITE), (0.94, RED)), (0.8, 0.34, 0.22)),
+    "yield": Layout(Outline.TIP_DOWN, ((1.0, _WHITE), (0.965, RED), (0.6, _WHITE))),
+    "priority_road": Layout(Outline.DIAMOND, ((1.0, _DARK), (0.97, _WHITE), (0.72, YELLOW))),
+    "motorway": Layout(Outline.SQUARE, ((1.0, _WHITE), (0.92, _BLUE)), (0.7, 0.7, 0.15)),
     "warning": _warning((0.09, 0.41, -0.5)),
     **dict.fromkeys(("fog_warning", "slippery", "curve_left", "curve_right", "queue"), _warning((0.4, 0.4, -0.2))),
 }
 """Faces by the kind of the sign; an unknown kind is taken for a plain disc."""
 
-UNKNOWN = Layout(Outline.DISC, ((1.0, WHITE),), (0.8, 0.8, 0.0))
+UNKNOWN = Layout(Outline.DISC, ((1.0, _WHITE),), (0.8, 0.8, 0.0))
 
 
 def layout_of(kind: str) -> Layout:

@@ -15,7 +15,7 @@ from fogsim.core.files.readers import number_within, read_json
 from fogsim.core.linear_algebra import inverse_of, matrix_product, times
 from fogsim.errors import InputError, shown
 
-FLAT = 0.35
+_FLAT = 0.35
 """Relative deviation of one sign's visibility beyond which the curve is flat and distances are uninformative [-]."""
 
 _MARGIN = 1.5
@@ -147,7 +147,7 @@ class _Curve:
         if self._curve is None:
             return (math.inf, -math.inf)
         distances = np.linspace(self._distance[0], max(self._end, self._distance[0]), 200)
-        flat = np.array([deviation / value for value, deviation in map(self.at, distances)]) > FLAT
+        flat = np.array([deviation / value for value, deviation in map(self.at, distances)]) > _FLAT
         last = int(np.argmax(flat)) - 1 if flat.any() else len(distances) - 1
         return (float(distances[0]), float(distances[max(last, 0)]))
 

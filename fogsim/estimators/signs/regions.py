@@ -11,10 +11,10 @@ from fogsim.vision.symmetry.detection import SearchRegion
 GATE = 3.3
 """Standard deviations that a sign's column and row may be off: 0.2 % of signs are farther off [-]."""
 
-NEAREST = 3.0
+_NEAREST = 3.0
 """Signs nearer to the camera than this are not looked for: they leave the picture [m]."""
 
-SMALLEST = 3.0
+_SMALLEST = 3.0
 """Least radius of a sign that is looked for [px]."""
 
 
@@ -67,8 +67,8 @@ def _projected(sighting: SignSighting, camera: Camera, setback: float, known: Po
     right, down, depth = sign_coordinates(sighting, camera, setback)
     if not all(map(math.isfinite, (right, down, depth, sighting.diameter))) or sighting.diameter <= 0.0:
         return None
-    place = None if depth < NEAREST else sign_place(sighting, camera, setback)
-    if place is None or place[3] < SMALLEST:
+    place = None if depth < _NEAREST else sign_place(sighting, camera, setback)
+    if place is None or place[3] < _SMALLEST:
         return None
     (u, v, _, radius), scale = place, camera.focal_length / depth
     x, y = scale * right, scale * down

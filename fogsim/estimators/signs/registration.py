@@ -13,13 +13,13 @@ from fogsim.vision.symmetry.detection import LARGER, SMALLER, SignDetection
 LIMIT = 4.0
 """Standard deviations that column, row and size of a detection may be off together: 0.1 % are farther off [-]."""
 
-SIZE_DEVIATION, BLUR = 0.15, 0.4
+_SIZE_DEVIATION, _BLUR = 0.15, 0.4
 """Standard deviation of a detected radius about the map's: relative to it, and by what blurs small signs [px]."""
 
-FALSE_ALARMS = 0.05
+_FALSE_ALARMS = 0.05
 """Detections in a region that are no sign of the map [-]."""
 
-DETECTED = 0.9
+_DETECTED = 0.9
 """Share of signs that are detected, for the confidence in a pair [-]."""
 
 
@@ -56,7 +56,7 @@ def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDete
 def _likelihood_ratio(sign: ProjectedSign, detection: SignDetection) -> float:
     """Likelihood of a detection as this sign over that as a false alarm [-]; 0 outside the gate."""
     a, b = (detection.u - sign.u) / sign.deviation_u, (detection.v - sign.v) / sign.deviation_v
-    size_deviation = math.hypot(SIZE_DEVIATION, BLUR / sign.radius)
+    size_deviation = math.hypot(_SIZE_DEVIATION, _BLUR / sign.radius)
     c = math.log(detection.radius / sign.radius) / size_deviation
     square = a * a + b * b + c * c
     if square > LIMIT * LIMIT:
@@ -64,4 +64,4 @@ def _likelihood_ratio(sign: ProjectedSign, detection: SignDetection) -> float:
     density = math.exp(-0.5 * square) / (2.0 * math.pi) ** 1.5
     density /= sign.deviation_u * sign.deviation_v * size_deviation
     area: float = 4.0 * GATE * GATE * sign.deviation_u * sign.deviation_v * math.log(LARGER / SMALLER)
-    return float(DETECTED * density * area / FALSE_ALARMS)
+    return float(_DETECTED * density * area / _FALSE_ALARMS)

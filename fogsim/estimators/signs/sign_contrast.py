@@ -29,25 +29,25 @@ from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.strips.sky import Sky
 
-MIN_LOOKS = 4
+_MIN_LOOKS = 4
 """Fewest looks at a sign."""
 
-LEAST_SPAN = 12.0
+_LEAST_SPAN = 12.0
 """Least change of the distance over them [m]."""
 
-SPACING = 0.025
+_SPACING = 0.025
 """Least change of distance between two looks, relative to it [-]."""
 
-MOST_LOOKS, MOST_SIGNS = 60, 30
+_MOST_LOOKS, _MOST_SIGNS = 60, 30
 """Looks at one sign, and signs, that are remembered."""
 
-LEAST_RADIUS, LARGEST_RADIUS = 3.0, 45.0
+_LEAST_RADIUS, _LARGEST_RADIUS = 3.0, 45.0
 """Radii of faces whose light is measured [px]."""
 
-SYSTEMATIC = 0.015
+_SYSTEMATIC = 0.015
 """Relative deviation of k that all signs share [-]."""
 
-WORST = 0.15
+_WORST = 0.15
 """Largest deviation of k relative to itself for an estimate [-]."""
 
 
@@ -56,12 +56,12 @@ class _Approach:
     """Looks at one sign, the nearest last, and what they say once they are enough."""
 
     time: float
-    looks: deque[FaceLook] = field(default_factory=lambda: deque(maxlen=MOST_LOOKS))
+    looks: deque[FaceLook] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
     fit: ApproachFit | None = None
 
     def is_news(self, distance: float) -> bool:
         """Whether a look from this distance would add to those before."""
-        return not self.looks or abs(distance - self.looks[-1].distance) > SPACING * distance
+        return not self.looks or abs(distance - self.looks[-1].distance) > _SPACING * distance
 
     @property
     def span(self) -> float:
@@ -178,7 +178,7 @@ class SignContrast:
             approach = self._approaches.setdefault(one.sign.sighting.sign_id, _Approach(time))
             approach.looks.append(look)
             approach.time = time
-            if len(approach.looks) >= MIN_LOOKS and approach.span >= LEAST_SPAN:
+            if len(approach.looks) >= _MIN_LOOKS and approach.span >= _LEAST_SPAN:
                 approach.fit = fit_approach(approach.looks, self._range_deviation)
         return ""
 
@@ -188,7 +188,7 @@ class SignContrast:
             # The same sign, driven past again.
             del self._approaches[one.sign.sighting.sign_id]
             known = None
-        fits = LEAST_RADIUS <= one.sign.radius <= LARGEST_RADIUS
+        fits = _LEAST_RADIUS <= one.sign.radius <= _LARGEST_RADIUS
         return fits and (known is None or known.is_news(one.sign.distance))
 
     def _look(self, image: NDArray[np.uint8] | NDArray[np.uint16], one: Registration, sky: Sky) -> FaceLook | None:
@@ -208,7 +208,7 @@ class SignContrast:
     def _estimate(self, time: float, found: dict[str, object]) -> Estimate:
         self._approaches = {name: one for name, one in self._approaches.items() if time - one.time <= self._window}
         counted = [one for one in self._approaches.values() if one.fit is not None and one.fit.misfit <= MAX_MISFIT]
-        counted = sorted(counted, key=lambda one: one.time)[-MOST_SIGNS:]
+        counted = sorted(counted, key=lambda one: one.time)[-_MOST_SIGNS:]
         found |= {"approaches": len(counted), "looks": sum(len(one.looks) for one in counted)}
         if not counted:
             return Estimate.invalid(self.method, self._watch.trouble or "no sign has come near enough yet", **found)
@@ -216,6 +216,6 @@ class SignContrast:
             return Estimate.invalid(self.method, "no sign is being looked at", **found)
         fits = [one.fit for one in counted if one.fit is not None]
         k, deviation = extinction_of(fits, self._wrong_share)
-        if deviation > WORST * k:
+        if deviation > _WORST * k:
             return Estimate.invalid(self.method, "the signs' light has not changed enough yet", **found)
-        return Estimate(self.method, k, math.hypot(deviation, SYSTEMATIC * k), diagnostics=found)
+        return Estimate(self.method, k, math.hypot(deviation, _SYSTEMATIC * k), diagnostics=found)

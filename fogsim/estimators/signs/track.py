@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from fogsim.estimators.signs.regions import ProjectedSign
 from fogsim.estimators.signs.registration import Registration
 
-CONFIRMED = 2
+_CONFIRMED = 2
 """Detections, without two misses between them, from which the first one counts."""
 
-FORGOTTEN = 2
+_FORGOTTEN = 2
 """Misses one after another by which a detection that was not confirmed was a false alarm."""
 
 
@@ -32,7 +32,7 @@ class SignTrack:
     @property
     def confirmed(self) -> bool:
         """Whether it was detected often enough for its first detection to count."""
-        return self.detections >= CONFIRMED
+        return self.detections >= _CONFIRMED
 
 
 class SignTracks:
@@ -79,6 +79,6 @@ def _missed(track: SignTrack) -> SignTrack:
     if not track.sign.expected:
         return track
     track = replace(track, misses=track.misses + 1, misses_since=track.misses_since + 1)
-    if track.first_seen is not None and not track.confirmed and track.misses_since >= FORGOTTEN:
+    if track.first_seen is not None and not track.confirmed and track.misses_since >= _FORGOTTEN:
         track = replace(track, first_seen=None, confidence=0.0, detections=0)
     return track if track.first_seen is not None else replace(track, unseen_before=track.sign.distance)

@@ -20,13 +20,13 @@ from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.symmetry.detection import detect_signs
 
-STRANGE = 3
+_STRANGE = 3
 """Successive signs not found at their position in the map after which the map is doubted."""
 
-MIN_AIRLIGHT = 6.0
+_MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
-WELL_SEEN = 30.0
+_WELL_SEEN = 30.0
 """Range within which a sign must have been searched to know that it is not simply too far to see [m]."""
 
 Detector = Callable[..., tuple[object, ...]]
@@ -83,7 +83,7 @@ class SignWatch:
         for track in passed:
             if track.confirmed:
                 self._lost = 0
-            elif track.unseen_before is not None and track.unseen_before < WELL_SEEN:
+            elif track.unseen_before is not None and track.unseen_before < _WELL_SEEN:
                 self._lost += 1
         return Watched(signs, found, passed, sky)
 
@@ -92,14 +92,14 @@ class SignWatch:
     ) -> tuple[Sky | None, str]:
         level = levelled(image, self._camera)
         sky = sky_above(linear_pixels(level, self._camera), self._camera, self._margin)
-        if sky is not None and sky.luminance < MIN_AIRLIGHT:
+        if sky is not None and sky.luminance < _MIN_AIRLIGHT:
             return sky, "too dark above the horizon: this is a daytime method"
         return sky, lit_by_lamps(level, self._camera, lead)
 
     @property
     def trouble(self) -> str:
         """Why no sign can be seen; empty if one might be."""
-        if self._lost >= STRANGE:
+        if self._lost >= _STRANGE:
             return (
                 f"the last {self._lost} signs were not found at their positions in the map: the map may be in another "
                 "coordinate frame, or the camera's calibration be wrong"

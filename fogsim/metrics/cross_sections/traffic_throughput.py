@@ -42,7 +42,7 @@ class TrafficThroughput(TrafficMetric):
         if span.route is None:
             return
         if self._sections is None:
-            self._sections = sections_along(span.route)
+            self._sections = _sections_along(span.route)
         read, time = _when_read(span, self._sections)
         self._time += time
         missing = int(span.vehicle.max(initial=-1)) + 1 - len(self._last)
@@ -59,7 +59,7 @@ class TrafficThroughput(TrafficMetric):
         return {"traffic_flow_vehicles_per_h": share(HOUR * self._passed, self._time)}
 
 
-def sections_along(road: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sections_along(road: NDArray[np.float64]) -> NDArray[np.float64]:
     """Middles [m] and unit vectors along the road (s, 4) of cross sections of a polyline (m, 3) [m]."""
     x, y = road[:, 0], road[:, 1]
     place = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))

@@ -11,7 +11,7 @@ from fogsim.metrics.traffic_span import TrafficSpan
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
-CLEARANCE = 6.0
+_CLEARANCE = 6.0
 """Way beyond its length after which a vehicle has left the junction's last crossing with others [m]."""
 
 UNKNOWN = -1
@@ -162,7 +162,7 @@ def _rows_at_junctions(fronts: Fronts, inside: NDArray[np.bool_]) -> Numbers:
     travelled = np.cumsum(np.hypot(*_steps(fronts.x[order], fronts.y[order])))
     last_inner = np.maximum.accumulate(np.where(inner, number, -1))
     been = last_inner >= np.maximum.accumulate(np.where(first, number, 0))
-    wanted = been & (travelled - travelled[last_inner] <= fronts.length[order] + CLEARANCE)
+    wanted = been & (travelled - travelled[last_inner] <= fronts.length[order] + _CLEARANCE)
     wanted[1:] |= wanted[:-1] & ~first[1:]
     wanted[:-1] |= inner[1:] & ~first[1:]
     rows: Numbers = order[wanted]

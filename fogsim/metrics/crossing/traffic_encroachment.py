@@ -13,7 +13,7 @@ from fogsim.metrics.crossing.way_kernels import crossing_pieces
 from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
-LEAST_ANGLE = math.radians(20.0)
+_LEAST_ANGLE = math.radians(20.0)
 """Angle between two ways from which on they cross, instead of going side by side or ahead of one another [rad]."""
 
 _CORNERS = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
@@ -46,7 +46,7 @@ def find_encroachments(tracks: Tracks) -> Encroachments:
     fronts = tracks.fronts
     places = np.stack((fronts.x, fronts.y), axis=1)
     begin, way = places[piece - 1], places[piece] - places[piece - 1]
-    least_sine = math.sin(LEAST_ANGLE)
+    least_sine = math.sin(_LEAST_ANGLE)
     found = crossing_pieces(begin, way, tracks.junction[piece], fronts.vehicle[piece], least_sine)
     numbers, parts = found[:, :2].astype(np.intp), found[:, 2:]
     row = piece[numbers]
@@ -81,13 +81,13 @@ def _alike(lanes: NDArray[np.intp]) -> NDArray[np.bool_]:
     return alike
 
 
-MEMORY = 10.0
+_MEMORY = 10.0
 """Time after which a vehicle that has left is no more compared with those who come [s]."""
 
-CONFLICT = 5.0
+_CONFLICT = 5.0
 """Post-encroachment time up to which SSAM by default calls an encounter a conflict [s] (FHWA-HRT-08-051)."""
 
-SERIOUS = 1.0
+_SERIOUS = 1.0
 """Time below which it is critical [s] (Várhelyi, Accident Analysis and Prevention 30 (1998), 731-742)."""
 
 
@@ -117,7 +117,7 @@ class TrafficEncroachment(TrafficMetric):
             self._spans, self._since = [span], now
             return
         self._spans.append(span)
-        if now - self._since >= MEMORY:
+        if now - self._since >= _MEMORY:
             self._compare()
             self._since = now
 
@@ -131,12 +131,12 @@ class TrafficEncroachment(TrafficMetric):
         columns = (column.tolist() for column in find_encroachments(tracks))
         for first, second, junction, time in zip(*columns, strict=True):
             pair = min(first, second), max(first, second), junction
-            self._least[pair] = min(time, self._least.get(pair, MEMORY))
+            self._least[pair] = min(time, self._least.get(pair, _MEMORY))
         now = rows.time.max()
         kept = rows.time == now
         inside = np.flatnonzero(tracks.junction >= 0)
         left = tracks.time_at(inside, tracks.travelled[inside] + tracks.fronts.length[inside])
-        late = inside[left > now - MEMORY]
+        late = inside[left > now - _MEMORY]
         since = np.full(len(tracks.start), len(tracks.track))
         np.minimum.at(since, tracks.track[late], late - 1)
         kept[tracks.source[np.arange(len(tracks.track)) >= since[tracks.track]]] = True
@@ -146,10 +146,10 @@ class TrafficEncroachment(TrafficMetric):
         """Say how closely they followed one another."""
         if self._junctions.learn(()) and self._spans:
             self._compare()
-        times = np.array([time for time in self._least.values() if time < MEMORY])
+        times = np.array([time for time in self._least.values() if time < _MEMORY])
         rate = self._exposure.per_kilometre
         return {
             "traffic_minimum_post_encroachment_time_s": float(times.min()) if len(times) else None,
-            "traffic_post_encroachments_below_5_s_per_vehicle_km": rate(int((times <= CONFLICT).sum())),
-            "traffic_post_encroachments_below_1_s_per_vehicle_km": rate(int((times <= SERIOUS).sum())),
+            "traffic_post_encroachments_below_5_s_per_vehicle_km": rate(int((times <= _CONFLICT).sum())),
+            "traffic_post_encroachments_below_1_s_per_vehicle_km": rate(int((times <= _SERIOUS).sum())),
         }

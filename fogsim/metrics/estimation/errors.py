@@ -20,13 +20,13 @@ def relative_error(visibility: float, truth: float) -> float:
     return abs(visibility - truth) / truth * 100.0
 
 
-LONGEST_LAG = 30.0
+_LONGEST_LAG = 30.0
 """Latencies are looked for up to this [s]."""
 
 _MOST_WAITING = 64
 """Beliefs that are gathered before they are judged: one after another they cost half of one in each step."""
 
-LEAST_CHANGE = 0.1
+_LEAST_CHANGE = 0.1
 """Standard deviation of ln V over a run above which a latency can be measured; a tenth is a change of 10 %."""
 
 
@@ -70,10 +70,10 @@ class Errors:
         if len(self._estimates) < 2:
             return None
         (when, estimate), (times, truths) = np.array(self._estimates).T, np.array(self._truths).T
-        if truths.std() < LEAST_CHANGE:
+        if truths.std() < _LEAST_CHANGE:
             return None
         # At every lag the same part of the run is compared: that before which the longest lag reaches.
-        longest = min(LONGEST_LAG, 0.5 * (times[-1] - times[0]))
+        longest = min(_LONGEST_LAG, 0.5 * (times[-1] - times[0]))
         settled = when >= times[0] + longest
         if not settled.any():
             return None

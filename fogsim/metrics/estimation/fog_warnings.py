@@ -13,7 +13,7 @@ from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of,
 from fogsim.units import visibility_from_extinction
 from fogsim.values import DriverWarning, FogBank, Step
 
-LONGEST_LEAD = 1000.0
+_LONGEST_LEAD = 1000.0
 """Distance before a bank from which on a warning counts as one of it [m]."""
 
 REASON_WITHIN = 500.0
@@ -45,7 +45,7 @@ class FogWarnings:
             self._times[warning] += sample.elapsed
         is_fog = warning is DriverWarning.FOG_AHEAD
         # A warning is decided after the step before.
-        is_reason = has_reason(step)
+        is_reason = _has_reason(step)
         if is_fog and self._before is not warning and not (is_reason or self._had_reason):
             self._false += 1
         self._before, self._had_reason = warning, is_reason
@@ -55,7 +55,7 @@ class FogWarnings:
 
     def _enter_banks(self, step: Step) -> None:
         """Note the lead of each bank once half its density is reached."""
-        while self._warned and self._warned[0] < step.route_position - LONGEST_LEAD:
+        while self._warned and self._warned[0] < step.route_position - _LONGEST_LEAD:
             self._warned.popleft()
         for number, bank in enumerate(_banks(step)):
             along = _along(step, bank)
@@ -79,7 +79,7 @@ class FogWarnings:
         }
 
 
-def has_reason(step: Step) -> bool:
+def _has_reason(step: Step) -> bool:
     """Whether the truth gives reason to warn of fog ahead.
 
     That is: here or up to `REASON_WITHIN` ahead, one cannot stop within sight at the present speed, or the extinction

@@ -14,30 +14,30 @@ from fogsim.values import Camera
 
 Floats = NDArray[np.float64]
 
-NEAREST, FARTHEST, STEP = 4.0, 24.0, 0.1
+_NEAREST, FARTHEST, STEP = 4.0, 24.0, 0.1
 """Ends of the piece of road that is compared, and its sampling [m by the assumed camera]."""
 
-HALF_WIDTH, COLUMNS = 2.2, 45
+_HALF_WIDTH, COLUMNS = 2.2, 45
 """Half of its width [m], which includes the lines of the lane, and samples across it."""
 
-SMOOTH = 3.0
+_SMOOTH = 3.0
 """Standard deviation along the road of what is taken away as shading [m]."""
 
-KERNEL, LEAST_ROWS = 181, 40
+_KERNEL, _LEAST_ROWS = 181, 40
 """Rows of the kernel that smooths, and of the overlap of two images below which they are not compared."""
 
-LEAST_WAY, MOST_WAY = 1.5, 5.0
+_LEAST_WAY, _MOST_WAY = 1.5, 5.0
 """Ways between two images that are compared [m]: shorter ones are inexact, longer ones leave less of the road in both
 and reach the period of the lane marks."""
 
-FACTORS = np.geomspace(0.5, 2.0, 139)
+_FACTORS = np.geomspace(0.5, 2.0, 139)
 """Assumed over true distances that are tried [-], 1 % apart."""
 
-LEAST_PAIRS, LEAST_CORRELATION, CLOSE = 5, 0.3, 0.15
+_LEAST_PAIRS, _LEAST_CORRELATION, _CLOSE = 5, 0.3, 0.15
 """Least pairs of images and mean correlation with a result [-], and how close in ln to the best factor those of
 single pairs count [-]."""
 
-LEAST_DEVIATION = 0.03
+_LEAST_DEVIATION = 0.03
 """Relative standard deviation that the track's own speed leaves at least [-]."""
 
 
@@ -53,8 +53,8 @@ class RoadMotion:
     """Comparison of images along a drive, seen as from above by an assumed camera."""
 
     def __init__(self, camera: Camera) -> None:
-        distance = np.arange(NEAREST, FARTHEST, STEP)
-        aside = np.linspace(-HALF_WIDTH, HALF_WIDTH, COLUMNS)
+        distance = np.arange(_NEAREST, FARTHEST, STEP)
+        aside = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, COLUMNS)
         below = camera.row_distance / distance[:, None]
         columns = camera.principal_point[0] + aside * below / camera.mount_height
         rows = (camera.horizon_row + below) * np.ones_like(columns)
@@ -67,7 +67,7 @@ class RoadMotion:
         """Add an image that was taken after a way from the start of the drive [m]."""
         texture = self._texture(image)
         for before, seen in reversed(self._earlier):
-            if LEAST_WAY <= way - before <= MOST_WAY:
+            if _LEAST_WAY <= way - before <= _MOST_WAY:
                 self._correlations.append(self._correlation(seen, texture, way - before))
                 break
         self._earlier.append((way, texture))
@@ -79,34 +79,34 @@ class RoadMotion:
 
     def scale(self) -> RoadScale | None:
         """Scale in which the road moves as the vehicle does; None if too little moved."""
-        if len(self._correlations) < LEAST_PAIRS:
+        if len(self._correlations) < _LEAST_PAIRS:
             return None
         correlations = np.stack(self._correlations)
         mean = correlations.mean(axis=0)
-        best = math.log(FACTORS[int(mean.argmax())])
-        if mean.max() < LEAST_CORRELATION or not 0 < int(mean.argmax()) < FACTORS.size - 1:
+        best = math.log(_FACTORS[int(mean.argmax())])
+        if mean.max() < _LEAST_CORRELATION or not 0 < int(mean.argmax()) < _FACTORS.size - 1:
             return None
-        single = np.log(FACTORS[correlations.argmax(axis=1)])
-        single = single[np.abs(single - best) < CLOSE]
+        single = np.log(_FACTORS[correlations.argmax(axis=1)])
+        single = single[np.abs(single - best) < _CLOSE]
         middle = float(np.median(single)) if single.size else best
-        scatter = 1.4826 * float(np.median(np.abs(single - middle))) if single.size else CLOSE
-        return RoadScale(math.exp(-middle), math.hypot(LEAST_DEVIATION, scatter / math.sqrt(max(single.size, 1))))
+        scatter = 1.4826 * float(np.median(np.abs(single - middle))) if single.size else _CLOSE
+        return RoadScale(math.exp(-middle), math.hypot(_LEAST_DEVIATION, scatter / math.sqrt(max(single.size, 1))))
 
     def _texture(self, image: Pixels) -> Floats:
         """Road from above without its shading (n, columns); zero where the image does not show it."""
         grey: Any = image if image.ndim == 2 else image[:, :, 1]
         above = cv2.remap(np.asarray(grey, np.float32), *self._places, cv2.INTER_LINEAR)
-        smooth = cv2.GaussianBlur(above, (1, KERNEL), sigmaX=1.0, sigmaY=SMOOTH / STEP)
+        smooth = cv2.GaussianBlur(above, (1, _KERNEL), sigmaX=1.0, sigmaY=_SMOOTH / STEP)
         return np.asarray((above - smooth) * self._shown[:, None], np.float64)
 
     def _correlation(self, before: Floats, after: Floats, way: float) -> Floats:
         """Correlation of two textures by factor: what was at x + way is at x now."""
         rows = np.arange(before.shape[0])
-        found = np.zeros(FACTORS.size)
-        for index, shift in enumerate(way * FACTORS / STEP):
+        found = np.zeros(_FACTORS.size)
+        for index, shift in enumerate(way * _FACTORS / STEP):
             place = rows[: max(before.shape[0] - math.ceil(shift) - 1, 0)] + shift
             first = place.astype(int)
-            if first.size < LEAST_ROWS:
+            if first.size < _LEAST_ROWS:
                 continue
             share = (place - first)[:, None]
             moved = (1.0 - share) * before[first] + share * before[first + 1]

@@ -16,7 +16,7 @@ from fogsim.units import KMH_PER_MPS
 USUAL_HEIGHT, USUAL_DIAMETER = 2.2, 0.6
 """Default height of a face's middle above the road, and its default size [m]."""
 
-WGS84 = ("CRS84", "4326")
+_WGS84 = ("CRS84", "4326")
 """Suffixes of the names of coordinate frames that GeoJSON may use."""
 
 
@@ -88,7 +88,7 @@ def _refuse_other_frames(path: Path, content: Mapping[str, Any]) -> None:
         )
     frame = content.get("crs") or "CRS84"
     name = _block(_block(frame).get("properties")).get("name", frame)
-    if not isinstance(name, str) or not name.endswith(WGS84):
+    if not isinstance(name, str) or not name.endswith(_WGS84):
         raise InputError(f"{path}: the map is in {shown(name)}; expected longitude and latitude, WGS 84 (EPSG:4326)")
 
 

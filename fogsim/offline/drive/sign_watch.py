@@ -23,10 +23,10 @@ from fogsim.values import Camera, Frame, Observation, Sign, SignLook, SignMap, S
 REACH = 250.0
 """Distance ahead up to which signs are searched [m]."""
 
-OWN_DRIVE = PoseDeviation(position=2.0, height=0.4, heading=math.radians(1.0), pitch=math.radians(0.3))
+_OWN_DRIVE = PoseDeviation(position=2.0, height=0.4, heading=math.radians(1.0), pitch=math.radians(0.3))
 """Accuracy of positions from a receiver in a car and a map that was drawn from images."""
 
-FAR_AWAY = 10_000.0
+_FAR_AWAY = 10_000.0
 """Distance between track and map above which they are in different frames, or of different drives [m]."""
 
 
@@ -79,7 +79,7 @@ class SignWatch:
         self._longitude = np.array([sign.longitude for sign in signs.signs])
         self._latitude = np.array([sign.latitude for sign in signs.signs])
         self._nearest = self._nearest_positions(signs.path)
-        self._camera, self._watch = camera, Watch(camera, None, OWN_DRIVE)
+        self._camera, self._watch = camera, Watch(camera, None, _OWN_DRIVE)
         self._passed: list[SignTrack] = []
         self._images = self._outside = 0
 
@@ -174,7 +174,7 @@ class SignWatch:
             hint = ""
             if swapped.min() <= REACH:
                 hint = ": longitude and latitude are swapped in the map; GeoJSON has longitude first"
-            elif distance.min() > FAR_AWAY:
+            elif distance.min() > _FAR_AWAY:
                 hint = ": map and track are in different coordinate frames, or of different drives"
             raise InputError(
                 f"{path}: no sign lies near the track {self._track.path}; the nearest is {_far(distance.min())} "
@@ -198,7 +198,7 @@ def _apart(
 
 
 def _far(distance: float) -> str:
-    return f"{distance / 1000.0:.0f} km" if distance > FAR_AWAY else f"{distance:.0f} m"
+    return f"{distance / 1000.0:.0f} km" if distance > _FAR_AWAY else f"{distance:.0f} m"
 
 
 def watch_signs(

@@ -16,16 +16,16 @@ from fogsim.core.files.readers import number_in_text, read_text
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError, shown
 
-SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
+_SEMI_MAJOR, _FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""
 
-LONGEST_GAP = 5.0
+_LONGEST_GAP = 5.0
 """Time without a position after which the track counts as interrupted [s]."""
 
-LONGEST_TIME = 1e12
+_LONGEST_TIME = 1e12
 """Largest number in a track: time in seconds since 1970 is about 2e9."""
 
-MOVING, MOST_LOOKED_AT = 10.0, 100
+MOVING, _MOST_LOOKED_AT = 10.0, 100
 """Distance over which a direction is derived from positions [m], and number of positions before and after."""
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
@@ -63,7 +63,7 @@ class Track:
         if time < self.time[0] or after == len(self.time):
             return None
         before = max(after - 1, 0)
-        if self.time[after] - self.time[before] > LONGEST_GAP:
+        if self.time[after] - self.time[before] > _LONGEST_GAP:
             return None
         columns = (self.longitude, self.latitude, self.heading)
         return GeographicPose(*(float(np.interp(time, self.time, column)) for column in columns))
@@ -83,9 +83,9 @@ def metres_per_radian(latitude: float) -> tuple[float, float]:
     The radii of curvature at latitude φ [rad] are M = a (1 − e²) / (1 − e² sin²φ)^1.5 along the meridian and N = a /
     √(1 − e² sin²φ) across it, so that the distance east is N cos φ.
     """
-    square = FLATTENING * (2.0 - FLATTENING)
+    square = _FLATTENING * (2.0 - _FLATTENING)
     share = 1.0 - square * math.sin(latitude) ** 2
-    return SEMI_MAJOR * math.cos(latitude) / math.sqrt(share), SEMI_MAJOR * (1.0 - square) / share**1.5
+    return _SEMI_MAJOR * math.cos(latitude) / math.sqrt(share), _SEMI_MAJOR * (1.0 - square) / share**1.5
 
 
 def load_track(path: Path) -> Track:
@@ -165,7 +165,7 @@ def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[f
 
 
 def _float(where: str, name: str, text: str | None) -> float:
-    return number_in_text(where, name, text or "", -LONGEST_TIME, LONGEST_TIME)
+    return number_in_text(where, name, text or "", -_LONGEST_TIME, _LONGEST_TIME)
 
 
 def _headings(
@@ -178,8 +178,8 @@ def _headings(
     place = np.stack((east * longitude, north * latitude), axis=1)
     found = np.full(len(place), math.nan)
     for number in range(len(place)):
-        start = max(number - MOST_LOOKED_AT, 0)
-        near = place[start : number + MOST_LOOKED_AT + 1]
+        start = max(number - _MOST_LOOKED_AT, 0)
+        near = place[start : number + _MOST_LOOKED_AT + 1]
         apart = np.hypot(*(near - place[number]).T) >= 0.5 * MOVING
         before, after = np.flatnonzero(apart[: number - start]), np.flatnonzero(apart[number - start :])
         first = near[before[-1]] if before.size else place[number]

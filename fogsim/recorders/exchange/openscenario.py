@@ -11,10 +11,10 @@ from fogsim.recorders.templating import render
 from fogsim.values import Step, TrafficStep
 from fogsim.values.traffic import BOX, PEDESTRIAN
 
-REFERENCE_SHARE = 0.28
+_REFERENCE_SHARE = 0.28
 """Where the middle of a body is ahead of the rear axle, the reference point, as a share of its length [-]."""
 
-CHANGE = 0.01
+_CHANGE = 0.01
 """Change of the visibility that becomes an event of its own, as a share [-]."""
 
 FARTHEST = 100_000.0
@@ -74,11 +74,11 @@ class OpenScenarioRecorder:
             size = (length, float(traffic.width[row]), float(traffic.height[row]))
             track = self._tracks.setdefault(name, _Track(traffic.types[row], size, float(traffic.speed[row])))
             x, y, z = map(float, traffic.position[row])
-            heading, back = float(traffic.heading[row]), (0.5 + REFERENCE_SHARE) * length
+            heading, back = float(traffic.heading[row]), (0.5 + _REFERENCE_SHARE) * length
             x, y = x - back * math.cos(heading), y - back * math.sin(heading)
             track.vertices.append(_Vertex(step.time, x, y, z, heading))
         now = min(step.truth.visibility, FARTHEST)
-        if not self._visibility or abs(now / self._visibility[-1][1] - 1.0) > CHANGE:
+        if not self._visibility or abs(now / self._visibility[-1][1] - 1.0) > _CHANGE:
             self._visibility.append((step.time, now))
         if isinstance(step, Step):
             self._ego = traffic.ids[step.ego]
@@ -93,7 +93,7 @@ class OpenScenarioRecorder:
                 visibilities=self._visibility,
                 ego=self._ego,
                 end=self._end,
-                reference_share=REFERENCE_SHARE,
+                reference_share=_REFERENCE_SHARE,
                 categories=_CATEGORIES,
                 others=_OTHERS,
             )

@@ -13,7 +13,7 @@ from fogsim.recorders.protocol import Derived
 from fogsim.values import Lamp, SignalColour, Step, TrafficState, TrafficStep
 from fogsim.values.traffic import BOX, PEDESTRIAN
 
-FOG_CLASSES = ((50.0, "DENSE"), (200.0, "THICK"), (1000.0, "LIGHT"), (2000.0, "MIST"), (4000.0, "POOR_VISIBILITY"),
+_FOG_CLASSES = ((50.0, "DENSE"), (200.0, "THICK"), (1000.0, "LIGHT"), (2000.0, "MIST"), (4000.0, "POOR_VISIBILITY"),
                (10_000.0, "MODERATE_VISIBILITY"), (40_000.0, "GOOD_VISIBILITY"))  # fmt: skip
 """Upper ends of OSI's classes of visibility [m]; beyond them it is excellent (osi_environment.proto)."""
 
@@ -185,7 +185,7 @@ class OsiRecorder:
 
 def fog_class(visibility: float) -> str:
     """OSI's name of a class of visibility, without ``FOG_`` (`visibility` [m])."""
-    return next((name for end, name in FOG_CLASSES if visibility < end), "EXCELLENT_VISIBILITY")
+    return next((name for end, name in _FOG_CLASSES if visibility < end), "EXCELLENT_VISIBILITY")
 
 
 def _set_vector(vector: Any, values: Any) -> None:

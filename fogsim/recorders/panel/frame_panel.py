@@ -31,7 +31,7 @@ from fogsim.recorders.style import (
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
 from fogsim.values import Collision, DriverWarning, Estimate, FogProfile, FogReport, Lamp, Step
 
-NEAREST, FARTHEST = -100.0, 500.0
+_NEAREST, FARTHEST = -100.0, 500.0
 """Distances ahead at both ends of the chart [m]."""
 
 _TICKS = (0.0, 200.0, 400.0)
@@ -43,7 +43,7 @@ _FOOT = 12
 """Space for the distances below the curves [px]."""
 
 
-def draw_profile(
+def _draw_profile(
     size: tuple[int, int],
     axis: Axis,
     believed: FogProfile,
@@ -59,7 +59,7 @@ def draw_profile(
     draw = ImageDraw.Draw(image)
 
     def points(profile: FogProfile, share: float) -> list[tuple[float, float]]:
-        distances: Sequence[float] = np.linspace(NEAREST, FARTHEST, 49).tolist()
+        distances: Sequence[float] = np.linspace(_NEAREST, FARTHEST, 49).tolist()
         inside = [one for one in distances if profile.distance[0] <= one <= profile.distance[-1]]
         return [(_across(one, width), _up(profile.visibility_quantile(one, share), axis, height)) for one in inside]
 
@@ -73,7 +73,7 @@ def draw_profile(
         for start in range(0, len(told) - 1, 3):
             draw.line(told[start : start + 3], fill=TRUTH, width=2 * _OVERSAMPLING)
     for distance, visibility in reported:
-        if NEAREST <= distance <= FARTHEST:
+        if _NEAREST <= distance <= FARTHEST:
             x, y = _across(distance, width), _up(visibility, axis, height)
             draw.ellipse([(x - _DOT, y - _DOT), (x + _DOT, y + _DOT)], fill=ADVICE)
     chart = Image.new("RGB", size, GROUND)
@@ -87,7 +87,7 @@ def draw_profile(
 
 
 def _across(distance: float, width: int) -> float:
-    return width * (distance - NEAREST) / (FARTHEST - NEAREST)
+    return width * (distance - _NEAREST) / (FARTHEST - _NEAREST)
 
 
 def _up(visibility: float, axis: Axis, height: int) -> float:
@@ -95,8 +95,8 @@ def _up(visibility: float, axis: Axis, height: int) -> float:
     return height - margin - axis.height(visibility) * (height - 2 * margin)
 
 
-PANEL_WIDTH = 384
-FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
+_PANEL_WIDTH = 384
+FRAME_WIDTH = camera_picture.WIDTH + _PANEL_WIDTH
 FRAME_HEIGHT = camera_picture.HEIGHT
 
 PICTURE_SIZE = camera_picture.WIDTH, camera_picture.HEIGHT
@@ -178,7 +178,7 @@ class FramePanel:
             chart = chart.copy()
             size = (half - 8, chart.height)
             believed, true = step.belief.profile, step.truth.profile
-            chart.paste(draw_profile(size, _VISIBILITY_AXIS, believed, true, self._reported(step)), (0, 0))
+            chart.paste(_draw_profile(size, _VISIBILITY_AXIS, believed, true, self._reported(step)), (0, 0))
         frame.paste(chart, (_LEFT, 300))
         frame.paste(self._speed.draw(), (_LEFT, 398))
 

@@ -9,7 +9,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Frame, Step
 from fogsim.values.camera_response import eight_bit
 
-FOGGY = 500.0
+_FOGGY = 500.0
 """Visibility from which on fog takes too little contrast to be undone [m]."""
 
 BRIGHT = 10.0
@@ -24,7 +24,7 @@ def draw_restored_picture(step: Step) -> Image.Image:
     picture, frame = draw_camera_picture(step), step.observation.frame
     light = step.observation.light
     believed = step.belief.visibility
-    if not isinstance(frame, Frame) or believed >= FOGGY or (light is not None and light.illuminance < BRIGHT):
+    if not isinstance(frame, Frame) or believed >= _FOGGY or (light is not None and light.illuminance < BRIGHT):
         return picture
     restored = restore_contrast(frame.image, frame.camera, OPTICAL_DEPTH_AT_VISIBILITY / believed, tone_map=True)
     scaled = scale_image(eight_bit(restored.image, frame.camera.bits), WIDTH, HEIGHT)

@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders.style import GROUND, LINE, MUTED, WELL, Colour, font
 
-WINDOW = 60.0
+_WINDOW = 60.0
 """Time that a chart shows [s]."""
 
 _SPACING = 0.25
@@ -81,7 +81,7 @@ class StripChart:
         self._latest = (time, values)
         if not self._rows or time - self._rows[-1][0] >= _SPACING - 1e-9:
             self._rows.append(self._latest)
-        while self._rows and self._rows[0][0] < time - WINDOW - 2 * _SPACING:
+        while self._rows and self._rows[0][0] < time - _WINDOW - 2 * _SPACING:
             self._rows.popleft()
             self._gone += 1
 
@@ -132,7 +132,7 @@ class StripChart:
 
     def _x(self, time: float) -> float:
         now = time if self._latest is None else self._latest[0]
-        return self._size[0] * (1.0 - (now - time) / WINDOW)
+        return self._size[0] * (1.0 - (now - time) / _WINDOW)
 
     def _y(self, value: float) -> float:
         margin = 3 * _OVERSAMPLING

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from fogsim.errors import MissingDependencyError
 from fogsim.render.protocol import RenderError
 
-OLDEST = (3, 3)
+_OLDEST = (3, 3)
 """Oldest version of OpenGL that will do: copies of shapes, integer pictures."""
 
 _LIBRARIES = {"egl": ("EGL", "GL"), "osmesa": ("OSMesa",)}
@@ -85,8 +85,8 @@ def _only_context() -> Context:
         raise MissingDependencyError(f"OpenGL or EGL could not be loaded ({_one_line(error)}); {_ADVICE}") from error
     version = (int(GL.glGetIntegerv(GL.GL_MAJOR_VERSION)), int(GL.glGetIntegerv(GL.GL_MINOR_VERSION)))
     renderer, text = (GL.glGetString(name).decode("ascii", "replace") for name in (GL.GL_RENDERER, GL.GL_VERSION))
-    if version < OLDEST:
-        wanted = ".".join(map(str, OLDEST))
+    if version < _OLDEST:
+        wanted = ".".join(map(str, _OLDEST))
         raise MissingDependencyError(f"OpenGL {wanted} or newer is needed, {renderer} offers {text}; {_ADVICE}")
     software = any(name in renderer.lower() for name in _SOFTWARE)
     return Context(platform, os.getpid(), version, software, f"OpenGL ({_NAMES[way]}) {text}, {renderer}")

@@ -11,7 +11,7 @@ from OpenGL import GL
 
 from fogsim.render.opengl.packing import COPY, CORNER
 
-INDIRECT = (4, 3)
+_INDIRECT = (4, 3)
 """Version of OpenGL from which on all meshes are drawn by one call."""
 
 _AT_ONCE = 20_000
@@ -30,7 +30,7 @@ class MeshStore:
     """All meshes of a scene in one vertex array, drawn in any number of copies."""
 
     def __init__(self, corners: NDArray[np.void], version: tuple[int, int]) -> None:
-        self._at_once = version >= INDIRECT
+        self._at_once = version >= _INDIRECT
         self._array = int(GL.glGenVertexArrays(1))
         self._buffers = [int(name) for name in GL.glGenBuffers(3)]
         fixed, self._copies, self._commands = self._buffers

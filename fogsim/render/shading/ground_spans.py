@@ -7,7 +7,7 @@ from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Picture, Spans, Wide
 from fogsim.render.shading.texture import Row
 
-INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+_INSTANCE, _LEAST, _MOST, _DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 _GAP = 16  # pixels between spans of a row that may show something else
 _SAME = 0.005  # difference of depths up to which two planes are taken as one, over the depth
 
@@ -31,19 +31,19 @@ def next_coplanar_spans(
             number += 1
             continue
         v, start, row = np.uint64(span[number, 0]), span[number, 1], float(span[number, 0])
-        rest = surface[k, DEPTH] * start + surface[k, DEPTH + 1] * row + surface[k, DEPTH + 2]
+        rest = surface[k, _DEPTH] * start + surface[k, _DEPTH + 1] * row + surface[k, _DEPTH + 2]
         if members == 0:
             first = number
         else:
             f = span[first, 3]
-            before = surface[f, DEPTH] * start + surface[f, DEPTH + 1] * row + surface[f, DEPTH + 2]
+            before = surface[f, _DEPTH] * start + surface[f, _DEPTH + 1] * row + surface[f, _DEPTH + 2]
             if span[number, 0] != span[first, 0] or start > end + _GAP or abs(before - rest) > _SAME * rest:
                 break
         member[members] = number
         members, end = members + 1, span[number, 2]
-        name = np.int32(surface[k, INSTANCE])
-        least, most = np.float32(surface[k, LEAST]), np.float32(surface[k, MOST])
-        slope, level = np.float32(surface[k, DEPTH]), np.float32(rest)
+        name = np.int32(surface[k, _INSTANCE])
+        least, most = np.float32(surface[k, _LEAST]), np.float32(surface[k, _MOST])
+        slope, level = np.float32(surface[k, _DEPTH]), np.float32(rest)
         x, y = np.float32((start - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
         for i in range(np.uint64(end - start)):

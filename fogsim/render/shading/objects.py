@@ -6,10 +6,10 @@ from fogsim.core.jit import kernel
 from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Light, Picture, Spans, Wide
 
-INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
-LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
-RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
-OBJECT = layout.OBJECT
+_INSTANCE, _LEAST, _MOST, _DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+LIGHT, _RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
+_RESPONSE_LOW, _RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
+_OBJECT = layout.OBJECT
 
 
 @kernel
@@ -21,13 +21,13 @@ def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> Non
     per_focal, one = np.float32(1.0 / lens[0]), np.float32(1.0)
     for number in range(count):
         k = span[number, 3]
-        if kinds[k] != OBJECT:
+        if kinds[k] != _OBJECT:
             continue
         v, begin, end = np.uint64(span[number, 0]), span[number, 1], span[number, 2]
-        row, name = float(span[number, 0]), np.int32(surface[k, INSTANCE])
-        least, most = np.float32(surface[k, LEAST]), np.float32(surface[k, MOST])
-        slope = np.float32(surface[k, DEPTH])
-        rest = np.float32(surface[k, DEPTH] * begin + surface[k, DEPTH + 1] * row + surface[k, DEPTH + 2])
+        row, name = float(span[number, 0]), np.int32(surface[k, _INSTANCE])
+        least, most = np.float32(surface[k, _LEAST]), np.float32(surface[k, _MOST])
+        slope = np.float32(surface[k, _DEPTH])
+        rest = np.float32(surface[k, _DEPTH] * begin + surface[k, _DEPTH + 1] * row + surface[k, _DEPTH + 2])
         x, y = np.float32((begin - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
         length = np.uint64(end - begin)
@@ -49,11 +49,11 @@ def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> Non
             radiance[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high)
             radiance[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high)
         if lamplight:
-            red, red_step = _along(surface, k, RESPONSE, begin, row)
-            green, green_step = _along(surface, k, RESPONSE + 3, begin, row)
-            blue, blue_step = _along(surface, k, RESPONSE + 6, begin, row)
-            red_low, green_low, blue_low = _numbers(surface, k, RESPONSE_LOW)
-            red_high, green_high, blue_high = _numbers(surface, k, RESPONSE_HIGH)
+            red, red_step = _along(surface, k, _RESPONSE, begin, row)
+            green, green_step = _along(surface, k, _RESPONSE + 3, begin, row)
+            blue, blue_step = _along(surface, k, _RESPONSE + 6, begin, row)
+            red_low, green_low, blue_low = _numbers(surface, k, _RESPONSE_LOW)
+            red_high, green_high, blue_high = _numbers(surface, k, _RESPONSE_HIGH)
             for i in range(length):
                 step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
                 far = distance[v, u]

@@ -102,7 +102,7 @@ def _background(v: int, begin: int, end: int, rays: Wide, terrain: bool) -> tupl
     return surface, split
 
 
-DEPTH, WHITE, COLOUR, TERRAIN = layout.DEPTH, layout.WHITE, layout.COLOUR, layout.TERRAIN
+_DEPTH, _WHITE, _COLOUR, _TERRAIN = layout.DEPTH, layout.WHITE, layout.COLOUR, layout.TERRAIN
 _DRY = (1.5, 0.4, -0.3)  # how much more of each channel the large patches of dry grass change
 
 
@@ -112,14 +112,14 @@ def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row,
     span, surface, rays, member = spans.span, spans.surface, lens.rays, work.member
     texture, tint, radiance, response = work.texture, work.tint, picture.radiance, picture.response
     dry, drier, driest = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])
-    members, number = next_coplanar_spans(TERRAIN, spans, 0, count, lens.lens, work, picture)
+    members, number = next_coplanar_spans(_TERRAIN, spans, 0, count, lens.lens, work, picture)
     while members > 0:
         k, row = span[member[0], 3], float(span[member[0], 0])
         begin, end = span[member[0], 1], span[member[members - 1], 2]
-        plane = surface[k, DEPTH], surface[k, DEPTH + 1], surface[k, DEPTH + 2]
+        plane = surface[k, _DEPTH], surface[k, _DEPTH + 1], surface[k, _DEPTH + 2]
         set_texture(GRASS, plane, row, begin, end, lens, noise, work)
-        v, white = np.uint64(span[member[0], 0]), surface[k, WHITE]
-        red, green, blue = surface[k, COLOUR], surface[k, COLOUR + 1], surface[k, COLOUR + 2]
+        v, white = np.uint64(span[member[0], 0]), surface[k, _WHITE]
+        red, green, blue = surface[k, _COLOUR], surface[k, _COLOUR + 1], surface[k, _COLOUR + 2]
         r, g, b = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
         # Seen and lit under the same angle to the ground.
         middle = 0.5 * (begin + end)
@@ -138,7 +138,7 @@ def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row,
                 for u in range(left, right):
                     response[v, u, 0], response[v, u, 1] = red * texture[u], green * texture[u]
                     response[v, u, 2] = blue * texture[u]
-        members, number = next_coplanar_spans(TERRAIN, spans, number, count, lens.lens, work, picture)
+        members, number = next_coplanar_spans(_TERRAIN, spans, number, count, lens.lens, work, picture)
 
 
 _UNUSED = 2  # references to an array that only its list and the question itself hold

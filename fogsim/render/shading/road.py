@@ -15,9 +15,9 @@ from fogsim.render.shading.pavement import Asphalt, mean_of_stretches, reflectan
 from fogsim.render.shading.texture import ASPHALT, Row, set_texture
 from fogsim.render.vectors import Vector
 
-DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
-HALF_WIDTH, LINES, COLOUR, ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
-START = layout.START
+_DEPTH, _ALONG, _ACROSS, _WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
+_HALF_WIDTH, _LINES, _COLOUR, _ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
+_START = layout.START
 
 LINE_REFLECTANCE = 0.6
 """Reflectance of painted lines."""
@@ -25,10 +25,10 @@ LINE_REFLECTANCE = 0.6
 _TRACK, _TRACK_WIDTH = 0.85, 0.28  # wheel tracks next to a lane's middle [m]
 _PIECE = 64  # pixels of a row over which the reflectance by angle, and that along the road, are linear
 
-ROAD_RESPONSE = 0.0125
+_ROAD_RESPONSE = 0.0125
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
 
-LINE_RESPONSE = 0.15
+_LINE_RESPONSE = 0.15
 """That of its painted lines; dry ones have 0.1 … 0.3."""
 
 
@@ -38,16 +38,16 @@ def shade_road(
 ) -> None:
     """Shade the spans of road, and set their distances and instance ids."""
     span, surface, member = spans.span, spans.surface, work.member
-    members, number = next_coplanar_spans(ROAD, spans, 0, count, lens.lens, work, picture)
+    members, number = next_coplanar_spans(_ROAD, spans, 0, count, lens.lens, work, picture)
     while members > 0:
         k, row = span[member[0], 3], float(span[member[0], 0])
         begin, end = span[member[0], 1], span[member[members - 1], 2]
-        plane = surface[k, DEPTH], surface[k, DEPTH + 1], surface[k, DEPTH + 2]
+        plane = surface[k, _DEPTH], surface[k, _DEPTH + 1], surface[k, _DEPTH + 2]
         set_texture(ASPHALT, plane, row, begin, end, lens, noise, work)
         _set_share(plane, row, begin, end, lens.lens, asphalt, work)
         _pave(members, spans, asphalt, work, picture)
         _paint(members, spans, work, picture)
-        members, number = next_coplanar_spans(ROAD, spans, number, count, lens.lens, work, picture)
+        members, number = next_coplanar_spans(_ROAD, spans, number, count, lens.lens, work, picture)
 
 
 @kernel
@@ -84,17 +84,17 @@ def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Pict
         number = member[place]
         k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
         begin, size = np.uint64(span[number, 1]), np.uint64(span[number, 2] - span[number, 1])
-        zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
-        tx, ty = surface[k, ACROSS], surface[k, ACROSS + 1]
-        base = tx * span[number, 1] + ty * row + surface[k, ACROSS + 2]
+        zx, zy = surface[k, _DEPTH], surface[k, _DEPTH + 1]
+        tx, ty = surface[k, _ACROSS], surface[k, _ACROSS + 1]
+        base = tx * span[number, 1] + ty * row + surface[k, _ACROSS + 2]
         middle = size // np.uint64(2)
         z = np.float64(depth[begin + middle])
         across = (base + tx * float(middle)) * z
         spread = abs(z * (tx - across * zx)) + abs(z * (ty - across * zy))
         width = np.float32(1.0 / (_TRACK_WIDTH + 0.5 * spread))
         darker = np.float32(asphalt.tracks * _TRACK_WIDTH) * width
-        rest, slope, white = np.float32(base), np.float32(tx), surface[k, WHITE]
-        red, green, blue = surface[k, COLOUR], surface[k, COLOUR + 1], surface[k, COLOUR + 2]
+        rest, slope, white = np.float32(base), np.float32(tx), surface[k, _WHITE]
+        red, green, blue = surface[k, _COLOUR], surface[k, _COLOUR + 1], surface[k, _COLOUR + 2]
         r, g, b = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
         for i in range(size):
             column = begin + i
@@ -108,7 +108,7 @@ def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Pict
             seen = texture[u] * share[u]
             radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * seen, g * seen, b * seen
         if len(response) > 0:
-            per_mean = 3.0 * ROAD_RESPONSE / max(red + green + blue, 3e-6)
+            per_mean = 3.0 * _ROAD_RESPONSE / max(red + green + blue, 3e-6)
             r, g, b = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
             for u in range(begin, np.uint64(span[number, 2])):
                 response[v, u, 0], response[v, u, 1], response[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
@@ -117,16 +117,16 @@ def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Pict
 @kernel
 def _mend(surface: Wide, k: int, row: float, begin: int, end: int, asphalt: Asphalt, share: Array) -> None:
     """Let a span's reflectance be that of older and newer asphalt along the road."""
-    zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
-    sx, sy = surface[k, ALONG], surface[k, ALONG + 1]
-    rest, base = zy * row + surface[k, DEPTH + 2], sy * row + surface[k, ALONG + 2]
+    zx, zy = surface[k, _DEPTH], surface[k, _DEPTH + 1]
+    sx, sy = surface[k, _ALONG], surface[k, _ALONG + 1]
+    rest, base = zy * row + surface[k, _DEPTH + 2], sy * row + surface[k, _ALONG + 2]
     here, first = np.float32(1.0), begin
     # From one node to the next; the first one only begins.
     for node in range(begin // _PIECE * _PIECE, end + _PIECE, _PIECE):
         z = 1.0 / max(zx * node + rest, 1e-9)
         along = (sx * node + base) * z
         extent = z * max(abs(sx - along * zx), abs(sy - along * zy))
-        mean = mean_of_stretches(asphalt.stretches, surface[k, START] + along, extent)
+        mean = mean_of_stretches(asphalt.stretches, surface[k, _START] + along, extent)
         there = np.float32(max(1.0 + asphalt.repairs * mean, 0.2))
         change = (there - here) / np.float32(_PIECE)
         for u in range(np.uint64(first), np.uint64(min(max(node, first), end))):
@@ -139,21 +139,21 @@ def _paint(members: int, spans: Spans, work: Row, picture: Picture) -> None:
     """Lines on the members of a row of spans, where they come near one."""
     span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
     radiance, response, one = picture.radiance, picture.response, np.float32(1.0)
-    lamplight, paint_response = len(response) > 0, np.float32(LINE_RESPONSE)
+    lamplight, paint_response = len(response) > 0, np.float32(_LINE_RESPONSE)
     for place in range(members):
         number = member[place]
         k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
-        codes, half_lane = int(surface[k, LINES]), surface[k, HALF_WIDTH]
+        codes, half_lane = int(surface[k, _LINES]), surface[k, _HALF_WIDTH]
         if codes == 0:
             continue
         begin, size = span[number, 1], span[number, 2] - span[number, 1]
-        zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
-        sx, sy = surface[k, ALONG], surface[k, ALONG + 1]
-        tx, ty = surface[k, ACROSS], surface[k, ACROSS + 1]
-        s_base = sx * begin + sy * row + surface[k, ALONG + 2]
-        t_base = tx * begin + ty * row + surface[k, ACROSS + 2]
-        base = zx * begin + zy * row + surface[k, DEPTH + 2]
-        paint = np.float32(surface[k, WHITE] * LINE_REFLECTANCE)
+        zx, zy = surface[k, _DEPTH], surface[k, _DEPTH + 1]
+        sx, sy = surface[k, _ALONG], surface[k, _ALONG + 1]
+        tx, ty = surface[k, _ACROSS], surface[k, _ACROSS + 1]
+        s_base = sx * begin + sy * row + surface[k, _ALONG + 2]
+        t_base = tx * begin + ty * row + surface[k, _ACROSS + 2]
+        base = zx * begin + zy * row + surface[k, _DEPTH + 2]
+        paint = np.float32(surface[k, _WHITE] * LINE_REFLECTANCE)
         for edge in range(2):
             code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
             if code == 0:

@@ -22,12 +22,12 @@ _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SH
 _PER_PI = 1.0 / math.pi
 _WHITE_SHEETING = 0.66  # its reflectance
 
-INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
-LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
-RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
-ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
-HALF_WIDTH, LINES, COLOUR, START = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.START
-OBJECT, ROAD, TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
+_INSTANCE, _LEAST, _MOST, _DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+LIGHT, _RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
+_RESPONSE_LOW, _RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
+_ALONG, _ACROSS, _WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
+_HALF_WIDTH, _LINES, _COLOUR, _START = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.START
+_OBJECT, ROAD, _TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
 
 
 @kernel
@@ -63,12 +63,12 @@ def retroreflection(distance: float) -> float:
 def set_background_surfaces(lens: Lens, light: Light, spans: Spans) -> None:
     """Set the numbers of sky and terrain."""
     kind, surface, height = spans.kind, spans.surface, lens.eye[2] - light.terrain[0]
-    kind[0], surface[0, INSTANCE] = layout.SKY, 0
-    kind[1], surface[1, INSTANCE], surface[1, WHITE] = TERRAIN, 1, light.white
-    surface[1, LEAST], surface[1, MOST] = 0.0, np.inf
+    kind[0], surface[0, _INSTANCE] = layout.SKY, 0
+    kind[1], surface[1, _INSTANCE], surface[1, _WHITE] = _TERRAIN, 1, light.white
+    surface[1, _LEAST], surface[1, _MOST] = 0.0, np.inf
     for column in range(3):
-        surface[1, DEPTH + column] = -lens.rays[2, column] / height
-        surface[1, COLOUR + column] = light.terrain[1 + column]
+        surface[1, _DEPTH + column] = -lens.rays[2, column] / height
+        surface[1, _COLOUR + column] = light.terrain[1 + column]
 
 
 @kernel
@@ -88,7 +88,7 @@ def set_surfaces(
         face = first_face[mesh[copy]] + triangle_of[number] - first[copy]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         kind, own = surface_of[i], integers[copy, 16]
-        surface[number, INSTANCE] = own if own != 0 else vertex_instance[i]
+        surface[number, _INSTANCE] = own if own != 0 else vertex_instance[i]
         turn = _column(record, copy, 0), _column(record, copy, 1), _column(record, copy, 2)
         place = _column(record, copy, 3)
         p, q, r = (
@@ -106,10 +106,10 @@ def set_surfaces(
         a = unit(columns_times(straight, row(normals, i)))
         if kind == _ROAD:
             kinds[number] = ROAD
-            surface[number, WHITE] = light.white * light_share(a[0], a[1], a[2], light.vertical, light.below)
+            surface[number, _WHITE] = light.white * light_share(a[0], a[1], a[2], light.vertical, light.below)
             _set_lane(surface, number, meshes.road, colours, (i, j, k), planes)
             continue
-        kinds[number] = OBJECT
+        kinds[number] = _OBJECT
         b = unit(columns_times(straight, row(normals, j)))
         c = unit(columns_times(straight, row(normals, k)))
         paint = record[copy, 12], record[copy, 13], record[copy, 14]
@@ -163,8 +163,8 @@ def _set_depth(surface: Wide, number: int, corners: Triple, pinhole: Vector) -> 
         _over_pixels(b, scale, focal, u0, v0, edge_on),
         _over_pixels(c, scale, focal, u0, v0, edge_on),
     )
-    surface[number, LEAST], surface[number, MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
-    _blend(surface, number, DEPTH, (1.0, 1.0, 1.0), planes)
+    surface[number, _LEAST], surface[number, _MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
+    _blend(surface, number, _DEPTH, (1.0, 1.0, 1.0), planes)
     return planes
 
 
@@ -182,12 +182,12 @@ def _set_lane(
     """Set where a triangle lies on its lane, the lane's lines and its mean reflectance."""
     i, j, k = corners
     start = PERIOD * math.floor(road[i, 0] / PERIOD)
-    _blend(surface, number, ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
-    _blend(surface, number, ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
+    _blend(surface, number, _ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
+    _blend(surface, number, _ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
     for channel in range(3):
-        surface[number, COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
-    surface[number, HALF_WIDTH], surface[number, LINES] = road[i, 2], road[i, 3]
-    surface[number, START] = start
+        surface[number, _COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
+    surface[number, _HALF_WIDTH], surface[number, _LINES] = road[i, 2], road[i, 3]
+    surface[number, _START] = start
 
 
 @kernel
@@ -206,7 +206,7 @@ def _set_lamp_response(
         # Of what is seen from behind, as of leaves, the other side is lit.
         side = _PER_PI if most > 0.0 else -_PER_PI
         share = max(side * facing[0], 0.0), max(side * facing[1], 0.0), max(side * facing[2], 0.0)
-    _set_colours(surface, number, (RESPONSE, RESPONSE_LOW, RESPONSE_HIGH), tints, share, (0.0, 0.0, 0.0), planes)
+    _set_colours(surface, number, (_RESPONSE, _RESPONSE_LOW, _RESPONSE_HIGH), tints, share, (0.0, 0.0, 0.0), planes)
 
 
 @kernel

@@ -31,7 +31,7 @@ class Condition:
 
 
 _USUAL = Condition("V_met 100 m, layer 250 m, eye 1.3 m, small droplets")
-CONDITIONS = (
+_CONDITIONS = (
     _USUAL,
     replace(_USUAL, name="V_met 30 m", visibility=30.0),
     replace(_USUAL, name="V_met 400 m", visibility=400.0),
@@ -67,7 +67,7 @@ def conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTab
     tables = []
     for title, kinds in (
         (f"Airlight over E/π by elevation: {_USUAL.name}", lands),
-        ("The same over land of albedo 0.1, with one thing changed", list(CONDITIONS)),
+        ("The same over land of albedo 0.1, with one thing changed", list(_CONDITIONS)),
     ):
         rows = [("", *(f"{elevation:g}°" for elevation in ELEVATIONS))]
         for kind in kinds:

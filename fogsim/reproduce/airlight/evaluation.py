@@ -22,32 +22,32 @@ from fogsim.reproduce.zhu2015_drive import SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, Frame, LeadMeasurement, Observation, View
 
-PUBLISHED = ("negru2013", "zhu2015", "huang2015_rough")
+_PUBLISHED = ("negru2013", "zhu2015", "huang2015_rough")
 EVEN_AIRLIGHT = "joint_road, even airlight"
 """The joint fit as it would be without airlight that darkens toward the road."""
 
-ROAD_METHODS = (*PUBLISHED, EVEN_AIRLIGHT, "joint_road")
+ROAD_METHODS = (*_PUBLISHED, EVEN_AIRLIGHT, "joint_road")
 CHASE_METHODS = ("lead_contrast",)
 
-FRAMES, PERIOD = 10, 1.0
+_FRAMES, _PERIOD = 10, 1.0
 """Frames of a drive alone, whose last estimate counts, and the time between [s]."""
 
-EXPOSED, BRIGHTEST = 0.65, 95.0
+_EXPOSED, _BRIGHTEST = 0.65, 95.0
 """Share of saturation at which the camera holds a percentile of the picture's luminance, as FogSim's does."""
 
-PAINTS = (0.03, 0.6)
+_PAINTS = (0.03, 0.6)
 """Reflectances of vehicles that are followed [-]."""
 
-FIRST_RANGE, LAST_RANGE, RANGE_STEP = 12.0, 100.0, 1.0
+_FIRST_RANGE, _LAST_RANGE, _RANGE_STEP = 12.0, 100.0, 1.0
 """Ranges of the vehicle that is followed as it drives away [m]; in dense fog up to 0.9 V_met."""
 
-AWAY = 5.0
+_AWAY = 5.0
 """By how much it is faster [m/s]."""
 
-RANGE_DEVIATION = 0.25
+_RANGE_DEVIATION = 0.25
 """Noise of its range, from the camera to its rear [m]."""
 
-NOTES = (
+_NOTES = (
     "Fog of 250 m, CIE overcast sky, flat Lambertian land of one albedo; small droplets (moderate radiation fog). The "
     "drawn road is the same in all: its own albedo is about 0.1.",
     "Koschmieder: the airlight is that of a white surface, 0.94 E/π, everywhere. Photons: about (0.34 + 0.66 ρ) E/π "
@@ -107,7 +107,7 @@ def reproduce(
     )
     sweeps, by_elevation = conditions()
     shown = (*by_elevation, *tables)
-    return Reproduction("airlight", tuple(records), tables[0].rows, NOTES, picture(records), shown, tuple(sweeps))
+    return Reproduction("airlight", tuple(records), tables[0].rows, _NOTES, picture(records), shown, tuple(sweeps))
 
 
 def drive_alone(
@@ -115,10 +115,10 @@ def drive_alone(
 ) -> Iterator[tuple[Case, str, Estimate]]:
     """Drive along the road alone: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([21, number])
-    moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng, period=PERIOD))
+    moments = list(drive(renderer, camera, _FRAMES, lead=False, rng=rng, period=_PERIOD))
     for case in cases:
         frames = [
-            Observation(Frame(PERIOD * number, _image(one.view, one.pose, camera, case, rng), camera), SPEED)
+            Observation(Frame(_PERIOD * number, _image(one.view, one.pose, camera, case, rng), camera), SPEED)
             for number, one in enumerate(moments)
         ]
         for method in ROAD_METHODS:
@@ -135,11 +135,11 @@ def follow(
     rng = np.random.default_rng([22, number])
     estimators = {case: make(CHASE_METHODS[0], camera, setback=0.0) for case in cases}
     last: dict[Case, Estimate] = {}
-    vehicle = StagedVehicle(paint=(float(rng.uniform(*PAINTS)),) * 3)
-    for ahead in np.arange(FIRST_RANGE, LAST_RANGE, RANGE_STEP).tolist():
-        time = (ahead - FIRST_RANGE) / AWAY
+    vehicle = StagedVehicle(paint=(float(rng.uniform(*_PAINTS)),) * 3)
+    for ahead in np.arange(_FIRST_RANGE, _LAST_RANGE, _RANGE_STEP).tolist():
+        time = (ahead - _FIRST_RANGE) / _AWAY
         scene = drawn(renderer, camera, vehicle, ahead, time * SPEED)
-        lead = LeadMeasurement(ahead + RANGE_DEVIATION * float(rng.normal()), AWAY)
+        lead = LeadMeasurement(ahead + _RANGE_DEVIATION * float(rng.normal()), _AWAY)
         for case, estimator in estimators.items():
             if ahead <= 0.9 * case.visibility:
                 frame = Frame(time, _image(scene.view, scene.pose, camera, case, rng), camera)
@@ -152,7 +152,7 @@ def _image(view: View, pose: CameraPose, camera: Camera, case: Case, rng: np.ran
     k = extinction_from_visibility(case.visibility)
     radiance = foggy_radiance(view, pose, camera, k, case.albedo, case.droplets)
     luminance = (radiance * np.array(LUMINANCE_WEIGHTS)).sum(axis=-1)
-    sensor = Sensor(saturation_luminance=float(np.percentile(luminance, BRIGHTEST)) / EXPOSED)
+    sensor = Sensor(saturation_luminance=float(np.percentile(luminance, _BRIGHTEST)) / _EXPOSED)
     return expose(radiance, sensor, camera.response, rng).astype(np.uint8)
 
 

@@ -25,7 +25,7 @@ from fogsim.reproduce.drivers.published import Bound, Finding, Look, Sign, Size
 Values = NDArray[np.float64]
 Ours = Callable[[Look], Values]
 
-DENSE_FOGS = (100.0, 70.0, 50.0)
+_DENSE_FOGS = (100.0, 70.0, 50.0)
 """Visibilities of the range in which C-6 found drivers most critical, 40 to 100 m [m]."""
 
 _THICKENING = (200.0, 150.0, 100.0, 70.0, 50.0, 30.0)
@@ -61,7 +61,7 @@ def _sign_effect(measure: str, visibility: float) -> Ours:
 
 def _over_clear(measure: str) -> Ours:
     """Mean over 50 to 100 m, over that in clear air [-]."""
-    return lambda look: _mean_over(DENSE_FOGS, lambda v: look(measure, v)) / look(measure, CLEAR)
+    return lambda look: _mean_over(_DENSE_FOGS, lambda v: look(measure, v)) / look(measure, CLEAR)
 
 
 def _kind_over_clear(kind: str) -> Ours:
@@ -77,7 +77,7 @@ def _least_fall(look: Look) -> Values:
 
 def _excess_between(look: Look) -> Values:
     """By how much more drivers overdrive at 50 to 100 m than at 30 m and at 200 m [percentage points]."""
-    inside = _mean_over(DENSE_FOGS, lambda v: look("overdriving_aashto", v))
+    inside = _mean_over(_DENSE_FOGS, lambda v: look("overdriving_aashto", v))
     outside = np.maximum(look("overdriving_aashto", 30.0), look("overdriving_aashto", 200.0))
     return 100.0 * (inside - outside)
 
@@ -134,7 +134,7 @@ SIX: tuple[Finding, ...] = (
 )
 """The six sizes that are to be met within 30 %."""
 
-OTHER_SIZES: tuple[Finding, ...] = (
+_OTHER_SIZES: tuple[Finding, ...] = (
     Finding(
         "speed_in_distant_fog",
         "change of speed in distant fog (ours: 150 m)",
@@ -179,7 +179,7 @@ OTHER_SIZES: tuple[Finding, ...] = (
     ),
 )
 
-SIGNS_OF_CHANGE: tuple[Finding, ...] = (
+_SIGNS_OF_CHANGE: tuple[Finding, ...] = (
     Finding(
         "speed_falls",
         "free speed falls with visibility: least fall of five steps from 200 to 30 m",
@@ -231,7 +231,7 @@ SIGNS_OF_CHANGE: tuple[Finding, ...] = (
     ),
 )
 
-FOLLOWERS: tuple[Finding, ...] = (
+_FOLLOWERS: tuple[Finding, ...] = (
     Finding(
         "fog_splits_at_22_4mps",
         "behind 22.4 m/s fog splits drivers, some lag out of sight (ours: V_met 40 m): share",
@@ -269,5 +269,5 @@ FOLLOWERS: tuple[Finding, ...] = (
     ),
 )
 
-FINDINGS = SIX + OTHER_SIZES + SIGNS_OF_CHANGE + FOLLOWERS
+FINDINGS = SIX + _OTHER_SIZES + _SIGNS_OF_CHANGE + _FOLLOWERS
 """All findings; the six sizes come first."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.reproduce.drivers.road import passed
 from fogsim.traffic import BrakeEvent, Trigger
 
-APART, BEHIND = 120.0, 3.0
+_APART, _BEHIND = 120.0, 3.0
 """Time from one leader to the next, and from a leader to its follower, as they enter [s]."""
 
 
@@ -25,13 +25,13 @@ class PairMeasures(NamedTuple):
 def follow(overrides: tuple[str, ...], leader_speed: float, visibility: float, seed: int, count: int) -> PairMeasures:
     """Measure drivers behind leaders of a given speed [m/s] after 2.5 km in fog of a visibility [m]."""
     rows = "".join(
-        f'<vehicle id="leader{i}" type="car" route="r" depart="{APART * (i + 1)}" departSpeed="{leader_speed}"/>'
-        f'<vehicle id="behind{i}" type="car" route="r" depart="{APART * (i + 1) + BEHIND}" departSpeed="max"/>'
+        f'<vehicle id="leader{i}" type="car" route="r" depart="{_APART * (i + 1)}" departSpeed="{leader_speed}"/>'
+        f'<vehicle id="behind{i}" type="car" route="r" depart="{_APART * (i + 1) + _BEHIND}" departSpeed="max"/>'
         for i in range(count)
     )
     demand = f'<vType id="car" vClass="passenger" tau="1.2" speedFactor="normc(1,0.1,0.7,1.3)"/>{rows}'
     events = tuple(BrakeEvent(f"leader{i}", Trigger(at_position=0.0), to_speed=leader_speed) for i in range(count))
-    seen = passed(overrides, 1, demand, visibility, seed, APART * (count + 4), events=events)
+    seen = passed(overrides, 1, demand, visibility, seed, _APART * (count + 4), events=events)
     return measured_pairs(seen, visibility)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.units import KMH_PER_MPS
 
-FREE_ABOVE = 5.0
+_FREE_ABOVE = 5.0
 """Time headway above which a vehicle is free, and below which it follows [s]."""
 
 THINKING_TIME, BRAKING = 0.67, 6.57
@@ -69,7 +69,7 @@ class Measures(NamedTuple):
 
 def measured(seen: Passages, visibility: float, seconds: float) -> Measures:
     """Measures of the vehicles that passed in fog of a visibility [m] within some seconds."""
-    follows = seen.headway < FREE_ABOVE
+    follows = seen.headway < _FREE_ABOVE
     free, closing = seen.speed[~follows], (seen.speed - seen.leader_speed)[follows]
     gap = seen.gap[follows]
     ttc = gap[closing > 0.0] / closing[closing > 0.0]

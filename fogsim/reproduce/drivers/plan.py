@@ -12,7 +12,7 @@ REPORT_SEEDS = tuple(range(1, 11))
 
 DEFAULT, SEEING, SIGNED = "default", "see_through_fog", "with signs"
 
-POPULATIONS: Mapping[str, tuple[str, ...]] = {
+_POPULATIONS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
     SEEING: ("drivers.see_through_fog=true", "drivers.speed_choice=observed"),
 }
@@ -20,7 +20,7 @@ POPULATIONS: Mapping[str, tuple[str, ...]] = {
 
 CAREFUL, MISJUDGING = "careful", "misjudging, by night"
 
-KINDS: Mapping[str, tuple[str, ...]] = {
+_KINDS: Mapping[str, tuple[str, ...]] = {
     CAREFUL: ("drivers.following=careful",),
     MISJUDGING: ("light.illuminance_lx=0", "drivers.distance_misjudgement=0.45"),
 }
@@ -41,7 +41,7 @@ PAIRS_IN = 40.0
 SIGNS: Mapping[float, float] = {100.0: 80.0, 50.0: 60.0, 30.0: 60.0}
 """What the A16's signs show [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""
 
-SIGNED_COMPLIANCE = "drivers.compliance.like=speed_limit_sign"
+_SIGNED_COMPLIANCE = "drivers.compliance.like=speed_limit_sign"
 """How the default drivers follow them."""
 
 
@@ -70,11 +70,11 @@ class Plan:
     seeds: tuple[int, ...] = REPORT_SEEDS
     demands: tuple[float, ...] = (SPARSE, MEDIUM, DENSE)  # on both lanes [vehicles/h]
     visibilities: tuple[float, ...] = (CLEAR, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0)  # [m]
-    populations: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: POPULATIONS)
+    populations: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: _POPULATIONS)
     seconds: float = 600.0  # watched [s]
     leader_speeds: tuple[float, ...] = (SLOW, FAST)  # [m/s]
     followers: int = 20  # in a run
-    kinds: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: KINDS)
+    kinds: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: _KINDS)
 
     @property
     def cases(self) -> tuple[Case, ...]:
@@ -98,5 +98,5 @@ class Plan:
     def overrides(self, case: Case | Pair) -> tuple[str, ...]:
         """What is set in the scenario of a case's drivers."""
         if case.population == SIGNED:
-            return (*self.populations[DEFAULT], SIGNED_COMPLIANCE)
+            return (*self.populations[DEFAULT], _SIGNED_COMPLIANCE)
         return {**self.kinds, **self.populations}[case.population]

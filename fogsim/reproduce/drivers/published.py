@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SIGNED, Case, Pair
 from fogsim.reproduce.drivers.results import Results
 
-NEAR, FACTOR = 0.3, 2.0
+NEAR, _FACTOR = 0.3, 2.0
 """Relative error of a size up to which ours is inside, and factor up to which it is not outside [-]."""
 
 
@@ -46,7 +46,7 @@ class Size:
         ratio = value / min(self.low, self.high, key=lambda end: abs(value - end))
         if abs(ratio - 1.0) <= NEAR:
             return Verdict.INSIDE
-        return Verdict.FACTOR_OF_TWO if 1.0 / FACTOR <= ratio <= FACTOR else Verdict.OUTSIDE
+        return Verdict.FACTOR_OF_TWO if 1.0 / _FACTOR <= ratio <= _FACTOR else Verdict.OUTSIDE
 
 
 @dataclass(frozen=True, slots=True)

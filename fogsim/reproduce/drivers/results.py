@@ -10,7 +10,7 @@ from fogsim.reproduce.drivers.pairs import PairMeasures
 from fogsim.reproduce.drivers.passages import Measures
 from fogsim.reproduce.drivers.plan import Case, Pair
 
-RESAMPLES = 4000
+_RESAMPLES = 4000
 """Bootstrap samples of an interval."""
 
 
@@ -28,7 +28,7 @@ def interval(values: NDArray[np.float64]) -> Interval:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return Interval(np.nan, np.nan, np.nan)
-    means = np.random.default_rng(0).choice(finite, (RESAMPLES, finite.size)).mean(axis=1)
+    means = np.random.default_rng(0).choice(finite, (_RESAMPLES, finite.size)).mean(axis=1)
     low, high = np.percentile(means, (2.5, 97.5))
     return Interval(float(finite.mean()), float(low), float(high))
 

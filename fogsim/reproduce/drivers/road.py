@@ -18,10 +18,10 @@ from fogsim.values import Command, FogField
 EDGE, EGO = "road", "first"
 """Ids of the road's edge, and of the ego, which drives ahead of all others and meets no one."""
 
-WIDTH = 3.75
+_WIDTH = 3.75
 """Width of a lane [m]."""
 
-LENGTH, LOOPS_AT = 2700.0, 2500.0
+LENGTH, _LOOPS_AT = 2700.0, 2500.0
 """Length of the road and place of the loops on it [m]."""
 
 LIMIT = 31.3
@@ -30,7 +30,7 @@ LIMIT = 31.3
 STEP = 0.2
 """SUMO's step [s]."""
 
-FIRST_VEHICLE = (
+_FIRST_VEHICLE = (
     '<vType id="fast" vClass="passenger" speedFactor="1.3"/>'
     f'<route id="r" edges="{EDGE}"/><vehicle id="{EGO}" type="fast" route="r" depart="0" departSpeed="max"/>'
 )
@@ -69,9 +69,9 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
     """The simulation, its drivers as a scenario has them."""
     net, routes, loops = (folder / name for name in ("road.net.xml", "road.rou.xml", "road.add.xml"))
     net.write_text(_net(lanes), encoding="utf-8")
-    routes.write_text(f"<routes>{FIRST_VEHICLE}{demand}</routes>", encoding="utf-8")
+    routes.write_text(f"<routes>{_FIRST_VEHICLE}{demand}</routes>", encoding="utf-8")
     rows = (
-        f'<instantInductionLoop id="{i}" lane="{EDGE}_{i}" pos="{LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
+        f'<instantInductionLoop id="{i}" lane="{EDGE}_{i}" pos="{_LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
     )
     loops.write_text(f"<additional>{''.join(rows)}</additional>", encoding="utf-8")
     return replace(
@@ -88,7 +88,7 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
 
 
 def _net(lanes: int) -> str:
-    y = [-(lanes - 0.5 - lane) * WIDTH for lane in range(lanes)]
+    y = [-(lanes - 0.5 - lane) * _WIDTH for lane in range(lanes)]
     rows = "".join(
         f'<lane id="{EDGE}_{i}" index="{i}" speed="{LIMIT}" length="{LENGTH}" shape="0,{y[i]} {LENGTH},{y[i]}"/>'
         for i in range(lanes)

@@ -32,7 +32,7 @@ def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
     """Published findings with ours, then the traffic of every population."""
     seeds, populations = f"{len(plan.seeds)} seeds", tuple(plan.populations)
     found = TitledTable(
-        f"What is published, and ours ({seeds}, mean [95 % interval])", findings_table(results, populations)
+        f"What is published, and ours ({seeds}, mean [95 % interval])", _findings_table(results, populations)
     )
     names = [*populations, *dict.fromkeys(c.population for c in plan.cases if c.population not in populations)]
     note = f"({seeds}, mean ± half the 95 % interval)"
@@ -40,20 +40,20 @@ def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
     return (found, *traffic)
 
 
-def findings_table(results: Results, populations: Sequence[str]) -> Rows:
+def _findings_table(results: Results, populations: Sequence[str]) -> Rows:
     """Every finding next to ours of some populations."""
     heading = ["published", "source", "size", *(cell for name in populations for cell in (name, "agrees"))]
     rows = [tuple(heading)]
     for finding in FINDINGS:
         row = [f"{'* ' if finding.six else ''}{finding.text}", finding.source, str(finding.published)]
         for name in populations:
-            ours, verdict = compared(finding, results, name)
+            ours, verdict = _compared(finding, results, name)
             row += [_cell(ours, 1.0, _digits(ours)), "—" if verdict is Verdict.UNKNOWN else verdict.value]
         rows.append(tuple(row))
     return tuple(rows)
 
 
-def compared(finding: Finding, results: Results, population: str) -> tuple[Interval, Verdict]:
+def _compared(finding: Finding, results: Results, population: str) -> tuple[Interval, Verdict]:
     """Ours of a population, and whether it agrees."""
     ours = interval(finding.values(Look(results, population)))
     return ours, finding.verdict(ours.mean)
@@ -105,7 +105,7 @@ def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
     ]
     for population in plan.populations:
         for finding in FINDINGS:
-            ours, verdict = compared(finding, results, population)
+            ours, verdict = _compared(finding, results, population)
             agreement: dict[str, Cell] = {
                 "published": str(finding.published),
                 "source": finding.source,

@@ -31,13 +31,13 @@ from fogsim.vision.light.pixel_kernels import Pixels
 CAMERA = Camera(1280, 800, 1154.0, (639.5, 399.5), 1.38, pitch=0.035, response=Response.SRGB)
 """The size of the paper's images; nothing else is known of its camera."""
 
-TABLES = ("I", "figure 8", "figure 11", "figure 12", "figure 14")
+_TABLES = ("I", "figure 8", "figure 11", "figure 12", "figure 14")
 """Parts of the paper that can be chosen: table I with equations 11 and 12, and figures with the text about them."""
 
-DRIVES = (("clear 1", math.inf, 1), ("clear 2", math.inf, 2), ("fog 1", 150.0, 1), ("fog 2", 80.0, 2))
+_DRIVES = (("clear 1", math.inf, 1), ("clear 2", math.inf, 2), ("fog 1", 150.0, 1), ("fog 2", 80.0, 2))
 """Name, visibility [m] and seed of the drives past lamps; those with one seed go past the same."""
 
-FRAME_STEP = 0.6
+_FRAME_STEP = 0.6
 """Distance from one frame to the next [m]: 25 frames a second at 54 km/h."""
 
 REFERENCES = (12.6, 51.4, 91.8, 167.8, 415.6, 2000.0)
@@ -46,10 +46,10 @@ REFERENCES = (12.6, 51.4, 91.8, 167.8, 415.6, 2000.0)
 LIDAR = 368.0
 """Visibility by LIDAR on the open road of figure 12 [m]."""
 
-COMPOSED, COMPOSED_STEP = 10, 6.0
+_COMPOSED, _COMPOSED_STEP = 10, 6.0
 """Frames whose mean is compared, and the distance between two [m]; the paper does not say how many."""
 
-NOTES = (
+_NOTES = (
     "Halos: street lamps, a vehicle ahead and oncoming ones in clear air and in fog of 150 and 80 m. The paper states"
     " neither how dense its fog was nor whether its rate counts clear frames; ours does. 'As published' has the mean"
     " Br50 and the threshold 9, 'corrected' the largest sharpness and a threshold from other scenes.",
@@ -94,16 +94,16 @@ def reproduce(
     watch: Watch = unwatched,
 ) -> Reproduction:
     """Take pictures of lamps and of the own beams' veil by night; `quick` takes a ninth of the drives' frames."""
-    wanted = chosen_tables(TABLES, table)
+    wanted = chosen_tables(_TABLES, table)
     size = size or (_QUICK if quick else Size())
     has_drives, has_fogs = "figure 8" in wanted, bool({"I", "figure 11", "figure 14"}.intersection(wanted))
-    frames_driven = has_drives * (size.scenes + len(DRIVES) * size.frames)
+    frames_driven = has_drives * (size.scenes + len(_DRIVES) * size.frames)
     steps = Steps(frames_driven + has_fogs * (len(REFERENCES) + size.fogs) + 1, watch)
     tables, cells, drives, fogs, road, least = list[TitledTable](), list[PaperCell](), [], [], [], PUBLISHED
     if has_drives:
         threshold = measure_halo_threshold(camera, size.scenes, watch=lambda done, _: steps.advance() if done else None)
         least = threshold.steepness
-        drives = [_drive(camera, *drive, threshold, size.frames, steps) for drive in DRIVES]
+        drives = [_drive(camera, *drive, threshold, size.frames, steps) for drive in _DRIVES]
         tables.append(TitledTable("Halos: frames taken for fog, each and by the mean of 25 [%]", _drive_rows(drives)))
         cells += drive_cells(drives, least)
     if has_fogs:
@@ -120,7 +120,7 @@ def reproduce(
     steps.advance()
     records = (*drives, *fogs, *road)
     drawn = picture(drives, fogs, least)
-    return Reproduction("gallen2014", records, tables[0].rows, NOTES, drawn, tuple(tables), cells=tuple(cells))
+    return Reproduction("gallen2014", records, tables[0].rows, _NOTES, drawn, tuple(tables), cells=tuple(cells))
 
 
 def _drive(
@@ -134,7 +134,7 @@ def _drive(
     sources, values = 0, list[float]()
     with NightRoad(camera, seed=seed) as road:
         for number in range(frames):
-            light = road.radiances(_scene(number * FRAME_STEP, seed), [visibility])[0]
+            light = road.radiances(_scene(number * _FRAME_STEP, seed), [visibility])[0]
             image = road.photograph(light, 1.0, rng)
             steps.advance()
             readings = {name: watch.look(image, camera.bits) for name, watch in watches.items()}
@@ -179,7 +179,7 @@ def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, 
         for number, visibility in enumerate(np.geomspace(REFERENCES[0], REFERENCES[-1], fogs).tolist()):
             images = drive(visibility, 1, number)
             scores = templates.scores(_mean_cells(images, camera))
-            corrected = make("gallen2014_veil", camera, frames=COMPOSED)
+            corrected = make("gallen2014_veil", camera, frames=_COMPOSED)
             for image in images:
                 veil = corrected.update(Observation(image, camera_setback=SETBACK, lamps=_LOW))
             found = visibility_by_parabola(scores), found_visibility(veil)
@@ -193,7 +193,7 @@ def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, 
 
 def _driven(road: NightRoad, visibility: float, seed: tuple[int, ...]) -> list[Pixels]:
     """Frames of a drive in fog on a road without other lamps."""
-    lights = (road.radiances(NightScene(COMPOSED_STEP * number), [visibility])[0] for number in range(COMPOSED))
+    lights = (road.radiances(NightScene(_COMPOSED_STEP * number), [visibility])[0] for number in range(_COMPOSED))
     return [road.photograph(light, 1.0, np.random.default_rng((*seed, at))) for at, light in enumerate(lights)]
 
 
@@ -308,7 +308,7 @@ def _accuracy_cells(records: Sequence[Record]) -> list[PaperCell]:
     return cells
 
 
-def fog_cells(records: Sequence[Record], wanted: Sequence[str] = TABLES) -> list[PaperCell]:
+def fog_cells(records: Sequence[Record], wanted: Sequence[str] = _TABLES) -> list[PaperCell]:
     """Classes, scores and errors while fog dissipates."""
     parts = {"I": _class_cells, "figure 11": _score_cells, "figure 14": _accuracy_cells}
     return [cell for name, part in parts.items() if name in wanted for cell in part(records)]

@@ -15,7 +15,7 @@ from fogsim.lighting.beams import high_beam
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam
 
-DROPLETS = {FogKind.RADIATION: Droplets.MODERATE_RADIATION, FogKind.ADVECTION: Droplets.HEAVY_ADVECTION}
+_DROPLETS = {FogKind.RADIATION: Droplets.MODERATE_RADIATION, FogKind.ADVECTION: Droplets.HEAVY_ADVECTION}
 """Droplets that stand for the paper's two types of fog."""
 
 _LAMPS = ((1.8, 0.6, -0.85), (1.8, -0.6, -0.85))  # of a car, from its camera [m]
@@ -27,7 +27,7 @@ def veil_luminance(beam: Beam, visibilities: Sequence[float], kind: FogKind) -> 
     """Luminance of the veil of two such lamps in front of a point on the road 40 m ahead, by FogSim's model [cd/m²]."""
     towards = np.array([[math.cos(_BELOW), 0.0, -math.sin(_BELOW)]], np.float32)
     table = lamp_table(beam)
-    air = lit_air(VeilRays((1, 1), towards, *ray_pieces()), [(place, table) for place in _LAMPS], DROPLETS[kind])
+    air = lit_air(VeilRays((1, 1), towards, *ray_pieces()), [(place, table) for place in _LAMPS], _DROPLETS[kind])
     node = _TARGET / (_TARGET + FOLD_DISTANCE) * INTERVALS
     found = []
     for visibility in visibilities:

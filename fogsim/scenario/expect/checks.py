@@ -16,7 +16,7 @@ from fogsim.units import clock_time
 if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
 
-MOST_SHOWN = 5
+_MOST_SHOWN = 5
 """Maximum number of metrics in a message."""
 
 
@@ -74,7 +74,7 @@ def expectation_mistakes(
             key = metric_check(name, expectation.metric).metric
             known = list(_metrics(content))
             if key not in known:
-                near = nearest_of(key, known, MOST_SHOWN)
+                near = nearest_of(key, known, _MOST_SHOWN)
                 yield (name, "metric"), f"unknown metric {shown(key)}; {suggest(key, near)}, … ({len(known)} in all)"
 
 

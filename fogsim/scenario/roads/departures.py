@@ -18,7 +18,7 @@ from fogsim.values.script import Enter
 Entries = Mapping[tuple[str, DepartAction], Enter]
 """What vehicles do that depart by themselves, by their ids and what the file says."""
 
-NO_ENTRIES: Entries = MappingProxyType({})
+_NO_ENTRIES: Entries = MappingProxyType({})
 
 _NUMBERS = {"right": 0, "left": -1}
 
@@ -32,7 +32,7 @@ def entering_vehicles(scenario: Scenario) -> Entries:
         if isinstance(doing, VehicleActions) and doing.depart and doing.depart.like is None
     }
     if not wanted:
-        return NO_ENTRIES
+        return _NO_ENTRIES
     if scenario.road is not None:
         layout, _ = road_layout(scenario)
         return {key: _on_template(*key, layout) for key in wanted}

@@ -240,7 +240,7 @@ def _check_type(name: str) -> str:
     return name
 
 
-PERSON = "person"
+_PERSON = "person"
 """Type of actors on foot."""
 
 _OF_PERSONS = frozenset({"side", "crosses_at_m", "waits"})
@@ -306,14 +306,14 @@ class ActorSection(Section):
     @field_validator("type")
     @classmethod
     def _known_type(cls, value: str) -> str:
-        if value not in VEHICLE_KINDS and value != PERSON:
-            raise ValueError(str(UnknownNameError("type", value, (*VEHICLE_KINDS, PERSON))))
+        if value not in VEHICLE_KINDS and value != _PERSON:
+            raise ValueError(str(UnknownNameError("type", value, (*VEHICLE_KINDS, _PERSON))))
         return value
 
     @property
     def is_person(self) -> bool:
         """Whether it is on foot."""
-        return self.type == PERSON
+        return self.type == _PERSON
 
     @model_validator(mode="after")
     def _keys_of_its_kind(self) -> Self:

@@ -20,7 +20,7 @@ from fogsim.scenario.section import (
     method_of,
 )
 
-HALF_A_MILE = 804.672
+_HALF_A_MILE = 804.672
 
 
 class ReportsFrom(Section):
@@ -80,7 +80,7 @@ class RoadsideCamera(Section):
 class RoadsideReports(MeasuredReports):
     """Visibility sensors next to the ego's route, as on California's Highway 99."""
 
-    every_m: Length = HALF_A_MILE
+    every_m: Length = _HALF_A_MILE
     """Distance from one to the next; half a mile there."""
 
     first_m: Distance = 0.0

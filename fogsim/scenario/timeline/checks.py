@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PHOTONS_BY_DAY = f"fog.airlight: photons is of the sky's light by day, from {DAY_ILLUMINANCE:g} lx on"
 """Why there is none by lamplight."""
 
-DAYLIGHT_RENDERER = "reference"
+_DAYLIGHT_RENDERER = "reference"
 """Name of the renderer that draws by daylight only."""
 
 
@@ -125,9 +125,9 @@ def _mistake(doing: Doing, scenario: "Scenario") -> str | None:
 
 
 def _light_mistake(doing: LightActions, scenario: "Scenario") -> str | None:
-    if scenario.renderer == DAYLIGHT_RENDERER and doing.illuminance_lx < DAY_ILLUMINANCE:
+    if scenario.renderer == _DAYLIGHT_RENDERER and doing.illuminance_lx < DAY_ILLUMINANCE:
         return (
-            f"illuminance_lx is {doing.illuminance_lx:g}, and the renderer {DAYLIGHT_RENDERER} knows no lamplight, "
+            f"illuminance_lx is {doing.illuminance_lx:g}, and the renderer {_DAYLIGHT_RENDERER} knows no lamplight, "
             f"which there is below {DAY_ILLUMINANCE:g}; take opengl or cpu"
         )
     if scenario.fog.airlight == "photons" and doing.illuminance_lx < DAY_ILLUMINANCE:

@@ -9,7 +9,7 @@ from fogsim.core.randomness import named_generator
 from fogsim.errors import shown, suggest
 from fogsim.units.quantities import split_quantity
 
-MOST_VALUES = 100_000
+_MOST_VALUES = 100_000
 """Maximum number of values of one name."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -150,8 +150,8 @@ def _refuse_others(written: dict[str, object], allowed: tuple[str, ...]) -> None
 
 def _seeds(written: object) -> SeedLevels:
     if isinstance(written, int) and not isinstance(written, bool):
-        if not 1 <= written <= MOST_VALUES:
-            raise LevelsError(f"expected 1 … {MOST_VALUES} seeds, got {written}")
+        if not 1 <= written <= _MOST_VALUES:
+            raise LevelsError(f"expected 1 … {_MOST_VALUES} seeds, got {written}")
         return SeedLevels(tuple(range(written)))
     listed = written if isinstance(written, list) else []
     if not listed or any(isinstance(one, bool) or not isinstance(one, int) or one < 0 for one in listed):
@@ -187,8 +187,8 @@ def _range(written: dict[str, object]) -> Levels:
     if step == 0 or (last - first) / step < 0:
         raise LevelsError(f"a step of {shown(written['step'])} does not lead there", "step")
     number = math.floor((last - first) / step + 1e-9) + 1
-    if number > MOST_VALUES:
-        raise LevelsError(f"{number} values are more than {MOST_VALUES}", "step")
+    if number > _MOST_VALUES:
+        raise LevelsError(f"{number} values are more than {_MOST_VALUES}", "step")
     return Levels(tuple(number_with_unit(first + i * step, unit) for i in range(number)))
 
 

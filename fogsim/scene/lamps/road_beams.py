@@ -12,7 +12,7 @@ from fogsim.values.light import Beam, Lamp, RoadBeams, Side, burning
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState, with_pieces
 
-FARTHEST, MOST = 150.0, 4
+FARTHEST, _MOST = 150.0, 4
 """Distance beyond which beams on the road are left out [m], and how many vehicles' are drawn, the nearest."""
 
 _HEIGHT_STEP = 0.05
@@ -37,7 +37,7 @@ def road_beams(
     shining = int(sum(beams))
     away = np.hypot(*(state.position[:, :2] - np.asarray(eye, np.float64)[:2]).T)
     lit = np.flatnonzero(((state.lamps & shining) != 0) & (away < FARTHEST))
-    nearest = [row for row in lit[np.argsort(away[lit], kind="stable")].tolist() if row != skip][:MOST]
+    nearest = [row for row in lit[np.argsort(away[lit], kind="stable")].tolist() if row != skip][:_MOST]
     names, kinds = body_names(state), tuple(beams)
     found: list[tuple[int, float, int, float]] = []
     for row in nearest:

@@ -13,7 +13,7 @@ from fogsim.scene.town.figures import HEAD, LEGS, POSES, STANDING, STRIDE, TRUNK
 from fogsim.values.scene import Batch, Instance, Mesh
 from fogsim.values.traffic import PersonState
 
-SLOWEST_STRIDE = 0.15
+_SLOWEST_STRIDE = 0.15
 """Speed up to which a person stands [m/s]."""
 
 _JACKETS = np.array(
@@ -60,7 +60,7 @@ def _poses(persons: PersonState, height: NDArray[np.float64], chance: NDArray[np
     """Number of the pose of each: by the way gone along their heading, in which feet keep to the ground."""
     gone = persons.position[:, 0] * np.cos(persons.heading) + persons.position[:, 1] * np.sin(persons.heading)
     phase = np.floor((gone / (STRIDE * height) + chance) * POSES).astype(np.int64) % POSES
-    return np.where(persons.speed > SLOWEST_STRIDE, phase, STANDING)
+    return np.where(persons.speed > _SLOWEST_STRIDE, phase, STANDING)
 
 
 @lru_cache(maxsize=65536)

@@ -24,7 +24,7 @@ from fogsim.values.road import SignalHead
 from fogsim.values.scene import FAR, MIDDLE, SPECK, TINY, Batch, Instance, Mesh, Surface
 from fogsim.values.traffic import SignalColour, SignalState
 
-HEAD, POST, ARM, WALK = "signal_head", "signal_post", "signal_arm", "signal_walk"
+HEAD, _POST, _ARM, _WALK = "signal_head", "signal_post", "signal_arm", "signal_walk"
 """Names of the shapes: a head of lenses of 1 m, a post of 1 m height, an arm of 1 m length, a head for persons."""
 
 _CELL = 1.5  # height and width of a lens's part of the housing, in diameters
@@ -63,9 +63,9 @@ def signal_shapes() -> dict[str, Mesh]:
     """Shapes of heads, which look to −x, and of posts and arms, with their levels of detail."""
     levels = (("", 20, True), (MIDDLE, 10, True), (FAR, 6, False), (TINY, 4, False))
     heads = {HEAD + ending: _head(sides, visors) for ending, sides, visors in levels}
-    walks = {WALK + ending: _walk(sides) for ending, sides, _ in (*levels, (SPECK, 4, False))}
-    posts = {POST + ending: _post(sides) for ending, sides in (("", 12), (MIDDLE, 6), (FAR, 4))}
-    arms = {ARM + ending: _arm(sides) for ending, sides in (("", 10), (MIDDLE, 6), (FAR, 4))}
+    walks = {_WALK + ending: _walk(sides) for ending, sides, _ in (*levels, (SPECK, 4, False))}
+    posts = {_POST + ending: _post(sides) for ending, sides in (("", 12), (MIDDLE, 6), (FAR, 4))}
+    arms = {_ARM + ending: _arm(sides) for ending, sides in (("", 10), (MIDDLE, 6), (FAR, 4))}
     return {**heads, HEAD + SPECK: _head(4, False), **walks, **posts, **arms}
 
 
@@ -140,11 +140,11 @@ def signal_posts(heads: Sequence[SignalHead]) -> list[Batch]:
         if math.hypot(x, y) > _BESIDE:
             arms.append((foot[0], foot[1], farthest.position[2], math.atan2(y, x), math.hypot(x, y) + 0.3))
     size = np.column_stack((np.ones((len(places), 2)), heights))
-    batches = [placed(POST, np.array(places), np.zeros(len(places)), size)]
+    batches = [placed(_POST, np.array(places), np.zeros(len(places)), size)]
     if arms:
         reach = np.array(arms)
         size = np.column_stack((reach[:, 4], np.ones((len(arms), 2))))
-        batches.append(placed(ARM, reach[:, :3], reach[:, 3], size))
+        batches.append(placed(_ARM, reach[:, :3], reach[:, 3], size))
     return batches
 
 
@@ -155,7 +155,7 @@ def signal_batches(signals: SignalState, time: float) -> tuple[Batch, ...]:
     size, lit = np.repeat(signals.diameter[:, None], 3, axis=1), _lit(signals, time)
     on_foot = _on_foot(signals)
     batches = []
-    for shape, rows in ((HEAD, np.flatnonzero(~on_foot)), (WALK, np.flatnonzero(on_foot))):
+    for shape, rows in ((HEAD, np.flatnonzero(~on_foot)), (_WALK, np.flatnonzero(on_foot))):
         if len(rows):
             there = signals.position[rows], signals.heading[rows], size[rows]
             heads = placed(shape, *there, instance=Instance.TRAFFIC_LIGHT)

@@ -24,10 +24,10 @@ from fogsim.values import Estimate, FogField, FogReport, TrafficState
 
 Floats = NDArray[np.float64]
 
-METER_HEIGHT = 2.0
+_METER_HEIGHT = 2.0
 """Height of a visibility sensor above the road [m]."""
 
-WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
+_WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
 """Extinctions between which a wrong measurement is any [1/m]."""
 
 
@@ -122,7 +122,7 @@ class FogReports:
         time = time if self._has_begun else time - sensors.delay_s
         self._has_begun = True
         points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
-        measured = extinction(fog, points + np.array([0.0, 0.0, METER_HEIGHT]))
+        measured = extinction(fog, points + np.array([0.0, 0.0, _METER_HEIGHT]))
         for i, k in zip(due, measured.tolist(), strict=True):
             self._send(f"{SENSOR} {i}", float(places[i]), k, sensors, time)
 
@@ -132,7 +132,7 @@ class FogReports:
         for row, place in self._senders(radio, state, ego):
             name = state.ids[row]
             if self._beats.is_due(name, radio.period_s, time):
-                eyes = state.position[row] + np.array([0.0, 0.0, METER_HEIGHT])
+                eyes = state.position[row] + np.array([0.0, 0.0, _METER_HEIGHT])
                 self._send(name, place, float(extinction(fog, eyes)), radio, time)
 
     def _senders(self, radio: VehicleReports, state: TrafficState, ego: int) -> Iterator[tuple[int, float]]:
@@ -171,7 +171,7 @@ class FogReports:
         wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
         reported = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
-            reported = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
+            reported = _WRONG[0] * (_WRONG[1] / _WRONG[0]) ** any_k
         stated_time = time + self._clock_error(name, sender.clock_deviation_s)
         number = self._beats.number(name)
         self._let_travel(FogReport(name, number, place, stated_time, reported, sender.deviation), time, sender)

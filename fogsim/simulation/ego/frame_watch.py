@@ -11,10 +11,10 @@ from fogsim.values import Frame, LeadMeasurement
 MOVING = 1.0
 """Speed from which on the picture of the road must change from frame to frame [m/s]."""
 
-LATEST = 0.5
+_LATEST = 0.5
 """How late a frame may be [s]: 18 m at 130 km/h."""
 
-LEAST_CONTRAST = 0.01
+_LEAST_CONTRAST = 0.01
 """Span of the grey levels of a frame below which it shows nothing, as a share of full scale [-]: in fog of 10 m by day
 the road before the bonnet still differs by more from the airlight."""
 
@@ -50,11 +50,11 @@ class FrameWatch:
 
 def why_useless(frame: Frame, time: float) -> str:
     """Say why a frame, news or not, does not show the road of now; empty if it may (`time` [s])."""
-    if time - frame.time > LATEST:
+    if time - frame.time > _LATEST:
         return f"the frame is {time - frame.time:.2f} s late"
     sample = frame.image[::_APART, ::_APART]
     dark, bright = np.quantile(sample, (0.01, 0.99))
-    if bright - dark < LEAST_CONTRAST * (2**frame.camera.bits - 1):
+    if bright - dark < _LEAST_CONTRAST * (2**frame.camera.bits - 1):
         return f"the picture shows nothing: {dark:.0f} … {bright:.0f} grey levels"
     return ""
 

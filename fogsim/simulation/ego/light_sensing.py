@@ -17,12 +17,12 @@ from fogsim.values import FogField, Lamp, LampEffects, LightMeasurement, Traffic
 from fogsim.values.eye import disability_glare
 from fogsim.values.light import ALL_LAMPS
 
-FARTHEST_DAZZLED = 250.0
+_FARTHEST_DAZZLED = 250.0
 """Drivers farther away than this are not dazzled [m]."""
 
 _STEPS_PER_E_FOLD = 200.0
 
-HEAD_LAMPS, TAIL_LAMPS = 1200.0, 16.0
+_HEAD_LAMPS, _TAIL_LAMPS = 1200.0, 16.0
 """Intensity straight ahead of a pair of low beams, and straight back of tail lamps; gives their reach [cd]."""
 
 
@@ -72,13 +72,13 @@ class LightSensing:
 
     def _least(self, other: Other) -> float:
         """Illuminance by which a vehicle's lamps are noticed [lx]."""
-        return HEAD_LAMPS / self._reach**2 if other.comes else TAIL_LAMPS / self._tail_reach**2
+        return _HEAD_LAMPS / self._reach**2 if other.comes else _TAIL_LAMPS / self._tail_reach**2
 
 
 def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead: float) -> LampEffects:
     """What the ego's lamps do by night (`extinction_ahead` [1/m])."""
     lamps = int(state.lamps[ego])
-    others = _others_ahead(state, ego, FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
+    others = _others_ahead(state, ego, _FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
     dazzled = [other for other in others if not other.comes or other.angle < 0.5 * math.pi]
     visibility = _stepped(visibility_from_extinction(extinction_ahead))
     sight = headlamp_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility)

@@ -28,7 +28,7 @@ from fogsim.values.traffic import rear_of
 
 Faults = Sequence[RunningFault]
 
-BUMPER_HEIGHT = 0.6
+_BUMPER_HEIGHT = 0.6
 """Height of the scatterometer above the road, at the front bumper [m]."""
 
 
@@ -84,7 +84,7 @@ class EgoSensors:
         """
         if self._scatterometer is None:
             return None
-        place = snapshot.state.position[snapshot.ego] + np.array([0.0, 0.0, BUMPER_HEIGHT])
+        place = snapshot.state.position[snapshot.ego] + np.array([0.0, 0.0, _BUMPER_HEIGHT])
         return faulty_scattering(self._scatterometer.measure(float(extinction(fog, place)), time), faults)
 
 

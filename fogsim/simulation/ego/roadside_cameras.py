@@ -19,7 +19,7 @@ from fogsim.values.result_checks import checked_estimate
 AHEAD = 10.0
 """How far ahead of a mast the road's direction is taken [m]."""
 
-LEAST_DEVIATION = 1e-6
+_LEAST_DEVIATION = 1e-6
 """Relative deviation that a report has at least [-]: less is rounding."""
 
 Draw = Callable[[CameraPose, Camera], NDArray[np.float32] | None]
@@ -114,7 +114,7 @@ def as_log_normal(estimate: Estimate) -> tuple[float, float]:
     It has the mean and the variance of the estimate's normal distribution where that is positive. In clear air, where
     the extinction is 0 with some deviation, that still limits it from above.
     """
-    deviation = max(estimate.standard_deviation, LEAST_DEVIATION * estimate.extinction)
+    deviation = max(estimate.standard_deviation, _LEAST_DEVIATION * estimate.extinction)
     ratio = estimate.extinction / deviation
     hazard = math.exp(-0.5 * ratio**2) / math.sqrt(2.0 * math.pi) / (0.5 * math.erfc(-ratio / math.sqrt(2.0)))
     mean, variance = ratio + hazard, 1.0 - hazard * (ratio + hazard)

@@ -10,10 +10,10 @@ from fogsim.values import TrafficState
 
 Floats = NDArray[np.float64]
 
-BESIDE = 15.0
+_BESIDE = 15.0
 """How far from the line of a route a vehicle is on its road [m]."""
 
-SAME_WAY = 0.5
+_SAME_WAY = 0.5
 """Least cosine of the angle between a vehicle's heading and the route for it to go the same way [-]."""
 
 
@@ -43,5 +43,5 @@ class RoutePlaces:
         row = np.arange(len(nearest))
         along = self.stations[nearest] + shares[row, nearest] * np.diff(self.stations)[nearest]
         (ahead, left), near = self._ways[nearest].T / self._lengths[nearest], apart[row, nearest]
-        on_way = np.cos(state.heading) * ahead + np.sin(state.heading) * left >= SAME_WAY
-        return Places(along, ahead * near[:, 1] - left * near[:, 0], on_way & (beside[row, nearest] <= BESIDE))
+        on_way = np.cos(state.heading) * ahead + np.sin(state.heading) * left >= _SAME_WAY
+        return Places(along, ahead * near[:, 1] - left * near[:, 0], on_way & (beside[row, nearest] <= _BESIDE))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.values import CameraPose, TrafficState, View
 
-LEAST_WAY = 0.01
+_LEAST_WAY = 0.01
 """Way [m] below which nothing is drawn smeared: of the road 4 m ahead it is half a pixel of a picture 640 wide."""
 
 Drawn = tuple[View, NDArray[np.float32] | None]
@@ -50,7 +50,7 @@ def exposed(
 
     Vehicles, the camera's own among them, go straight on for the time; what they turn and speed up in it is left out.
     """
-    if shutter.open_time * float(np.max(state.speed)) < LEAST_WAY:
+    if shutter.open_time * float(np.max(state.speed)) < _LEAST_WAY:
         return draw(state, pose)
     own, total = _velocities(state)[ego], np.zeros(())
     for seconds in shutter.offsets():

@@ -51,7 +51,7 @@ DARKEST_SKY = 1e-4
 Surfaces reflect street lamps' light as they reflect the sky's, so the sky must give some.
 """
 
-BEHIND_BUMPER = 0.15
+_BEHIND_BUMPER = 0.15
 """Distance of the bonnet's front edge behind the bumper [m]."""
 
 _LEEWAY = 600.0
@@ -180,7 +180,7 @@ class ViewRenderer:
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = build.camera_mount(scenario, body).setback
         has_bonnet = scenario.camera.bonnet and body == build.CAR
-        self._bonnet = Bonnet(self._setback - BEHIND_BUMPER) if has_bonnet else None
+        self._bonnet = Bonnet(self._setback - _BEHIND_BUMPER) if has_bonnet else None
         self._scenario, self._network = scenario, network
         self._daylight = scenario.light.illuminance_lx
         # Lamps that were lit in the picture only from a moment on would be a jump in it.

@@ -3,7 +3,7 @@
 from fogsim.simulation.ego.fog_reports import place_seen
 from fogsim.values import Estimate, FogReport, Step
 
-SURE = 0.5
+_SURE = 0.5
 """Relative deviation beyond which an extinction is not sent [-]."""
 
 
@@ -20,7 +20,7 @@ def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
 
 
 def _report(vehicle: str, place: float, estimates: tuple[Estimate, ...], step: Step) -> FogReport | None:
-    valid = [one for one in estimates if one.valid and one.standard_deviation < SURE * one.extinction]
+    valid = [one for one in estimates if one.valid and one.standard_deviation < _SURE * one.extinction]
     if not valid:
         return None
     surest = min(valid, key=lambda one: one.standard_deviation / one.extinction)

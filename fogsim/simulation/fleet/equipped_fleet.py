@@ -28,7 +28,7 @@ from fogsim.values import (
 )
 from fogsim.values.script import Actions
 
-LONGEST_END = 5.0
+_LONGEST_END = 5.0
 """Time that a process is given to end by itself [s]."""
 
 
@@ -94,7 +94,7 @@ class UnitProcess:
         if self._link is not None:
             self._link.close()
         if self._process is not None:
-            self._process.join(LONGEST_END)
+            self._process.join(_LONGEST_END)
             if self._process.is_alive():
                 self._process.terminate()
                 self._process.join()

@@ -39,7 +39,7 @@ class Due:
     over: tuple[Begun, ...] = ()  # Entries that are over
 
 
-NOTHING_DUE = Due()
+_NOTHING_DUE = Due()
 
 
 class Timeline:
@@ -61,7 +61,7 @@ class Timeline:
         An entry begins when its condition holds (and its delay is over) and all its vehicles are on the road.
         """
         if not self._entries:
-            return NOTHING_DUE
+            return _NOTHING_DUE
         moment = self._history.moment(step)
         now = _Now(moment, self._entering)
         self._seen.update(step.traffic.ids)

@@ -10,7 +10,7 @@ from fogsim.values import Command, Display, Stretch
 Heard = dict[Display, dict[str, float]]
 """The lowest speed that each driver has heard, by where; nothing by where no one has heard any [m/s]."""
 
-HARDEST_BRAKING = 9.0
+_HARDEST_BRAKING = 9.0
 """No vehicle brakes harder than this for long [m/s²]."""
 
 
@@ -78,7 +78,7 @@ class AdviceHearing:
             for vehicle, past in on.items():
                 if vehicle not in readers and vehicle not in last_on:
                     # Who has come onto the stretch farther on, from a ramp, has not passed the sign.
-                    driven = self._places.speed(vehicle) * elapsed + 0.5 * HARDEST_BRAKING * elapsed**2
+                    driven = self._places.speed(vehicle) * elapsed + 0.5 * _HARDEST_BRAKING * elapsed**2
                     readers.update({vehicle: shown} if past <= driven else {})
         self._readers[stretch], self._last_on[stretch] = readers, on
         if shown is None and not readers:

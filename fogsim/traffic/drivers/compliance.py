@@ -27,7 +27,7 @@ class Compliance:
 FULL = Compliance()
 """Everyone is reached and goes all the way down, and no one up: the best case."""
 
-SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
+_SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
 """Signs with a speed limit for the visibility, above every lane, which drivers know and trust.
 
 A16 (Hogema & van der Horst 1997): 80 km/h for 70 to 140 m, 60 km/h below; mean speeds 8 to 10 km/h lower than without
@@ -35,7 +35,7 @@ signs, and below 35 m 60 km/h in place of 29: drivers took the sign's speed for 
 made 2 to 5 mph (Gonzales & Fontaine 2018); in Finland 80 for 100 km/h on slippery roads 3.4 km/h (Rämä 1999).
 """
 
-ADVISORY_SIGN = Compliance(rate=0.1, strength=0.35)
+_ADVISORY_SIGN = Compliance(rate=0.1, strength=0.35)
 """Signs next to the road that advise a speed.
 
 Caltrans' CAWS near Stockton (MacCarley, Ackles & Watts 2006): mean speeds fell by 1.1 mph over all fogs, and were
@@ -51,17 +51,17 @@ Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the w
 60 km/h.
 """
 
-VEHICLE_TO_VEHICLE = Compliance(reached_share=0.3, strength=0.55)
+_VEHICLE_TO_VEHICLE = Compliance(reached_share=0.3, strength=0.55)
 """Advice from vehicle to vehicle, displayed in the car: as `IN_CAR`, to those who are equipped; FogSim's own share."""
 
 COMPLIANCES: Registry[Compliance] = Registry(
     "compliance",
     {
         "full": FULL,
-        "speed_limit_sign": SPEED_LIMIT_SIGN,
-        "advisory_sign": ADVISORY_SIGN,
+        "speed_limit_sign": _SPEED_LIMIT_SIGN,
+        "advisory_sign": _ADVISORY_SIGN,
         "in_car": IN_CAR,
-        "vehicle_to_vehicle": VEHICLE_TO_VEHICLE,
+        "vehicle_to_vehicle": _VEHICLE_TO_VEHICLE,
     },
 )
 

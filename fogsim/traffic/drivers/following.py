@@ -16,7 +16,7 @@ from fogsim.traffic.drivers.leader_reach import LeaderReach
 CATCHING_UP = 5.0
 """Who keeps up with a leader is ready to drive so much faster, as IDM must be to hold a gap [m/s]; FogSim's own."""
 
-RECOMMENDED_HEADWAY = 2.0
+_RECOMMENDED_HEADWAY = 2.0
 """Time headway that traffic education recommends [s] (the two-second rule)."""
 
 
@@ -80,7 +80,7 @@ class Careful(FollowingModel):
     Meijman 1998, 1999). By how much is FogSim's own: linear in visibility to the recommended one.
     """
 
-    recommended: float = RECOMMENDED_HEADWAY  # Headway in dense fog, unless the own one is longer [s]
+    recommended: float = _RECOMMENDED_HEADWAY  # Headway in dense fog, unless the own one is longer [s]
     unaffected_above: float = 200.0  # Visibility from which the headway is that of clear air [m]
     dense: float = 50.0  # Visibility up to which the headway is the recommended one [m]
 

@@ -12,16 +12,16 @@ from fogsim.values import Lamp
 from fogsim.values.light import Side, burning
 from fogsim.values.luminous_intensity import SignalLobe, signal_share
 
-REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
+_REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
 """Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
 
 THIRD_STOP_LAMP = 40.0
 """Luminous intensity of the third stop lamp, where it burns alone [cd]: within UNECE's 25–110 (R148, S3)."""
 
-BRIGHTEST = REAR_LAMPS[0][1]
+BRIGHTEST = _REAR_LAMPS[0][1]
 """Luminous intensity of the brightest rear lamp [cd]."""
 
-FRONT_SIGNAL_LAMPS = ((int(Lamp.DAYTIME), 600.0), (int(Lamp.POSITION), 10.0))
+_FRONT_SIGNAL_LAMPS = ((int(Lamp.DAYTIME), 600.0), (int(Lamp.POSITION), 10.0))
 """Luminous intensity of one front lamp that shines all around [cd]: within UNECE's 400–1200 and 4–140."""
 
 LEAST_INTENSITY = 0.05
@@ -34,18 +34,18 @@ LIT_ROAD_INTENSITY = 0.2
 SIDE_MARKER = 4.0
 """Luminous intensity of a side marker lamp [cd]: UNECE R148 asks for 4–25."""
 
-SHORTEST_WITH_MARKERS = 6.0
+_SHORTEST_WITH_MARKERS = 6.0
 """Vehicles longer than this must have side marker lamps [m] (UNECE R48)."""
 
-HEAD_LAMPS = int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
+_HEAD_LAMPS = int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
 
-BEAM_WIDTH = math.radians(7.0)
+_BEAM_WIDTH = math.radians(7.0)
 """Angle to the side at which a dipped beam below its cut-off has 1/e of its light ahead [rad]: UMTRI-2004-23 at 1.5°
 down has 0.52, 0.22, 0.05 at 5°, 10°, 20°, the mean of both sides."""
 
 
 @functools.lru_cache(maxsize=1024)
-def kinds_that_burn(lamps: int) -> int:
+def _kinds_that_burn(lamps: int) -> int:
     """Kinds of lamps that burn on the left or on the right, bits of `Lamp`."""
     return burning(lamps, Side.LEFT) | burning(lamps, Side.RIGHT)
 
@@ -53,7 +53,7 @@ def kinds_that_burn(lamps: int) -> int:
 @functools.lru_cache(maxsize=1024)
 def head_lamps_that_burn(lamps: int) -> tuple[int, ...]:
     """Beams, bits of `Lamp`, of each of a vehicle's two head lamps that burns."""
-    return tuple(lit for side in (Side.LEFT, Side.RIGHT) if (lit := burning(lamps, side) & HEAD_LAMPS))
+    return tuple(lit for side in (Side.LEFT, Side.RIGHT) if (lit := burning(lamps, side) & _HEAD_LAMPS))
 
 
 def burning_head_lamps(lamps: int) -> float:
@@ -67,14 +67,14 @@ def rear_intensity(lamps: int) -> float:
 
     Of two alike each is seen by itself, so that one that fails changes nothing as long as the other one burns.
     """
-    kinds = kinds_that_burn(lamps)
+    kinds = _kinds_that_burn(lamps)
     third = THIRD_STOP_LAMP if burning(lamps, Side.MIDDLE) else 0.0
-    return max(next((intensity for lamp, intensity in REAR_LAMPS if kinds & lamp), 0.0), third)
+    return max(next((intensity for lamp, intensity in _REAR_LAMPS if kinds & lamp), 0.0), third)
 
 
 def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> float:
     """Luminous intensity of the brightest lamp of a vehicle toward an eye [cd] (`length` [m], `ahead`, `aside` [m])."""
-    kinds = kinds_that_burn(lamps)
+    kinds = _kinds_that_burn(lamps)
     if not lamps:
         return 0.0
     has_position_lamps = bool(kinds & int(Lamp.POSITION))
@@ -86,16 +86,16 @@ def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> f
     if ahead < -length:
         lobe = SignalLobe.REAR_FOG if kinds & int(Lamp.REAR_FOG) else SignalLobe.SIGNAL
         return max(rear_intensity(lamps) * signal_share(lobe, math.atan2(aside, -length - ahead)), least)
-    return SIDE_MARKER if has_position_lamps and length > SHORTEST_WITH_MARKERS else least
+    return SIDE_MARKER if has_position_lamps and length > _SHORTEST_WITH_MARKERS else least
 
 
 def head_lamp_share(bearing: float) -> float:
     """Light of the own head lamps in a direction over that straight ahead [-] (`bearing` [rad])."""
-    return math.exp(-abs(bearing) / BEAM_WIDTH)
+    return math.exp(-abs(bearing) / _BEAM_WIDTH)
 
 
 def _front_intensity(lamps: int, angle: float) -> float:
-    signal = next((intensity for lamp, intensity in FRONT_SIGNAL_LAMPS if lamps & lamp), 0.0)
+    signal = next((intensity for lamp, intensity in _FRONT_SIGNAL_LAMPS if lamps & lamp), 0.0)
     signal *= signal_share(SignalLobe.DAYTIME if lamps & int(Lamp.DAYTIME) else SignalLobe.SIGNAL, angle)
     return max(signal, beam_intensity(lamps, math.degrees(angle)))
 

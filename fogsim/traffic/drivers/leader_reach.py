@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.units import DAY_ILLUMINANCE, extinction_from_visibility
 
-TYPICAL_CONTRAST = 0.9
+_TYPICAL_CONTRAST = 0.9
 """Inherent contrast of a typical rear to the airlight [-]: paint of reflectance 0.25 and a third that is dark."""
 
-POSITION_LAMP = 8.0
+_POSITION_LAMP = 8.0
 """Luminous intensity of a rear position lamp [cd]."""
 
-REFERENCE_LAMP = 2.0
+_REFERENCE_LAMP = 2.0
 """Luminous intensity of the rear light whose range gives the visibility by night (White & Jeffery 1980) [cd]."""
 
 _STEPS_PER_E_FOLD = 100
@@ -63,12 +63,12 @@ def _extinction(step: int) -> float:
 def _leader_reach(sight: DriverSight, step: int) -> LeaderReach:
     extinction = _extinction(step)
     return LeaderReach(
-        by_body=sight.seen_distance(extinction, TYPICAL_CONTRAST),
-        farthest=sight.seen_distance(extinction, TYPICAL_CONTRAST, POSITION_LAMP),
+        by_body=sight.seen_distance(extinction, _TYPICAL_CONTRAST),
+        farthest=sight.seen_distance(extinction, _TYPICAL_CONTRAST, _POSITION_LAMP),
     )
 
 
 @functools.lru_cache(maxsize=4096)
 def _visibility(sight: DriverSight, step: int) -> float:
     # By day this is the visibility itself, in darkness the range of the lamp.
-    return sight.seen_distance(_extinction(step), 1.0, REFERENCE_LAMP, head_lamps=0.0)
+    return sight.seen_distance(_extinction(step), 1.0, _REFERENCE_LAMP, head_lamps=0.0)

@@ -9,10 +9,10 @@ HIGH_BEAM_LIGHT = 4.8
 """Light of high beams on the rear of a vehicle ahead over that of low beams [-]: the mean over 1.6 m across and 0.3 to
 1.2 m above the road of UMTRI-2001-19, table 6, over that of UMTRI-2004-23, table 4, is 4.5 … 5.0 from 30 to 200 m."""
 
-DENSEST_VEIL = 4.4
+_DENSEST_VEIL = 4.4
 """What the veil of high beams exceeds that of low beams by in the densest fog [cd/m²]."""
 
-HALF_VEIL_EXTINCTION = 0.0325
+_HALF_VEIL_EXTINCTION = 0.0325
 """Extinction coefficient at which it is half of that [1/m]."""
 
 
@@ -37,4 +37,4 @@ def high_beam_veil(extinction: float) -> float:
 
     Takes `extinction` [1/m].
     """
-    return DENSEST_VEIL * extinction / (extinction + HALF_VEIL_EXTINCTION)
+    return _DENSEST_VEIL * extinction / (extinction + _HALF_VEIL_EXTINCTION)

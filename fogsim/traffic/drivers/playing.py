@@ -11,13 +11,13 @@ from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import Side, dark_on, settled
 from fogsim.values.script import Arrive, ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
 
-GAP_GAIN, SPEED_GAIN = 0.25, 0.8
+_GAP_GAIN, _SPEED_GAIN = 0.25, 0.8
 """Of the law by which a scripted vehicle follows: acceleration for a gap [1/s²] and for a difference of speeds [1/s].
 
 They damp it at any headway above 0.25 s (Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 6: constant time gap).
 """
 
-LEAST_ACCELERATION, MOST_ACCELERATION = -6.0, 2.5
+_LEAST_ACCELERATION, _MOST_ACCELERATION = -6.0, 2.5
 """Limits of that acceleration [m/s²]."""
 
 
@@ -84,8 +84,8 @@ class _FollowCourse:
         if gap is None:
             return math.inf
         excess = gap - follow.gap - follow.headway * own
-        wanted = GAP_GAIN * excess + SPEED_GAIN * (motion.speed(follow.leader) - own)
-        return max(own + min(max(wanted, LEAST_ACCELERATION), MOST_ACCELERATION) * motion.step, 0.0)
+        wanted = _GAP_GAIN * excess + _SPEED_GAIN * (motion.speed(follow.leader) - own)
+        return max(own + min(max(wanted, _LEAST_ACCELERATION), _MOST_ACCELERATION) * motion.step, 0.0)
 
 
 @dataclass(slots=True)
@@ -206,7 +206,7 @@ class Lamps:
         return replace(state, lamps=lamps.astype(np.int32))
 
 
-USUAL_DURATION = 3.0
+_USUAL_DURATION = 3.0
 """Time that a change of lane takes which says nothing of it [s]."""
 
 
@@ -242,7 +242,7 @@ class Playing:
                 self._courses[action.vehicle] = _StopCourse(action, place)
             case ChangeLane():
                 begins = motion.time + action.indicator
-                lasting = USUAL_DURATION if action.duration is None else action.duration
+                lasting = _USUAL_DURATION if action.duration is None else action.duration
                 indicating = _Indicating(action, begins, begins + lasting)
                 self._due_changes.append(indicating)
                 if action.indicator > 0.0:

@@ -26,7 +26,7 @@ from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, luminance_of
 from fogsim.values.fog import AIRLIGHT_SHARE
 
-VERTICAL_ILLUMINANCE = 0.5
+_VERTICAL_ILLUMINANCE = 0.5
 """Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
 
 
@@ -152,4 +152,4 @@ def inherent_contrast(paint: tuple[float, float, float], airlight_share: float =
     A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
     """
     reflectance = luminance_of(paint) * 2.0 / 3.0
-    return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / airlight_share)
+    return max(0.0, 1.0 - _VERTICAL_ILLUMINANCE * reflectance / airlight_share)

@@ -15,14 +15,14 @@ FARTHEST = 1e5
 DISTANCE_TOLERANCE = 0.01
 """By how much a distance that is searched for may be too small [m]."""
 
-NEAREST = 0.1
+_NEAREST = 0.1
 """No one is nearer than this [m]."""
 
 BODY_MIDDLE = 1.2
 """Height above the road at which a vehicle is looked at by those whose eyes are higher [m]."""
 
 
-DISTANCE, DEPTH, CLOSING, DEEPENING, CONTRAST, STEADY, INTENSITY, BRIGHTEST, OWN_STEADY, OWN = range(10)
+DISTANCE, DEPTH, _CLOSING, _DEEPENING, CONTRAST, STEADY, INTENSITY, BRIGHTEST, OWN_STEADY, OWN = range(10)
 """Rows of what is known of drivers and their leaders.
 
 Distance [m] and optical depth [-] between them, and bounds on how fast these change [m/s], [1/s]; the leader's inherent
@@ -34,7 +34,7 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
 
 
-X, Y, Z, SPEED, MINIMUM_GAP, BODY_CONTRAST, EYE_HEIGHT = range(7)
+X, Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
 """Columns of what is known of a vehicle: where its front bumper is [m], its speed [m/s], its driver's minimum gap [m],
 the contrast of its body [-], and its driver's eyes above the road [m]."""
 
@@ -64,12 +64,12 @@ def face_leaders(
     """
     for i in range(gaps.size):
         own, other = vehicles[behind[i]], vehicles[ahead[i]]
-        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], NEAREST)
-        facing[CONTRAST, i] = other[BODY_CONTRAST]
-        facing[CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed
+        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], _NEAREST)
+        facing[CONTRAST, i] = other[_BODY_CONTRAST]
+        facing[_CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
-        facing[DEEPENING, i] = closing.extinction * (facing[CLOSING, i] if closing.is_even else apart)
+        facing[_DEEPENING, i] = closing.extinction * (facing[_CLOSING, i] if closing.is_even else apart)
         x, y, z = other[X] - own[X], other[Y] - own[Y], other[Z] - own[Z]
         height = own[EYE_HEIGHT]
         z += min(height, BODY_MIDDLE) - height
@@ -142,7 +142,7 @@ def judge_leaders(
     """
     for i in range(facing.shape[1]):
         distance, depth, contrast = facing[DISTANCE, i], facing[DEPTH, i], facing[CONTRAST, i]
-        deepening, change = facing[DEEPENING, i], facing[CLOSING, i] * horizon
+        deepening, change = facing[_DEEPENING, i], facing[_CLOSING, i] * horizon
         judged[1, i] = 0.0
         # Lamps that are commanded may go dark at once; what the others light stays.
         steady, own = facing[STEADY, i], facing[OWN_STEADY, i]
@@ -156,6 +156,6 @@ def judge_leaders(
             judged[0, i] = SEEN if is_certain else DAZZLED
             continue
         # Lamps that are commanded may be commanded otherwise in any step.
-        lit, nearest = facing[BRIGHTEST, i], max(distance - change, NEAREST)
+        lit, nearest = facing[BRIGHTEST, i], max(distance - change, _NEAREST)
         limit = depth_limit(eyes, threshold, reach, nearest, contrast, lit, 1.0)
         judged[0, i], judged[1, i] = HIDDEN, min(max(depth - limit, 0.0) / deepening, horizon)

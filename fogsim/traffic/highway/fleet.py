@@ -12,7 +12,7 @@ EGO = "ego"
 LEAD = "lead"
 """Id of the vehicle that is ahead of the ego in its lane when the run begins, if there is one."""
 
-BRAKING = 0.5
+_BRAKING = 0.5
 """Stop lamps are lit from this deceleration [m/s²]."""
 
 
@@ -92,7 +92,7 @@ class Fleet:
         if not hasattr(vehicle, "action") or self.name(vehicle) in self.dark:
             return Lamp.NONE
         steady = self.ego_lamps if vehicle is self.ego else self.lamps_of.get(self.name(vehicle), OTHERS_LAMPS)
-        return steady | Lamp.STOP if acceleration(vehicle) < -BRAKING else steady
+        return steady | Lamp.STOP if acceleration(vehicle) < -_BRAKING else steady
 
 
 def acceleration(vehicle: Any) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.traffic.highway.route import lanes_ahead, reached_at
 from fogsim.values import Lane, LaneMarking, RoadNetwork
 
-SAMPLING = 2.0
+_SAMPLING = 2.0
 """Longest piece of a curved centreline [m]; at 10 m radius it leaves the curve by 5 cm."""
 
 _MARKINGS = {
@@ -93,7 +93,7 @@ def edge_id(start: str, end: str) -> str:
 
 
 def _centreline(lane: Any, start: float = 0.0) -> NDArray[np.float64]:
-    stations = np.linspace(start, lane.length, max(2, math.ceil((lane.length - start) / SAMPLING) + 1))
+    stations = np.linspace(start, lane.length, max(2, math.ceil((lane.length - start) / _SAMPLING) + 1))
     if np.ptp([lane.heading_at(s) for s in stations]) == 0:
         stations = stations[[0, -1]]
     return upright([lane.position(s, 0.0) for s in stations])

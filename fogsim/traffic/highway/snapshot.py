@@ -14,10 +14,10 @@ from fogsim.traffic.highway.route import RouteProgress
 from fogsim.values import Collision, Leader, TrafficSnapshot, TrafficState
 from fogsim.values.traffic import advised_speeds
 
-HEIGHT = 1.5
+_HEIGHT = 1.5
 """Height of every vehicle [m], taken from SUMO's passenger cars; highway-env's have none."""
 
-LEADER_REACH = 300.0
+_LEADER_REACH = 300.0
 """How far ahead a leader is looked for [m]."""
 
 
@@ -85,7 +85,7 @@ def _state(fleet: Fleet, vehicles: list[Any], heard: Mapping[str, float]) -> Tra
         acceleration=np.array([acceleration(v) for v in vehicles]),
         length=np.array([v.LENGTH for v in vehicles], dtype=np.float64),
         width=np.array([v.WIDTH for v in vehicles], dtype=np.float64),
-        height=np.full(len(vehicles), HEIGHT),
+        height=np.full(len(vehicles), _HEIGHT),
         lane=tuple(lane_id(v.lane_index) for v in vehicles),
         lamps=np.array([int(fleet.lamps(v)) for v in vehicles], dtype=np.int32),
         paint=np.array([fleet.paint(v) for v in vehicles]),
@@ -100,4 +100,4 @@ def _leader(fleet: Fleet) -> Leader | None:
     if front is None or isinstance(front, Landmark):
         return None
     gap = float(ego.lane_distance_to(front)) - 0.5 * (ego.LENGTH + front.LENGTH)
-    return Leader(fleet.name(front), gap, float(front.speed)) if gap <= LEADER_REACH else None
+    return Leader(fleet.name(front), gap, float(front.speed)) if gap <= _LEADER_REACH else None

@@ -25,7 +25,7 @@ from fogsim.values import Collision, Command, RoadNetwork, SignMap, TrafficSnaps
 from fogsim.values.script import TrafficAction
 
 
-def find_collisions(fleet: Fleet, period: float) -> Iterator[Collision]:
+def _find_collisions(fleet: Fleet, period: float) -> Iterator[Collision]:
     """Collisions of the last simulation step by the library's own rule; they are found in later steps again.
 
     Takes `period` [s].
@@ -173,7 +173,7 @@ class HighwayTraffic:
         fleet.environment.road.step(self.step_length)
         fleet.environment.steps += 1
         fleet.environment.time += self.step_length
-        self._collisions.add(find_collisions(fleet, self.step_length))
+        self._collisions.add(_find_collisions(fleet, self.step_length))
         if self._after_collision is AfterCollision.REMOVE:
             road = fleet.environment.road
             road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]

@@ -8,7 +8,7 @@ from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
 from fogsim.traffic.road.configuration import configured_demand
 
-MOST_BYTES = 50_000_000
+_MOST_BYTES = 50_000_000
 """Unpacked bytes of files after which nothing is claimed about a demand."""
 
 MOST_NAMES = 10_000
@@ -56,7 +56,7 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
 
 
 def read_demand(
-    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = MOST_BYTES, *, reroutes: bool = False
+    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = _MOST_BYTES, *, reroutes: bool = False
 ) -> Demand:
     """Search for vehicles in additional and route files, in SUMO's order.
 

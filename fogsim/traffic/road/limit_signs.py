@@ -10,7 +10,7 @@ from fogsim.values import Sign
 
 SPEED_LIMIT = "speed_limit"
 """Type of the signs."""
-SIGN_CLEARANCE = 3.9
+_SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
 _OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
 """Alternative distances where the usual one is on another road; the first free one is used [m]."""
@@ -39,7 +39,7 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
     x, y, z = points[0] + along / math.hypot(*along) * min(10.0, 0.5 * lane.getLength())
     places = [
         (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
-        for left in (side * (lane.getWidth() / 2 + away) for away in (SIGN_CLEARANCE, *_OTHER_CLEARANCES))
+        for left in (side * (lane.getWidth() / 2 + away) for away in (_SIGN_CLEARANCE, *_OTHER_CLEARANCES))
     ]
     # Another road may be next to it, where roads part or meet.
     x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])

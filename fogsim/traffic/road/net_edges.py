@@ -9,7 +9,7 @@ from pathlib import Path
 from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
 
-MOST_BYTES = 50_000_000
+_MOST_BYTES = 50_000_000
 """Unpacked bytes of a network file after which reading stops."""
 
 Point = tuple[float, ...]
@@ -34,7 +34,7 @@ class NetEdges:
 
 
 def read_net_edges(
-    net: Path, wanted: Sequence[str], most_bytes: int = MOST_BYTES, *, must_follow: bool = False
+    net: Path, wanted: Sequence[str], most_bytes: int = _MOST_BYTES, *, must_follow: bool = False
 ) -> NetEdges | None:
     """Edges of a network, with axes of the wanted ones and gaps between them; None if too large or not a network."""
     reader = _EdgeReader(wanted, set(itertools.pairwise(wanted)) if must_follow else set())

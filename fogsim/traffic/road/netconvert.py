@@ -15,7 +15,7 @@ from fogsim.core.files.readers import read_text
 from fogsim.errors import InputError, MissingDependencyError, shown
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 
-USUAL_LIMIT = 130.0 / 3.6
+_USUAL_LIMIT = 130.0 / 3.6
 """Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
 
 _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
@@ -30,7 +30,7 @@ _MOST_SHOWN = 1000  # of its last messages [bytes]
 _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
-def netconvert_program() -> str:
+def _netconvert_program() -> str:
     """Path of netconvert; MissingDependencyError if it is missing."""
     package = importlib.util.find_spec("sumo")
     folders = [Path(place) / "bin" for place in (package.submodule_search_locations or ())] if package else []
@@ -44,9 +44,9 @@ def netconvert_program() -> str:
     return found
 
 
-def netconvert_recipe(*, with_oncoming: bool = False) -> bytes:
+def _netconvert_recipe(*, with_oncoming: bool = False) -> bytes:
     """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
-    program = Path(netconvert_program())
+    program = Path(_netconvert_program())
     return f"{program}\0{program.stat().st_mtime_ns}\0{with_oncoming}\0".encode() + Path(__file__).read_bytes()
 
 
@@ -54,7 +54,7 @@ def map_net(path: Path, *, with_oncoming: bool) -> str:
     """Text of the SUMO network of a map; see `opendrive_net`."""
     if not is_opendrive(path):
         return read_text(path, _MOST_BYTES)
-    recipe = netconvert_recipe(with_oncoming=with_oncoming)
+    recipe = _netconvert_recipe(with_oncoming=with_oncoming)
     return kept_text("opendrive", path, recipe, lambda: opendrive_net(path, with_oncoming=with_oncoming))
 
 
@@ -64,7 +64,7 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
     Its lanes have the parameter ``origId``, OpenDRIVE's road and lane. In a network `with_oncoming` lanes to overtake
     on, both directions of a road count its length alike, also in bends.
     """
-    program = netconvert_program()
+    program = _netconvert_program()
     source = read_opendrive(path)
     for road in source.iter("road"):
         if road.get("rule") == "LHT":
@@ -74,7 +74,7 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
         types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
         roads = Path(folder) / "road.xodr"
         ElementTree(_without_empty_attributes(source)).write(roads, encoding="utf-8")
-        lines = [f'<type id="{name}" priority="1" speed="{USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
+        lines = [f'<type id="{name}" priority="1" speed="{_USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
         types.write_text(f"<types>{''.join(lines)}</types>", encoding="utf-8")
         command = [program, "--opendrive-files", str(roads), "-o", str(net), "-t", str(types)]
         command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]

@@ -23,13 +23,13 @@ from fogsim.values.light import SIGNAL_DIAMETER
 LARGE_DIAMETER = 0.3
 """Diameter of the lenses above roads and next to fast ones [m]."""
 
-FAST = 16.7
+_FAST = 16.7
 """Speed limit above which the lenses next to a road are large, too [m/s]."""
 
 POST_HEIGHT, ARM_HEIGHT = 2.75, 5.5
 """Height of the middle lens next to and above the road [m]: footways are clear to 2.1 m, roads to 4.5 m."""
 
-ON_FOOT_HEIGHT = 2.4
+_ON_FOOT_HEIGHT = 2.4
 """Height of the middle of heads for pedestrians [m]."""
 
 _BEYOND, _BESIDE_CROSSING = 0.5, 0.4  # of posts of such heads, from the end and the border of their crossing [m]
@@ -55,7 +55,7 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
         # Lanes of an edge end on a line across it, and arms extend along that line.
         place = post if number == 0 else post + across * float(matrix_product(end - post, across))
         height = ARM_HEIGHT if number else POST_HEIGHT
-        is_large = number > 0 or float(lane.getSpeed()) > FAST
+        is_large = number > 0 or float(lane.getSpeed()) > _FAST
         yield SignalHead(
             signal_id=signal,
             lane_id=lane.getID(),
@@ -67,7 +67,7 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
         )
 
 
-def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
+def _crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
     """Heads for pedestrians at both ends of a crossing lane (sumolib).
 
     `side` is the side that vehicles keep to: left (1) or right (−1).
@@ -86,7 +86,7 @@ def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
             signal_id=ways[0].getTLSID(),
             lane_id=name,
             links=(ways[0].getTLLinkIndex(),),
-            position=_tuple(post + np.array([0.0, 0.0, ON_FOOT_HEIGHT])),
+            position=_tuple(post + np.array([0.0, 0.0, _ON_FOOT_HEIGHT])),
             heading=heading,
             diameter=SIGNAL_DIAMETER,
             post=_tuple(post),
@@ -126,7 +126,7 @@ _STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic li
 _ADJOINING = 0.6  # two carriageways whose borders are nearer than this share a line [m]
 
 
-def map_of(net: Any, lefthand: bool) -> RoadMap:
+def _map_of(net: Any, lefthand: bool) -> RoadMap:
     """Map of a network that was read with its internal edges.
 
     Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
@@ -153,7 +153,7 @@ def map_of(net: Any, lefthand: bool) -> RoadMap:
 def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
     function = edge.getFunction()
     if function:
-        return crossing_heads(edge.getLanes()[0], side) if function == "crossing" else iter(())
+        return _crossing_heads(edge.getLanes()[0], side) if function == "crossing" else iter(())
     return signal_heads([lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY], side)
 
 
@@ -274,7 +274,7 @@ def _parsed(path: Path) -> RoadMap:
     try:
         read_elements(path, reader, _MOST_BYTES)
         reader.endDocument()
-        found = map_of(reader.getNet(), reader.is_lefthand)
+        found = _map_of(reader.getNet(), reader.is_lefthand)
     except InputError:
         raise
     except Exception as error:  # sumolib checks nothing

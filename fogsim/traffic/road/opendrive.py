@@ -13,17 +13,17 @@ from fogsim.traffic.road.plan_view import PlanView, plan_view
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign
 
-GERMAN_SPEED_LIMIT = "274"
+_GERMAN_SPEED_LIMIT = "274"
 """Number of the maximum-speed sign in the German catalogue (VzKat), which OpenDRIVE files commonly use."""
 
-HEIGHT = 2.6
+_HEIGHT = 2.6
 """Default height of a sign's middle [m]."""
-DIAMETER = 0.9
+_DIAMETER = 0.9
 """Default diameter of a sign [m]."""
 FASTEST = 300.0 / KMH_PER_MPS
 """Highest speed on a sign [m/s]."""
 
-LONGEST_ROAD = 50_000.0
+_LONGEST_ROAD = 50_000.0
 """Longest road that is read [m]: netconvert's time grows with the square of a curve's length."""
 
 _SECTIONS = ("planView", "elevationProfile", "lateralProfile", "lanes")
@@ -75,16 +75,18 @@ def read_opendrive(path: Path) -> Element:
     root = read_tree(path, "OpenDRIVE")
     for road in root.iter("road"):
         where = f"{path}: road {shown(road.get('id', '?'))}"
-        along = [number_in_text(where, "length", road.get("length", "0"), 0.0, LONGEST_ROAD)]
+        along = [number_in_text(where, "length", road.get("length", "0"), 0.0, _LONGEST_ROAD)]
         for element in (one for section in road if section.tag in _SECTIONS for one in section.iter()):
             inside = f"{where}: <{element.tag}>"
             for key, text in element.attrib.items():
                 if key in _NUMBERS:
                     number_in_text(inside, key, text)
             if element.tag == "geometry":
-                along.append(number_in_text(inside, "length", element.get("length", "0"), 0.0, LONGEST_ROAD))
-        if sum(along[1:]) > LONGEST_ROAD:
-            raise InputError(f"{where}: its geometry is {sum(along[1:]):g} m long; at most {LONGEST_ROAD:g} m are read")
+                along.append(number_in_text(inside, "length", element.get("length", "0"), 0.0, _LONGEST_ROAD))
+        if sum(along[1:]) > _LONGEST_ROAD:
+            raise InputError(
+                f"{where}: its geometry is {sum(along[1:]):g} m long; at most {_LONGEST_ROAD:g} m are read"
+            )
     return root
 
 
@@ -114,7 +116,7 @@ def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_ha
         raise InputError(f"{where}: {error}") from None
     # Some programs write -1 for an unknown size.
     size = max(0.0, *(_number(where, signal, key) for key in ("width", "height")))
-    above = _number(where, signal, "zOffset") + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
+    above = _number(where, signal, "zOffset") + 0.5 * size if "zOffset" in signal.attrib else _HEIGHT
     kind, value = _meaning(where, signal)
     position = (
         x - t * math.sin(along) + net_offset[0],
@@ -122,7 +124,7 @@ def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_ha
         road.height(s) + above,
     )
     heading = along + _number(where, signal, "hOffset") + (0.0 if _faces_along(signal, t, left_hand) else math.pi)
-    return Sign(f"xodr.{signal.get('id', '')}", kind, value, position, heading, size or DIAMETER)
+    return Sign(f"xodr.{signal.get('id', '')}", kind, value, position, heading, size or _DIAMETER)
 
 
 def _faces_along(signal: Element, t: float, left_hand: bool) -> bool:
@@ -135,9 +137,9 @@ def _meaning(where: str, signal: Element) -> tuple[str, float]:
     """Type and value of a signal."""
     code, name = signal.get("type", ""), signal.get("name", "").lower()
     value = _number(where, signal, "value")
-    if code == GERMAN_SPEED_LIMIT and value <= 0 and signal.get("subtype", "").isdecimal():
+    if code == _GERMAN_SPEED_LIMIT and value <= 0 and signal.get("subtype", "").isdecimal():
         value = _number(where, signal, "subtype")
-    if (code == GERMAN_SPEED_LIMIT or name.startswith("speed")) and value > 0:
+    if (code == _GERMAN_SPEED_LIMIT or name.startswith("speed")) and value > 0:
         unit = signal.get("unit", "")
         if unit not in _METRES_PER_SECOND:
             allowed = ", ".join(filter(None, _METRES_PER_SECOND))

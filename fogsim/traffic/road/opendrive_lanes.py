@@ -16,7 +16,7 @@ from fogsim.errors import InputError
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
-FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
+_FARTHEST_ROUTE, _LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
 _ROUNDING = 0.01  # of places across a lane [m]
@@ -220,7 +220,7 @@ class OpenDriveLanes:
     def backwards(self, spot: Spot) -> list[tuple[float, float]]:
         """Points from a place against its lane's direction, straight on until the road ends [m]."""
         found, lane, position, length = [spot.world[:2]], spot.lane, spot.position, 0.0
-        while length < LONGEST_LAPS:
+        while length < _LONGEST_LAPS:
             steps = np.diff(lane.shape, axis=0)
             lengths = np.hypot(steps[:, 0], steps[:, 1])
             along = np.concatenate([[0.0], np.cumsum(lengths)]) * lane.length / lengths.sum()
@@ -245,9 +245,9 @@ class OpenDriveLanes:
             joined = (*before, *(wanted if before else wanted[list(wanted).index(edge) :]))
             return (*joined, *self.route(joined[-1])[1:])
         lengths = {one.edge: one.length for one in self.lanes}
-        found, length, most = [edge], lengths[edge], FARTHEST_ROUTE
+        found, length, most = [edge], lengths[edge], _FARTHEST_ROUTE
         while length < most and (following := self.followers.get(found[-1])):
-            most = LONGEST_LAPS if following[0] in found else most
+            most = _LONGEST_LAPS if following[0] in found else most
             found.append(following[0])
             length += lengths[found[-1]]
         return tuple(found)

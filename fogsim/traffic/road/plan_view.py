@@ -10,7 +10,7 @@ import numpy as np
 from fogsim.core.files.readers import number_in_text
 from fogsim.core.linear_algebra import matrix_product
 
-SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
+_SPIRAL_NODES, _SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Gauss-Legendre rule on −1 … 1; on a spiral that turns by π its error is far below a millimetre."""
 
 _STEP, _ROUNDS = 20.0, 6  # Distance of first guesses along a line [m], and corrections of the best one
@@ -39,10 +39,10 @@ class Piece:
         """Point at a distance from its start [m]."""
         turned = self._turned(distance)
         if self.curvature_rate:
-            along = 0.5 * distance * (SPIRAL_NODES + 1.0)
+            along = 0.5 * distance * (_SPIRAL_NODES + 1.0)
             angles = self.heading + self.curvature * along + 0.5 * self.curvature_rate * along**2
-            dx = 0.5 * distance * float(matrix_product(SPIRAL_WEIGHTS, np.cos(angles)))
-            dy = 0.5 * distance * float(matrix_product(SPIRAL_WEIGHTS, np.sin(angles)))
+            dx = 0.5 * distance * float(matrix_product(_SPIRAL_WEIGHTS, np.cos(angles)))
+            dy = 0.5 * distance * float(matrix_product(_SPIRAL_WEIGHTS, np.sin(angles)))
         else:
             # A chord of an arc: its length is that of the arc times sin(a) / a, its direction the middle one.
             half = 0.5 * turned

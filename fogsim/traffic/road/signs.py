@@ -15,15 +15,15 @@ from fogsim.traffic.road.road_map import RoadMap
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 
-SIGN_TYPE = "fogsim.sign."
+_SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
-LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
+_LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Types whose value is a speed, in km/h in additional files."""
-GANTRY_HEIGHT = 6.2
+_GANTRY_HEIGHT = 6.2
 """Height of the middle of a face above a lane [m]: vehicles up to 4.5 m pass below."""
 
-DIAMETERS, HEIGHTS = (0.05, 20.0), (0.0, 50.0)
+_DIAMETERS, _HEIGHTS = (0.05, 20.0), (0.0, 50.0)
 """Sizes of signs, and heights of their middle above the road [m]."""
 
 LonLat = tuple[float, float]
@@ -36,7 +36,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
         if is_opendrive(path):
             signs += opendrive_signs(path, _net_offset(roads))
         else:
-            signs += [_marked_sign(shape, pieces) for shape in marked_shapes(path, SIGN_TYPE)]
+            signs += [_marked_sign(shape, pieces) for shape in marked_shapes(path, _SIGN_TYPE)]
     return SignMap(tuple(signs))
 
 
@@ -90,13 +90,13 @@ class _Roads:
 def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
     x, y = _middle(shape)
     heading = math.radians(90.0 - number_in_text(shape.where, "angle", shape.attributes.get("angle", "")))
-    if shape.kind in LIMITS:
+    if shape.kind in _LIMITS:
         value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
     else:
         value = shape.parameter("value", -FARTHEST, FARTHEST, 0.0)
-    diameter = shape.parameter("diameter", *DIAMETERS, SIGN_DIAMETER)
+    diameter = shape.parameter("diameter", *_DIAMETERS, SIGN_DIAMETER)
     ground, over_lane = roads.below(x, y)
-    above = shape.parameter("height", *HEIGHTS, GANTRY_HEIGHT if over_lane else SIGN_HEIGHT)
+    above = shape.parameter("height", *_HEIGHTS, _GANTRY_HEIGHT if over_lane else SIGN_HEIGHT)
     return Sign(shape.name, shape.kind, value, (x, y, ground + above), heading, diameter)
 
 

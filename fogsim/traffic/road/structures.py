@@ -13,7 +13,7 @@ from fogsim.values import Structure, StructureKind
 STRUCTURE_TYPE = "fogsim.structure."
 """Polygons of type ``fogsim.structure.KIND`` in an additional file are structures; their shape is their middle line."""
 
-WIDEST, HEIGHTS = 10_000.0, (-1000.0, 10_000.0)
+_WIDEST, _HEIGHTS = 10_000.0, (-1000.0, 10_000.0)
 """Greatest width of a structure, and heights of its bottom and top [m]."""
 
 
@@ -30,8 +30,8 @@ def _structure(shape: MarkedShape) -> Structure:
     if shape.kind not in kinds:
         raise InputError(f"{shape.where}: unknown kind of structure {shape.kind!r}; {suggest(shape.kind, kinds)}")
     line = np.array([[*corner, 0.0][:3] for corner in shape.corners()], np.float64)
-    width = shape.parameter("width", 0.0, WIDEST)
-    bottom, top = shape.parameter("bottom", *HEIGHTS, 0.0), shape.parameter("top", *HEIGHTS)
+    width = shape.parameter("width", 0.0, _WIDEST)
+    bottom, top = shape.parameter("bottom", *_HEIGHTS, 0.0), shape.parameter("top", *_HEIGHTS)
     line = line[[True, *np.any(line[1:] != line[:-1], axis=1)]]  # a repeated corner has no direction
     if len(line) < 2 or width <= 0.0 or top <= bottom:
         raise InputError(

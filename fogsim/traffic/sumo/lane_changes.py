@@ -17,20 +17,20 @@ from fogsim.values import TrafficState
 DURATION = 3.0
 """Time that a change by one lane takes [s]."""
 
-LEAST_DURATION = 0.001
+_LEAST_DURATION = 0.001
 """Time that a change at once takes [s]."""
 
-LANE_WIDTH = 3.75
+_LANE_WIDTH = 3.75
 """Whoever moves farther to the side than this takes longer, at the same sideways speed [m]."""
 
-LEAST_JUMP, LARGEST_JUMP = 0.5, 8.0
+_LEAST_JUMP, _LARGEST_JUMP = 0.5, 8.0
 """Sideways jumps from a lane to another that count as a change of lane [m]. Smaller ones are bends, or changes that the
 simulation makes smooth by itself; larger ones are vehicles moved by hand."""
 
-TOP_SPEED = 100.0
+_TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
 
-LEAST_SPEED = 10.0
+_LEAST_SPEED = 10.0
 """Slower vehicles turn to the side no farther than if they were this fast [m/s]."""
 
 
@@ -84,12 +84,12 @@ class LaneChangeSmoothing:
     def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[str]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
         for vehicle, jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
-            if LEAST_JUMP <= abs(jump) <= LARGEST_JUMP:
+            if _LEAST_JUMP <= abs(jump) <= _LARGEST_JUMP:
                 earlier = self._glides.get(vehicle)
                 left, rate = (0.0, 0.0) if earlier is None else earlier.left(state.time)
                 offset = left + jump
-                usual = DURATION * max(1.0, abs(offset) / LANE_WIDTH)
-                duration = max(self._wanted.pop(vehicle, usual), LEAST_DURATION)
+                usual = DURATION * max(1.0, abs(offset) / _LANE_WIDTH)
+                duration = max(self._wanted.pop(vehicle, usual), _LEAST_DURATION)
                 self._glides[vehicle] = _Glide(state.time, duration, offset, rate)
 
     def _glided(self, state: TrafficState) -> TrafficState:
@@ -104,7 +104,7 @@ class LaneChangeSmoothing:
             angle = float(heading[row])
             position[row, 0] += left * math.sin(angle)
             position[row, 1] -= left * math.cos(angle)
-            heading[row] = angle - math.atan2(rate, max(float(state.speed[row]), LEAST_SPEED))
+            heading[row] = angle - math.atan2(rate, max(float(state.speed[row]), _LEAST_SPEED))
         return replace(state, position=position, heading=heading) if self._glides else state
 
 
@@ -125,5 +125,5 @@ def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[
     turn = np.remainder(state.heading[new] - last.heading[old] + np.pi, 2.0 * np.pi) - np.pi
     middle = last.heading[old] + 0.5 * turn
     jump = moved[:, 1] * np.cos(middle) - moved[:, 0] * np.sin(middle)
-    reach = TOP_SPEED * (state.time - last.time) + LARGEST_JUMP
+    reach = _TOP_SPEED * (state.time - last.time) + _LARGEST_JUMP
     return np.where(np.hypot(moved[:, 0], moved[:, 1]) <= reach, jump, np.inf)

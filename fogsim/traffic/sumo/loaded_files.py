@@ -12,10 +12,10 @@ from fogsim.traffic.sumo.link import Api
 CLOCK_TICK = 1e-3
 """Resolution of SUMO's clock [s]."""
 
-SHOWN = 8
+_SHOWN = 8
 """Vehicles that a message names."""
 
-MOST_WARNINGS = 3
+_MOST_WARNINGS = 3
 """Warnings of SUMO's that a message repeats."""
 
 
@@ -24,7 +24,7 @@ def describe_seen(ego: str, seen: Collection[str]) -> str:
     if not seen:
         return "no vehicle did: are there vehicles in its route or additional files?"
     near = difflib.get_close_matches(ego, sorted(seen), n=3, cutoff=0.5)
-    some = [*near, *sorted(set(seen).difference(near))[: SHOWN - len(near)]]
+    some = [*near, *sorted(set(seen).difference(near))[: _SHOWN - len(near)]]
     others = f" and {len(seen) - len(some)} more" if len(seen) > len(some) else ""
     return f"those that did: {', '.join(some)}{others}"
 
@@ -33,8 +33,8 @@ def describe_warnings(warnings: Sequence[str], ego: str | None) -> str:
     """What SUMO has warned of, in one line: of the ego if it is named, otherwise of all; empty without warnings."""
     distinct = list(dict.fromkeys(warnings))
     shown_warnings = [one for one in distinct if ego is not None and f"'{ego}'" in one] or distinct
-    more = f" and {len(shown_warnings) - MOST_WARNINGS} more" if len(shown_warnings) > MOST_WARNINGS else ""
-    return f"SUMO warned: {' '.join(shown_warnings[:MOST_WARNINGS])}{more}" if shown_warnings else ""
+    more = f" and {len(shown_warnings) - _MOST_WARNINGS} more" if len(shown_warnings) > _MOST_WARNINGS else ""
+    return f"SUMO warned: {' '.join(shown_warnings[:_MOST_WARNINGS])}{more}" if shown_warnings else ""
 
 
 def end_time(api: Api) -> float:

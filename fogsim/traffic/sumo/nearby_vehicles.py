@@ -11,10 +11,10 @@ from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, UpdateSchedule
 
-TOP_SPEED = 100.0
+_TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
 
-MAX_WAIT = 1.0
+_MAX_WAIT = 1.0
 """Time after which a vehicle's distance is computed again in any case [s], should somebody have moved it by hand."""
 
 
@@ -88,7 +88,7 @@ class NearbyVehicles:
             self._set_near(self._schedule_far(self._near, distance))
             position, distance = position[is_near], distance[is_near]
         wait = float(np.min((self._radius - distance) / self._max_rates(self._near)))
-        self._all_near_until = self._roster.time + min(wait, MAX_WAIT)
+        self._all_near_until = self._roster.time + min(wait, _MAX_WAIT)
         return position
 
     def _set_near(self, near: Sequence[str]) -> None:
@@ -97,30 +97,30 @@ class NearbyVehicles:
     def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
         """Those near; the others wait until they could have come near."""
         now = self._roster.time
-        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), MAX_WAIT).tolist()
+        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), _MAX_WAIT).tolist()
         near: list[str] = []
         far: list[str] = []
         for vehicle, wait in zip(vehicles, waits, strict=True):
-            if wait == MAX_WAIT:
+            if wait == _MAX_WAIT:
                 far.append(vehicle)
             elif wait > 0.0:
                 self._far.add((vehicle,), now + wait)
             else:
                 near.append(vehicle)
-        self._far.add(far, now + MAX_WAIT)
+        self._far.add(far, now + _MAX_WAIT)
         return near
 
     def _max_rates(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         """How fast their distances from the ego change at most, within the longest wait (n,) [m/s]."""
         speeds = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        return np.asarray(speeds + (float(self._speed(self._ego)) + MAX_RELATIVE_ACCELERATION * MAX_WAIT))
+        return np.asarray(speeds + (float(self._speed(self._ego)) + MAX_RELATIVE_ACCELERATION * _MAX_WAIT))
 
     def _has_jumped(self, here: Sequence[float]) -> bool:
         """True after a jump of the ego or of time, and at the first look."""
         time, x, y = self._last_place
         now = self._roster.time
         self._last_place = (now, here[0], here[1])
-        return now < time or not math.hypot(here[0] - x, here[1] - y) <= TOP_SPEED * (now - time) + 1.0
+        return now < time or not math.hypot(here[0] - x, here[1] - y) <= _TOP_SPEED * (now - time) + 1.0
 
     def _all_others(self) -> list[str]:
         self._far.clear()

@@ -19,7 +19,7 @@ _LOG_NAME = ".fogsim-warnings"
 _WARNING = "Warning:"
 _LOG = ("--error-log", _LOG_NAME, "--aggregate-warnings", "20")  # so many of a type, or the log of a day would be long
 _OPEN_FILES = Path("/proc/self/fd")
-MOST_NAMED = 6
+_MOST_NAMED = 6
 """Files that a message names."""
 
 
@@ -112,10 +112,11 @@ class OutputFolder:
         lost = [name for name in _names(self._own) if name not in self._reported]
         if lost:
             self._reported.update(lost)
-            more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
+            more = f" and {len(lost) - _MOST_NAMED} more" if len(lost) > _MOST_NAMED else ""
             warnings.warn(
-                f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: each run would replace the "
-                "files of the one before. Name a folder for them (fogsim.run(…, sumo_outputs=…)), or use fogsim run",
+                f"SUMO writes {', '.join(lost[:_MOST_NAMED])}{more}, which will not be kept: each run would replace "
+                "the files of the one before. Name a folder for them (fogsim.run(…, sumo_outputs=…)), or use "
+                "fogsim run",
                 stacklevel=2,
             )
 
@@ -145,7 +146,7 @@ class OutputFolder:
         cut = [name for name in _names(folder) if name.endswith(".xml") and not _is_whole(folder / name)]
         if cut:
             warnings.warn(
-                f"SUMO could not write all of {', '.join(cut[:MOST_NAMED])} in {folder}, and does not say why: is the "
+                f"SUMO could not write all of {', '.join(cut[:_MOST_NAMED])} in {folder}, and does not say why: is the "
                 "disk full?",
                 stacklevel=2,
             )

@@ -9,13 +9,13 @@ from types import ModuleType
 from fogsim.errors import InputError, MissingDependencyError, SimulationError
 from fogsim.traffic.sumo.link import Api, translated_errors
 
-WAIT = 0.25
+_WAIT = 0.25
 """Time between two attempts to connect [s]."""
 
-TIMEOUT = 60.0
+_TIMEOUT = 60.0
 """How long SUMO may leave one message unanswered unless something else is asked for [s]."""
 
-LONGEST_TIMEOUT = 1e6
+_LONGEST_TIMEOUT = 1e6
 """From here on a time is for ever [s]: sockets cannot count much longer ones."""
 
 
@@ -46,7 +46,7 @@ class TraciLink:
         port: int = 8813,
         order: int | None = None,
         retries: int = 40,
-        timeout: float = TIMEOUT,
+        timeout: float = _TIMEOUT,
     ) -> None:
         if not timeout > 0:
             raise InputError(f"timeout: expected a time of more than 0 s, or inf for ever, got {timeout!r}")
@@ -73,7 +73,7 @@ class TraciLink:
     def _connect(self) -> Api:
         traci, begun = load_traci(), time.monotonic()
         # A host that swallows what is sent to it lets each attempt last for minutes.
-        longest = max(self._timeout, self._retries * WAIT)
+        longest = max(self._timeout, self._retries * _WAIT)
         for attempt in range(self._retries + 1):
             try:
                 # Its own retries would print to stdout.
@@ -82,7 +82,7 @@ class TraciLink:
             except (traci.FatalTraCIError, OSError) as error:
                 if attempt == self._retries or time.monotonic() - begun > longest:
                     raise SimulationError(self._no_answer(attempt + 1, time.monotonic() - begun, error)) from error
-                time.sleep(WAIT)
+                time.sleep(_WAIT)
         connection._socket = _LimitedSocket(connection._socket, self._timeout, self._where)
         if self._order is not None:
             with self.translated_errors():
@@ -138,7 +138,7 @@ class _LimitedSocket:
         self._socket = connected
         self._timeout = timeout
         self._where = where
-        connected.settimeout(timeout if timeout < LONGEST_TIMEOUT else None)
+        connected.settimeout(timeout if timeout < _LONGEST_TIMEOUT else None)
 
     def recv(self, size: int) -> bytes:
         """Wait for up to `size` bytes."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 MAX_RELATIVE_ACCELERATION = 20.0
 """One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
 
-BATCH_PERIOD = 0.5
+_BATCH_PERIOD = 0.5
 """Vehicles that may wait this long are gathered with others in the steps of this period [s]: a batch costs less than
 many single vehicles."""
 
@@ -35,7 +35,7 @@ class UpdateSchedule:
 
     def __init__(self, step: float, now: float) -> None:
         self._step = step
-        self._batch = max(1, round(BATCH_PERIOD / step))
+        self._batch = max(1, round(_BATCH_PERIOD / step))
         self._current = self._number(now)
         self._due: dict[int, list[str]] = {}
 

@@ -7,7 +7,7 @@ from fogsim.traffic.sumo.link import Api, getter, is_off_lanes
 LONG_WAY = 1000.0
 """The first vehicle with so much of its route ahead is chosen [m]."""
 
-PATIENCE = 600.0
+_PATIENCE = 600.0
 """So long after the first vehicle that would do, the one with the longest way is chosen, if possible without stops [s].
 """
 
@@ -56,7 +56,7 @@ class EgoChoice:
             if way >= (True, LONG_WAY):
                 return vehicle
             if way > self._longest:
-                self._until = self._until or now + PATIENCE
+                self._until = self._until or now + _PATIENCE
                 self._longest, self.best = way, vehicle
         return self.best if self.best is not None and now >= self._until else None
 

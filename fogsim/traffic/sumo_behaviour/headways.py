@@ -12,7 +12,7 @@ from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 
-UNNOTICED_RATIO = 0.03
+_UNNOTICED_RATIO = 0.03
 """Change of a headway, as a share of it, that is not noticed [-]; setting it costs calls."""
 
 
@@ -42,7 +42,7 @@ class HeadwayControl:
         for i in np.flatnonzero(due).tolist():
             own = float(values[i, Column.HEADWAY])
             wanted = self._wanted(vehicles[i], values[i]) if in_fog[i] else own
-            if abs(wanted - values[i, Column.HEADWAY_SET]) > UNNOTICED_RATIO * own or wanted == own:
+            if abs(wanted - values[i, Column.HEADWAY_SET]) > _UNNOTICED_RATIO * own or wanted == own:
                 self._set(vehicles[i], int(rows[i]), wanted)
         self._table.values[rows, Column.HEADWAY_EXTINCTION] = values[:, Column.EXTINCTION]
 

@@ -6,7 +6,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.values import Lamp
 from fogsim.values.light import lamp_names
 
-LAMPS_PARAMETER = "fogsim-lamps"
+_LAMPS_PARAMETER = "fogsim-lamps"
 """Parameter of a vehicle that names its lit lamps, joined by "+"."""
 
 
@@ -25,5 +25,5 @@ class LampPublisher:
         """Publish the lamps that have changed."""
         for vehicle, lit in lamps.items():
             if lit != self._published.get(vehicle) and vehicle in present:
-                self._api.vehicle.setParameter(vehicle, LAMPS_PARAMETER, lamp_names(lit))
+                self._api.vehicle.setParameter(vehicle, _LAMPS_PARAMETER, lamp_names(lit))
                 self._published[vehicle] = lit

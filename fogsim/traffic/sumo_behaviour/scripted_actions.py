@@ -80,7 +80,7 @@ _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
 not hit anybody."""
 
-LONGEST_CHANGE = 10.0
+_LONGEST_CHANGE = 10.0
 """Time after which a change of lane that no one could make is given up [s]."""
 
 _ONCOMING_STAY = 1.0
@@ -201,7 +201,7 @@ class ScriptedActions:
             return
         vehicle, mode = change.vehicle, int(self._modes.own_value(change.vehicle))
         self._modes.claim(vehicle, mode & ~_REGARD_OF_OTHERS | _NO_COLLISION)
-        self._changing[vehicle] = time + min(change.stay, LONGEST_CHANGE)
+        self._changing[vehicle] = time + min(change.stay, _LONGEST_CHANGE)
         if change.duration is not None:
             self._lane_changes.take_time(vehicle, change.duration)
         if change.oncoming:

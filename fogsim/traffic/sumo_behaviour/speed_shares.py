@@ -13,7 +13,7 @@ from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.top_speeds import MAX_INTERVAL
 
-UNNOTICED_SHARE = 0.01
+_UNNOTICED_SHARE = 0.01
 """Change of a share [-] that is not noticed; setting it costs calls."""
 
 _SLOWEST = 1.0
@@ -89,5 +89,5 @@ class SpeedShareControl:
 
 def _is_noticed(desired: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether shares differ; whoever is to be as in clear air is, to the last digit."""
-    noticed: NDArray[np.bool_] = (np.abs(desired - known) > UNNOTICED_SHARE) | ((desired == 1.0) & (known != 1.0))
+    noticed: NDArray[np.bool_] = (np.abs(desired - known) > _UNNOTICED_SHARE) | ((desired == 1.0) & (known != 1.0))
     return noticed

@@ -15,7 +15,7 @@ from fogsim.traffic.sumo.claims import Claims
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 
-UNNOTICED_SPEED = 0.3
+_UNNOTICED_SPEED = 0.3
 """Change of a desired speed [m/s] that is not noticed; setting it costs calls."""
 
 MAX_INTERVAL = 1.0
@@ -37,7 +37,7 @@ class TopSpeedControl:
     def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Set the desired speeds of drivers (`rows` (n,) int, `desired` (n,) [m/s])."""
         table = self._table
-        for i in np.flatnonzero(np.abs(desired - table.values[rows, Column.SPEED_DESIRED]) > UNNOTICED_SPEED).tolist():
+        for i in np.flatnonzero(np.abs(desired - table.values[rows, Column.SPEED_DESIRED]) > _UNNOTICED_SPEED).tolist():
             vehicle, row, speed = vehicles[i], int(rows[i]), float(desired[i])
             table.values[row, Column.SPEED_DESIRED] = speed
             top_speed = float(table.values[row, Column.SPEED_SET])
@@ -54,7 +54,7 @@ class TopSpeedControl:
     def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Let vehicles that have just departed drive no faster than their drivers desire."""
         table = self._table
-        slower = np.flatnonzero(desired < table.values[rows, Column.TOP_SPEED] - UNNOTICED_SPEED)
+        slower = np.flatnonzero(desired < table.values[rows, Column.TOP_SPEED] - _UNNOTICED_SPEED)
         for i in slower.tolist():
             vehicle, speed = vehicles[i], float(desired[i])
             if speed < self._speed(vehicle):

@@ -37,22 +37,22 @@ from fogsim.traffic.sumo_drivers.perception import REACH, Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 
-THRESHOLD = 0.2
+_THRESHOLD = 0.2
 """Sum of relative gains at which the wish begins, over the driver's eagerness [s]."""
 
-LEAST_SPEED = 10.0
+_LEAST_SPEED = 10.0
 """Gains are relative to the speed in the other lane, and at least to this [m/s]."""
 
-FORGOTTEN = 0.8
+_FORGOTTEN = 0.8
 """Share of the sum that is left after a second without anything to gain [-]."""
 
-SHORTEST_STAY = 20.0
+_SHORTEST_STAY = 20.0
 """The route must go on in the other lane for so long [s]."""
 
 _SPEED_GAIN_BITS = 0x30
 
 
-def safe_speed(gap: float, leader_speed: float, deceleration: float, headway: float) -> float:
+def _safe_speed(gap: float, leader_speed: float, deceleration: float, headway: float) -> float:
     """Speed behind a leader from which one stops behind it if both brake equally hard [m/s].
 
     Source: Krauss, S. (1998), Microscopic modeling of traffic flow: investigation of collision free vehicle dynamics.
@@ -84,7 +84,7 @@ class OvertakingWishes:
             elif gain > 0.0:
                 kept = before[driver] + gain * self._period
             else:
-                kept = before[driver] * FORGOTTEN**self._period
+                kept = before[driver] * _FORGOTTEN**self._period
             self._gains[driver] = kept
         return [driver for driver, gain in self._gains.items() if self._is_wish(driver, gain)]
 
@@ -95,8 +95,8 @@ class OvertakingWishes:
             return 0.0
         get = self._vehicles
         free = float(get.getAllowedSpeed(driver))
-        behind = safe_speed(gap, float(self._speed(leader)), float(get.getDecel(driver)), float(get.getTau(driver)))
-        return (free - min(behind, free)) / max(free, LEAST_SPEED)
+        behind = _safe_speed(gap, float(self._speed(leader)), float(get.getDecel(driver)), float(get.getTau(driver)))
+        return (free - min(behind, free)) / max(free, _LEAST_SPEED)
 
     def _is_wish(self, driver: str, gain: float) -> bool:
         """Whether a sum of gains is enough for the driver's own eagerness, mode and route."""
@@ -105,31 +105,31 @@ class OvertakingWishes:
         # A lane-change model without it (DK2008) has other rules.
         with contextlib.suppress(self._refusal):
             eagerness = SPEED_GAIN.read(get, driver)
-        if gain * eagerness <= THRESHOLD or not get.getLaneChangeMode(driver) & _SPEED_GAIN_BITS:
+        if gain * eagerness <= _THRESHOLD or not get.getLaneChangeMode(driver) & _SPEED_GAIN_BITS:
             return False
         lanes, beside = get.getBestLanes(driver), int(get.getLaneIndex(driver)) + 1
         if beside >= len(lanes):
             return False
         _, length, _, offset, *_ = lanes[beside]
-        return bool(offset == 0 and length > SHORTEST_STAY * float(self._speed(driver)))
+        return bool(offset == 0 and length > _SHORTEST_STAY * float(self._speed(driver)))
 
 
 LOOK_PERIOD = 0.5
 """Time between two looks of a driver [s]."""
 
-CERTAIN_PERIOD = 1.0
+_CERTAIN_PERIOD = 1.0
 """Who has somebody in sight for certain ahead in the lane to the left, or no one, looks there again after this [s]."""
 
-STANDING_REACH = 150.0
+_STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
 
-SOON_STANDING = 5.0
+_SOON_STANDING = 5.0
 """Who drives slower than this may stand before the next look [m/s]: braking hard, or after a collision."""
 
-SUBLANE_CHANGE = 4.0
+_SUBLANE_CHANGE = 4.0
 """Time for which SUMO's sublane model is asked to change lanes, at up to 1 m/s to the side [s]."""
 
-MUCH_FASTER = 2.0
+_MUCH_FASTER = 2.0
 """Who drives so much faster in the lane to the left holds no one back, seen or not [m/s]."""
 
 _NEVER, _ALWAYS = -1.0, 1.0
@@ -157,14 +157,14 @@ class StandingLeaders:
             self._strategic.turn_on(driver)
 
     def _may_soon_stand(self, vehicle: str) -> bool:
-        return float(self._leaders.speed(vehicle)) < SOON_STANDING
+        return float(self._leaders.speed(vehicle)) < _SOON_STANDING
 
     def _would_be_left_for(self, driver: str, hidden: str) -> bool:
         """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
         if not self._may_soon_stand(hidden):
             return False
         leader, gap = self._leaders.leader(driver, REACH) or ("", 0.0)
-        if leader != hidden or gap > STANDING_REACH:
+        if leader != hidden or gap > _STANDING_REACH:
             return False
         lane = self._vehicles.getLaneID(driver)
         # SUMO reports for each lane of the edge how many lanes away the best one for the route is.
@@ -187,7 +187,7 @@ class RequestedChanges:
         self._edges = api.edge
         # Apart from the session's other claim, that vehicles keep their lanes.
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session} changes")
-        self._duration = SUBLANE_CHANGE if float(api.simulation.getOption("lateral-resolution")) > 0.0 else 0.0
+        self._duration = _SUBLANE_CHANGE if float(api.simulation.getOption("lateral-resolution")) > 0.0 else 0.0
         self._asked: dict[str, float] = {}
 
     def ask(self, driver: str, lanes: int, time: float) -> bool:
@@ -275,7 +275,7 @@ class LaneChanging:
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         left_leader, speed, sure = self._neighbours.left_leader, self._leaders.speed, self._certainly_seen
-        soon, later = self._roster.time + 0.5 * LOOK_PERIOD, self._roster.time + CERTAIN_PERIOD
+        soon, later = self._roster.time + 0.5 * LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
         certain_until = self._certain_until
         for driver in drivers:
             if certain_until.get(driver, 0.0) > soon:
@@ -284,7 +284,7 @@ class LaneChanging:
             if ahead is None or ahead[1] <= sure:
                 certain_until[driver] = later
                 continue
-            if speed(ahead[0]) > speed(driver) + MUCH_FASTER:
+            if speed(ahead[0]) > speed(driver) + _MUCH_FASTER:
                 continue
             if ahead[1] > self._certainly_hidden:
                 unseen[driver] = None

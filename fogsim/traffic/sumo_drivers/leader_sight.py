@@ -37,13 +37,13 @@ from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 from fogsim.values import Lamp
 
-LEAST_EXTINCTION = 1e-6
+_LEAST_EXTINCTION = 1e-6
 """Below this, fog hides nothing that matters [1/m]."""
 
-FASTEST_DRIFT = 30.0
+_FASTEST_DRIFT = 30.0
 """Fog drifts and changes no faster than if a wind of this speed carried it [m/s]."""
 
-STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
+_STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
 
 Pair = tuple[str, str, float]
@@ -94,11 +94,11 @@ class LeaderSight:
         place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys((*followers, *leaders)))}
         rows = np.array([place[v] for v in (*followers, *leaders)], dtype=np.int64).reshape(2, -1)
         facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
-        extinction = max(self._max_extinction, LEAST_EXTINCTION) if self._is_even else self._max_extinction
-        closing = Closing(closing_speed_bound(0.0, 0.0, horizon), FASTEST_DRIFT, extinction, self._is_even)
+        extinction = max(self._max_extinction, _LEAST_EXTINCTION) if self._is_even else self._max_extinction
+        closing = Closing(closing_speed_bound(0.0, 0.0, horizon), _FASTEST_DRIFT, extinction, self._is_even)
         face_leaders(self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), closing, facing, lines)
         facing[DEPTH] = self._max_extinction * facing[DISTANCE] if self._is_even else self._fog.optical_depth(*lines)
-        facing[STEADY], facing[OWN_STEADY : OWN + 1] = STEADY_INTENSITY, 1.0
+        facing[STEADY], facing[OWN_STEADY : OWN + 1] = _STEADY_INTENSITY, 1.0
         facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
         return facing
 

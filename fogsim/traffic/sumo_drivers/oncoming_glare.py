@@ -16,10 +16,10 @@ from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import disability_glare
 
-FARTHEST_SOURCE = 200.0
+_FARTHEST_SOURCE = 200.0
 """Lamps farther away than this are left out [m]."""
 
-DEEPEST_SOURCE = 5.0
+_DEEPEST_SOURCE = 5.0
 """Lamps behind fog of more than this optical depth are left out [-]: less than 1 % of their light comes through."""
 
 MOST_GLARE = 10.0
@@ -50,7 +50,7 @@ class OncomingGlare:
     def __init__(self, api: Api, fog: FogAccess, vehicles: SeenVehicles, remote: bool = False) -> None:
         self._fog = fog
         self._vehicles = vehicles
-        self._farthest = min(FARTHEST_SOURCE, DEEPEST_SOURCE / max(fog.minimum_extinction, 1e-6))
+        self._farthest = min(_FARTHEST_SOURCE, _DEEPEST_SOURCE / max(fog.minimum_extinction, 1e-6))
         self._opposite, self._directions = OppositeEdges(api), LaneDirections(api)
         self._lane = vehicle_getter(api, "getLaneID")
         self._road = vehicle_getter(api, "getRoadID")

@@ -34,10 +34,10 @@ from fogsim.traffic.sumo_lanes.leaders import Leaders
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
 
-LARGEST_MINIMUM_GAP = 5.0
+_LARGEST_MINIMUM_GAP = 5.0
 """No driver's minimum gap is larger than this [m]."""
 
-FASTEST_APPROACH = 70.0
+_FASTEST_APPROACH = 70.0
 """Faster than this no gap changes [m/s]: 250 km/h towards a standing vehicle."""
 
 MAX_PAUSE = 0.5
@@ -134,11 +134,11 @@ class Perception:
         self._emerging: dict[str, tuple[str, float]] = {}
         # No leader nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
         self._certainly_seen = (
-            sight.sure_distance(fog.maximum_extinction, most_glare(sight.illuminance)) - LARGEST_MINIMUM_GAP
+            sight.sure_distance(fog.maximum_extinction, most_glare(sight.illuminance)) - _LARGEST_MINIMUM_GAP
         )
         # And none farther than this is seen, wherever the fog is thinnest.
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
-        margin = FASTEST_APPROACH * MAX_PAUSE
+        margin = _FASTEST_APPROACH * MAX_PAUSE
         self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
     @property

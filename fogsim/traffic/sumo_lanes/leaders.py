@@ -15,7 +15,7 @@ from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.values import Leader
 
-EGO_REACH = 500.0
+_EGO_REACH = 500.0
 """How far ahead a leader of the ego is searched [m]."""
 
 LONGEST = 25.0
@@ -100,7 +100,7 @@ class Leaders:
 
     def of_ego(self, ego: str) -> Leader | None:
         """The ego's leader."""
-        found = self.find(ego, EGO_REACH) if self._spots.is_divided else self._of_ego_in_lane(ego)
+        found = self.find(ego, _EGO_REACH) if self._spots.is_divided else self._of_ego_in_lane(ego)
         if not found or not found[0]:
             return None
         # SUMO's gap leaves out the follower's minimum gap.
@@ -109,9 +109,9 @@ class Leaders:
     def _of_ego_in_lane(self, ego: str) -> tuple[str, float] | None:
         is_against, lane = self._directions.is_against, self._lane
         if is_against(ego, lane(ego)):
-            return self.find(ego, EGO_REACH)
-        found: tuple[str, float] | None = self._in_lane(ego, EGO_REACH)
-        return self.find(ego, EGO_REACH) if found and found[0] and is_against(found[0], lane(found[0])) else found
+            return self.find(ego, _EGO_REACH)
+        found: tuple[str, float] | None = self._in_lane(ego, _EGO_REACH)
+        return self.find(ego, _EGO_REACH) if found and found[0] and is_against(found[0], lane(found[0])) else found
 
     def find(self, vehicle: str, reach: float) -> tuple[str, float] | None:
         """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none.
@@ -164,7 +164,7 @@ class Leaders:
             lanes = range(1 if edge.startswith(":") else int(self._api.edge.getLaneNumber(edge)))
             nearest = sorted(lanes, key=lambda other: abs(other - int(number)))
             candidates = [lane] if edge.startswith(":") else [f"{edge}_{other}" for other in nearest]
-            ways = (self._way_of(link) for one in candidates for link in self._links(one) if leads_to(link, following))
+            ways = (self._way_of(link) for one in candidates for link in self._links(one) if _leads_to(link, following))
             known = self._ways[lane, following] = next(ways, ())
         return known
 
@@ -200,6 +200,6 @@ class Leaders:
         return _Spot(vehicle, lane, is_against, station, self._spots.across(vehicle, lane), *size)
 
 
-def leads_to(link: Sequence[str], edge: str) -> bool:
+def _leads_to(link: Sequence[str], edge: str) -> bool:
     """Whether a link of a lane leads to an edge."""
     return link[0].rpartition("_")[0] == edge

@@ -20,10 +20,10 @@ from fogsim.values.traffic import BodyPieces
 LONGEST_RIGID = 15.0
 """Longer bodies are in pieces [m]."""
 
-RAIL_CARRIAGE, TRAM_CARRIAGE, BUS_SECTION, TRAILER = 25.0, 10.0, 9.0, 13.6
+_RAIL_CARRIAGE, _TRAM_CARRIAGE, _BUS_SECTION, _TRAILER = 25.0, 10.0, 9.0, 13.6
 """About how long the pieces of bodies are whose type has no ``carriageLength`` [m]."""
 
-LONGEST_SEMITRAILER = 18.75
+_LONGEST_SEMITRAILER = 18.75
 """Trucks up to this are a tractor and one trailer [m]."""
 
 _TRACTOR, _COUPLED = 6.2, 2.85
@@ -149,7 +149,7 @@ class LongBodies:
         known = self._gentle.get(lane)
         if known is None:
             shape = np.array([point[:2] for point in self._api.lane.getShape(lane)])
-            known = self._gentle[lane] = _most_turn(shape, LONGEST_SEMITRAILER) <= _GENTLE
+            known = self._gentle[lane] = _most_turn(shape, _LONGEST_SEMITRAILER) <= _GENTLE
         return known
 
     def _lanes_behind(self, vehicle: str, lane: str, missing: float) -> tuple[str, ...]:
@@ -213,15 +213,17 @@ class LongBodies:
 def sections(vehicle_class: str, length: float, carriage: float = math.nan) -> tuple[_Section, ...]:
     """Rigid parts of a long body (`length` [m], `carriage` [m])."""
     if vehicle_class in RAILWAYS:
-        usual = TRAM_CARRIAGE if vehicle_class == "tram" else RAIL_CARRIAGE
+        usual = _TRAM_CARRIAGE if vehicle_class == "tram" else _RAIL_CARRIAGE
         return _equal("carriage", "carriage", length, usual if math.isnan(carriage) else carriage, _RAIL_GAP)
     if vehicle_class in {"bus", "coach"}:
-        return _equal("bus", "carriage", length, BUS_SECTION if math.isnan(carriage) else carriage, 0.0)
-    if length <= LONGEST_SEMITRAILER:
+        return _equal("bus", "carriage", length, _BUS_SECTION if math.isnan(carriage) else carriage, 0.0)
+    if length <= _LONGEST_SEMITRAILER:
         scale = length / _MODEL
         coupled = scale * _COUPLED if math.isnan(carriage) or carriage >= length else length - carriage
         return _Section("tractor", 0.0, scale * _TRACTOR), _Section("trailer", coupled, length)
-    trailers = _equal("trailer", "trailer", length - _COUPLED, TRAILER if math.isnan(carriage) else carriage, _RAIL_GAP)
+    trailers = _equal(
+        "trailer", "trailer", length - _COUPLED, _TRAILER if math.isnan(carriage) else carriage, _RAIL_GAP
+    )
     return (
         _Section("tractor", 0.0, _TRACTOR),
         *(_Section(one.kind, one.start + _COUPLED, one.end + _COUPLED) for one in trailers),

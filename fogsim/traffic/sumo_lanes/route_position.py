@@ -9,7 +9,7 @@ from fogsim.traffic.drivers.events import signed_gap
 from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
-MOVE_TOLERANCE = 5.0
+_MOVE_TOLERANCE = 5.0
 """Driven and straight distance between two updates may differ by this much more than a bend explains [m]."""
 
 
@@ -148,7 +148,7 @@ class RoutePosition:
         if last is None:
             return False
         way, straight = driven - last[0], math.hypot(x - last[1], y - last[2])
-        return not straight - MOVE_TOLERANCE <= way <= 2.0 * straight + MOVE_TOLERANCE
+        return not straight - _MOVE_TOLERANCE <= way <= 2.0 * straight + _MOVE_TOLERANCE
 
 
 class GapToEgo:

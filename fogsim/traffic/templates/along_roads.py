@@ -14,7 +14,7 @@ from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, ZebraPlan
 SAME_WAY, ONCOMING = "same_way", "oncoming"
 """Names of the ego's way and of that of the oncoming traffic, and of the edges on them."""
 
-START = (0.0, 0.0, math.radians(20.0))
+_START = (0.0, 0.0, math.radians(20.0))
 """Where a road begins, and in which direction: no axis of the image or of the map is any road's."""
 
 _CREST_RADIUS = 3000.0  # of vertical curves [m]
@@ -143,7 +143,7 @@ class AlongRoad:
         InputError
             If its curve or its grade is longer than the road.
         """
-        return axis_of(self.bends(), self.grades(), START)
+        return axis_of(self.bends(), self.grades(), _START)
 
     def bends(self) -> list[Bend]:
         """Its plan.

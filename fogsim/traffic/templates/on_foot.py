@@ -13,7 +13,7 @@ from fogsim.traffic.templates.xml_text import element, opening
 WALKING_SPEED = 5.0 / 3.6
 """Default walking speed of persons [m/s]."""
 
-WAITING_SPEED = 1e-3
+_WAITING_SPEED = 1e-3
 """Speed of a person who waits for an order to walk [m/s]: SUMO's persons do not stand still on a footway."""
 
 _BESIDE = 15.0  # from a crossing to where those who cross come from, and go to [m]
@@ -71,7 +71,7 @@ def _walker(walker: Walker, layout: Layout) -> Iterator[str]:
     _check(walker, layout)
     edge, position = _beside(walker, layout)
     end = _crossed(walker, layout) if walker.crosses_at is not None else _onward(walker, layout)
-    yield _person_type(f"type.{walker.name}", WAITING_SPEED if walker.waits else walker.speed, "1.0")
+    yield _person_type(f"type.{walker.name}", _WAITING_SPEED if walker.waits else walker.speed, "1.0")
     yield opening(
         "person", id=walker.name, type=f"type.{walker.name}", depart=f"{walker.depart:g}", departPos=f"{position:.2f}"
     )

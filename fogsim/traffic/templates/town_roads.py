@@ -13,10 +13,10 @@ from fogsim.traffic.templates.footpaths import ZEBRA_LEAD
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, Phase, ZebraPlan
 
-NORTH, SOUTH = "north", "south"
+_NORTH, _SOUTH = "north", "south"
 """Names of the ways that come from the other roads; the ego comes from the west."""
 
-ARMS = (SAME_WAY, SOUTH, ONCOMING, NORTH)
+ARMS = (SAME_WAY, _SOUTH, ONCOMING, _NORTH)
 """Names of the ways by where they come from: west, south, east, north, counterclockwise."""
 
 _DIRECTIONS = (math.pi, 1.5 * math.pi, 0.0, 0.5 * math.pi)
@@ -72,7 +72,7 @@ class Streets:
         priorities : sequence of int
             Of the ego's road and of the other.
         """
-        name, away = ARMS[number], straight_axis(_DIRECTIONS[number], (inner, 0.5 * self.length))
+        name, away = ARMS[number], _straight_axis(_DIRECTIONS[number], (inner, 0.5 * self.length))
         is_side = number % 2
         measures = (1, self.lane_width, self.side_limit if is_side else self.limit, priorities[is_side])
         end = f"{name}.end"
@@ -80,7 +80,7 @@ class Streets:
         return into, Edge(f"{name}.back", nodes[1], end, away, *measures)
 
 
-def straight_axis(direction: float, reach: tuple[float, float]) -> Axis:
+def _straight_axis(direction: float, reach: tuple[float, float]) -> Axis:
     """A straight line away from the middle (`direction` [rad], `reach` [m])."""
     along = np.linspace(*reach, 2)
     points = np.stack([along * math.cos(direction), along * math.sin(direction), np.zeros(2)], axis=-1)
@@ -120,17 +120,17 @@ class Crossing(Streets):
             target = f"{ARMS[(number + steps) % 4]}.back"
             links.append(Link(name, target, direction=turn[0]))
             ways.append((name if turn == "straight" else f"{name}.{turn}", (name, target)))
-        signals = ((node, two_phases(self.footways)),) if self.lights else ()
+        signals = ((node, _two_phases(self.footways)),) if self.lights else ()
         zebras = tuple(ZebraPlan(node, name, f"{name}.back") for name in ARMS) if self.footways else ()
         if self.footways:
             edges = [replace(edge, footway=self.footway_width) for edge in edges]
         return Layout(NetPlan(tuple(edges), tuple(links), signals, zebras), tuple(ways), self.lane_width)
 
 
-def two_phases(walks: bool = False) -> tuple[Phase, ...]:
+def _two_phases(walks: bool = False) -> tuple[Phase, ...]:
     """Phases of traffic lights: one road after the other."""
     phases = list[Phase]()
-    for greens in ((SAME_WAY, ONCOMING), (SOUTH, NORTH)):
+    for greens in ((SAME_WAY, ONCOMING), (_SOUTH, _NORTH)):
         green = [Phase(_WALK, greens, walks=True), Phase(_GREEN - _WALK, greens)] if walks else [Phase(_GREEN, greens)]
         phases += [*green, Phase(_YELLOW, greens, "y"), Phase(_RED, ())]
     return tuple(phases)

@@ -11,13 +11,13 @@ from fogsim.vision.light.pixel_kernels import even_column
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SKY_SHARE, SKY_REACH = 7, 0.012
+_SKY_SHARE, _SKY_REACH = 7, 0.012
 """Part of a row of sky (one in so many) that is at least seen, and half the width of its pixel values, relative [-]."""
 
-MOST_COLUMNS, MOST_ROWS = 80, 4
+_MOST_COLUMNS, _MOST_ROWS = 80, 4
 """Most pixels of a row, and rows of a bin, that are read."""
 
-TAIL = 0.04
+_TAIL = 0.04
 """Share of the pixels of a strip beyond either level whose difference is its contrast [-]."""
 
 
@@ -39,9 +39,9 @@ class RowBins(NamedTuple):
 def bright_part(seen: Floats) -> tuple[float, float]:
     """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it (`seen` (n,))."""
     count = seen.size
-    centre = seen[count - 1 - count // SKY_SHARE]
+    centre = seen[count - 1 - count // _SKY_SHARE]
     spread = seen[count - 1 - count // 20] - seen[count - 1 - count // 3]
-    reach = max(SKY_REACH * centre, min(1.5 * spread, 3.0 * SKY_REACH * centre))
+    reach = max(_SKY_REACH * centre, min(1.5 * spread, 3.0 * _SKY_REACH * centre))
     apart = 0.0
     for _ in range(4):
         total, kept, apart = 0.0, 0, 0.0
@@ -60,10 +60,10 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, 
 
     Takes `image` (rows, cols, channels) uint8, `out` (3, n).
     """
-    values = np.empty(MOST_COLUMNS * MOST_ROWS)
+    values = np.empty(_MOST_COLUMNS * _MOST_ROWS)
     for i in range(bins.first.size):
-        rows = min(bins.last[i] - bins.first[i] + 1, MOST_ROWS)
-        columns = min(bins.right[i] - bins.left[i] + 1, MOST_COLUMNS)
+        rows = min(bins.last[i] - bins.first[i] + 1, _MOST_ROWS)
+        columns = min(bins.right[i] - bins.left[i] + 1, _MOST_COLUMNS)
         count = 0
         for a in range(rows):
             row = bins.first[i] + (2 * a + 1) * (bins.last[i] - bins.first[i] + 1) // (2 * rows)
@@ -82,10 +82,10 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, 
             # Trees and houses hide sky on both sides: what is alike near the brightest counts.
             out[0, i], out[1, i] = bright_part(seen)
         row = (bins.first[i] + bins.last[i]) // 2
-        count = min(bins.outer_right[i] - bins.outer_left[i] + 1, MOST_COLUMNS)
+        count = min(bins.outer_right[i] - bins.outer_left[i] + 1, _MOST_COLUMNS)
         for b in range(count):
             column = even_column(b, count, bins.outer_left[i] - 0.5, bins.outer_right[i] + 0.5)
             values[b] = image[row, column, channel]
         seen = np.sort(values[:count])
-        tail = int(TAIL * count)
+        tail = int(_TAIL * count)
         out[2, i] = seen[count - 1 - tail] - seen[tail]

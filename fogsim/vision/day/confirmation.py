@@ -23,10 +23,10 @@ MODEL_DEVIATION = 0.15
 """Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
 are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
-CONTRAST = 300.0
+_CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
 
-THINNEST = extinction_from_visibility(CLEAR)
+_THINNEST = extinction_from_visibility(CLEAR)
 """Extinction up to which fog counts as thin [1/m]."""
 
 UNCONFIRMED = "the rest of the image does not confirm the fog that the road's brightness shows"
@@ -95,7 +95,7 @@ class Confirmation:
             return STANDS_OUT if self._stands_out(level, least) else _contradiction(own, day)
         if not is_open:
             return UNCONFIRMED
-        shows_clear = _has_contrast(day) or self._stands_out(level, THINNEST)
+        shows_clear = _has_contrast(day) or self._stands_out(level, _THINNEST)
         return "" if shows_clear else NOT_CLEAR
 
     def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
@@ -111,13 +111,13 @@ def without_far_objects(own: Estimate, image: NDArray[Any], camera: Camera, hori
 
 
 def _has_contrast(day: DayVerdict) -> bool:
-    return day.is_clear or (day.is_road and day.interval[0] > CONTRAST)
+    return day.is_clear or (day.is_road and day.interval[0] > _CONTRAST)
 
 
 def _is_thin(own: Estimate, day: DayVerdict) -> bool:
     """Whether the fog of an estimate is thin, and may be none where clear air shows."""
     half = NORMAL_90_PERCENT * own.standard_deviation
-    is_thin = own.extinction <= half or own.extinction + half <= THINNEST
+    is_thin = own.extinction <= half or own.extinction + half <= _THINNEST
     return is_thin or (_has_contrast(day) and agree(own.visibility_interval, day.interval))
 
 
@@ -128,7 +128,7 @@ def _added_deviation(own: Estimate, day: DayVerdict, *, is_open: bool, is_behind
     """
     half, least, most = NORMAL_90_PERCENT * own.standard_deviation, day.least, day.most
     if is_open:
-        least, most = 0.0, extinction_from_visibility(day.interval[0]) if _has_contrast(day) else THINNEST
+        least, most = 0.0, extinction_from_visibility(day.interval[0]) if _has_contrast(day) else _THINNEST
     more = _beyond(half, max(own.extinction - least, most - own.extinction))
     if not day.shows_fog:
         return more

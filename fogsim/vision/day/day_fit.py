@@ -22,43 +22,43 @@ from fogsim.vision.lines.horizon import Horizon
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-NEAREST, FARTHEST, STEP = math.log(12.0), math.log(60_000.0), 0.2
+_NEAREST, FARTHEST, STEP = math.log(12.0), math.log(60_000.0), 0.2
 """Visibilities between which fog is looked for, in logarithms of metres, and about how far apart [-]."""
 
-CLEAR_CHANCE = 0.05
+_CLEAR_CHANCE = 0.05
 """Chance of air without any fog, which the farthest visibility stands for [-]."""
 
-HORIZONS, HORIZON_CHANCES = (-1.2, 0.0, 1.2), (0.22, 0.56, 0.22)
+_HORIZONS, _HORIZON_CHANCES = (-1.2, 0.0, 1.2), (0.22, 0.56, 0.22)
 """Horizons, in deviations of what is known of it, and their chances: normal laws about each, half as wide, make up the
 whole."""
 
-HORIZON_SHARE = 0.6
+_HORIZON_SHARE = 0.6
 """Deviation of each of these laws, over that of the whole [-]."""
 
-SHARP = 0.03
+_SHARP = 0.03
 """Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
 
-FIRST_WORTHWHILE, WORTHWHILE = 14.0, 10.0
+_FIRST_WORTHWHILE, _WORTHWHILE = 14.0, 10.0
 """Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
 under other responses [-]."""
 
-MANY = 20
+_MANY = 20
 """Visibilities of a horizon from which on other responses are tried at every second one: no fog shows."""
 
-FINE = 0.01
+_FINE = 0.01
 """Step of the posterior [ln m]."""
 
-FLOOR, MOST_OVER = -25.0, 1.5
+_FLOOR, _MOST_OVER = -25.0, 1.5
 """Least logarithm of the chance, over the best cell's, that is interpolated, and greatest [-]."""
 
-UNLIKELY = -1e4
+_UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
 
-FEWEST_BINS = 4
+_FEWEST_BINS = 4
 """Fewest bins of road about which anything can be said."""
 
-VEHICLE, RANGE_MARGIN = 1.8, 0.5
+VEHICLE, _RANGE_MARGIN = 1.8, 0.5
 """Height up to which a vehicle ahead may hide the sky, and by how much its foot may be nearer than its range says
 [m]."""
 
@@ -97,7 +97,7 @@ def free_road(lead: LeadMeasurement | None) -> float:
     """Depth up to which the own lane is free of the tracked vehicle [m]."""
     if lead is None or not math.isfinite(lead.distance):
         return math.inf
-    return max(lead.distance - RANGE_MARGIN, 1.0)
+    return max(lead.distance - _RANGE_MARGIN, 1.0)
 
 
 def fit_day(
@@ -116,7 +116,7 @@ def fit_day(
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
     if math.isfinite(free):
         bins = _without_vehicle(bins, camera, horizon.row, free)
-        if int((bins.first > horizon.row).sum()) < FEWEST_BINS:
+        if int((bins.first > horizon.row).sum()) < _FEWEST_BINS:
             return _nothing_seen(camera)
     rows = read_rows(pixels, bins, camera, horizon.row)
     fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_contradiction(rows, camera, horizon, claimed))
@@ -136,16 +136,16 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | 
     """Posterior of the visibility by all rows, or by those above a bonnet, where one is likelier than none."""
     grid = _Grid(rows, camera, horizon, earlier)
     # A first look, at every second visibility under the middle horizon; where no road begins, there is none.
-    whole = grid.evidence(np.concatenate([grid.cells[1, ::2], grid.cells[:, 0]]), USUAL, ALL)[:, 0]
+    whole = grid.evidence(np.concatenate([grid.cells[1, ::2], grid.cells[:, 0]]), _USUAL, _ALL)[:, 0]
     heights = len(grid.cells)
-    none = float(np.logaddexp(np.logaddexp.reduce(whole[-heights:, ALL.size] + grid.of_horizon), rows.none))
-    whole = np.delete(whole[:-heights], ALL.size, axis=1) + grid.lights + grid.likely[::2, None]
+    none = float(np.logaddexp(np.logaddexp.reduce(whole[-heights:, _ALL.size] + grid.of_horizon), rows.none))
+    whole = np.delete(whole[:-heights], _ALL.size, axis=1) + grid.lights + grid.likely[::2, None]
     of_light = np.logaddexp.reduce(whole, axis=0)
-    if grid.lights.size > ALL.size and of_light[ALL.size :].max() > of_light[: ALL.size].max():
-        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon, earlier)
-    kept = np.flatnonzero(of_light[: ALL.size] > of_light.max() - SUITS)
+    if grid.lights.size > _ALL.size and of_light[_ALL.size :].max() > of_light[: _ALL.size].max():
+        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[_ALL.size :]))), camera, horizon, earlier)
+    kept = np.flatnonzero(of_light[: _ALL.size] > of_light.max() - _SUITS)
     some, chosen = np.logaddexp.reduce(whole, axis=1), np.zeros(grid.cells.shape[:2], np.bool_)
-    chosen[:, ::2] = some > some.max() - FIRST_WORTHWHILE
+    chosen[:, ::2] = some > some.max() - _FIRST_WORTHWHILE
     return _posterior(grid, _wider(chosen, 2), kept, none)
 
 
@@ -157,12 +157,12 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
     prior = grid.of_horizon[:, None] + grid.likely
     tried = np.array([(0, int(s)) for s in np.flatnonzero(grid.surfaces)])
     each = grid.hypotheses(chosen, tried, kept, prior)
-    good = np.full(chosen.shape, UNLIKELY)
+    good = np.full(chosen.shape, _UNLIKELY)
     good[chosen] = np.logaddexp.reduce(each, axis=(1, 2))
-    still = chosen & _wider(good > good.max() - WORTHWHILE, 1)
+    still = chosen & _wider(good > good.max() - _WORTHWHILE, 1)
     each = each[still[chosen]]
     of_surface = np.logaddexp.reduce(each, axis=(0, 2))
-    suit = tried[of_surface > of_surface.max() - SUITS, 1]
+    suit = tried[of_surface > of_surface.max() - _SUITS, 1]
     more = np.array([(r, int(s)) for s in suit for r in np.flatnonzero(grid.responses) if r])
     # What another response changes, changes little from one visibility to the next.
     half = _thinned(still)
@@ -181,7 +181,7 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
         fog_over_none=evidence - none,
         responses=_sums(pairs[:, 0], weight.sum(axis=0), grid.responses.size),
         surfaces=_sums(pairs[:, 1], weight.sum(axis=0), grid.surfaces.size),
-        lights=_sums(kept, _shares(each), ALL.size),
+        lights=_sums(kept, _shares(each), _ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         response_deviation=_apart(np.log(grid.cells[still][:, 1]), weight, pairs[:, 0]),
@@ -193,7 +193,7 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
 def _thinned(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(h, v) bool: cells without every second visibility whose neighbours are among them, where they are many."""
     some = cells.copy()
-    inner = cells[:, :-2:2] & cells[:, 2::2] & (cells.sum(axis=1, keepdims=True) > MANY)
+    inner = cells[:, :-2:2] & cells[:, 2::2] & (cells.sum(axis=1, keepdims=True) > _MANY)
     some[:, 1 : 2 * inner.shape[1] : 2] &= ~inner
     return some
 
@@ -217,8 +217,8 @@ def _left(earlier: DayFit | None, count: int) -> tuple[NDArray[np.bool_], NDArra
     if earlier is None:
         return np.ones(count, np.bool_), np.ones(SURFACES.chance.size, np.bool_)
     responses = np.zeros(count, np.bool_)
-    responses[0], responses[np.argsort(earlier.responses)[-LIKELY:]] = True, True
-    return responses, earlier.surfaces > HARDLY
+    responses[0], responses[np.argsort(earlier.responses)[-_LIKELY:]] = True, True
+    return responses, earlier.surfaces > _HARDLY
 
 
 def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
@@ -232,32 +232,32 @@ def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
 
 def _visibilities() -> tuple[Floats, Floats, Floats]:
     """Logarithms of visibilities, extinctions, and logarithms of their chances."""
-    logs = np.linspace(NEAREST, FARTHEST, math.ceil((FARTHEST - NEAREST) / STEP) + 1)
+    logs = np.linspace(_NEAREST, FARTHEST, math.ceil((FARTHEST - _NEAREST) / STEP) + 1)
     extinctions = OPTICAL_DEPTH_AT_VISIBILITY / np.exp(logs)
     extinctions[-1] = 1e-7
-    likely = np.full(logs.size, math.log((1.0 - CLEAR_CHANCE) / (logs.size - 1)))
-    likely[-1] = math.log(CLEAR_CHANCE)
+    likely = np.full(logs.size, math.log((1.0 - _CLEAR_CHANCE) / (logs.size - 1)))
+    likely[-1] = math.log(_CLEAR_CHANCE)
     return logs, extinctions, likely
 
 
-LOG_SURFACES = np.log(SURFACES.chance)
+_LOG_SURFACES = np.log(SURFACES.chance)
 """Logarithms of the surfaces' chances."""
 
-USUAL = np.zeros((1, 2), np.int64)
+_USUAL = np.zeros((1, 2), np.int64)
 """The stated response and the usual surface."""
 
-HARDLY, LIKELY = 0.03, 2
+_HARDLY, _LIKELY = 0.03, 2
 """Probability below which a surface is not tried in later images of a drive [-], and how many responses are, in
 addition to the stated one: an image hardly separates them, and a camera keeps its own."""
 
-SUITS = 5.0
+_SUITS = 5.0
 """Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""
 
 
-ALL = np.arange(LIGHTS.sky.size)
+_ALL = np.arange(LIGHTS.sky.size)
 """All lights."""
 
-CLIPPED_AIRLIGHT = 0.6
+_CLIPPED_AIRLIGHT = 0.6
 """Deviation of the airlight before an image is seen, over the usual one, where the sky is clipped [-]: exposure meters
 do not let it be much brighter."""
 
@@ -267,7 +267,7 @@ class _Grid:
 
     def __init__(self, rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | None) -> None:
         self.rows, self._lens = rows, _lens_of(camera)
-        self._shift = HORIZON_SHARE * horizon.standard_deviation
+        self._shift = _HORIZON_SHARE * horizon.standard_deviation
         curves = curves_of(camera)
         self._chances = np.log(curves.chance)
         ends = rows.cuts.size - 2
@@ -282,19 +282,19 @@ class _Grid:
 
     def hypotheses(self, chosen: NDArray[np.bool_], tried: Ints, lights: Ints, prior: Floats) -> Floats:
         """(c, t, m) float64: logarithms of the evidence of hypotheses with their chances (`prior` (h, v))."""
-        chance = self._chances[tried[:, 0]] + LOG_SURFACES[tried[:, 1]]
+        chance = self._chances[tried[:, 0]] + _LOG_SURFACES[tried[:, 1]]
         found = self.evidence(self.cells[chosen], tried, lights) + self.lights[lights]
         return np.asarray(found + (prior[chosen][:, None] + chance)[:, :, None])
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
         laws = np.stack([LIGHTS.mean, LIGHTS.deviation])[:, lights]
-        laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self.rows.least_airlight.any() else 1.0
-        cuts = self.rows.cuts.size - 1 if lights is ALL else 0
+        laws[1, :, AIRLIGHT] *= _CLIPPED_AIRLIGHT if self.rows.least_airlight.any() else 1.0
+        cuts = self.rows.cuts.size - 1 if lights is _ALL else 0
         out = np.empty((len(cells), len(tried), lights.size + cuts))
         places = np.ascontiguousarray(cells)
         evidence_grid(self.rows, self._lens, places, tried, self._laws, laws, self._shift, out)
-        return np.where(np.isfinite(out), out, UNLIKELY)
+        return np.where(np.isfinite(out), out, _UNLIKELY)
 
 
 def _nothing_seen(camera: Camera) -> DayFit:
@@ -362,7 +362,7 @@ def _lens_of(camera: Camera) -> Floats:
 def _horizons(rows: RowData, horizon: Horizon) -> tuple[Floats, Floats]:
     """Rows of the horizon that are tried, and the logarithms of their chances."""
     deviation = horizon.standard_deviation
-    at, chance = horizon.row + deviation * np.array(HORIZONS), np.array(HORIZON_CHANCES)
+    at, chance = horizon.row + deviation * np.array(_HORIZONS), np.array(_HORIZON_CHANCES)
     edge = _edge(rows, horizon)
     if edge is not None:
         share = 0.3 * math.exp(-0.5 * ((edge - horizon.row) / deviation) ** 2)
@@ -379,7 +379,7 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
         return None
     place = int(near[np.argmax(np.abs(light[near + 1] - light[near - 1]))])
     low, high = light[place - 2], light[place + 2]
-    if abs(high - low) < SHARP:
+    if abs(high - low) < _SHARP:
         return None
     inside = float((high - light[place - 1 : place + 2]).sum() / (high - low))
     step = float(middle[place] - middle[place - 1])
@@ -412,16 +412,16 @@ def _interpolated(logs: Floats, chosen: NDArray[np.bool_], chance: Floats) -> tu
     For each horizon and pair its logarithm is cubic between visibilities (Catmull and Rom), so that parabolas stay.
     """
     best = float(chance.max())
-    value = np.full((*chosen.shape, chance.shape[1]), FLOOR)
-    value[chosen] = np.maximum(chance - best, FLOOR)
+    value = np.full((*chosen.shape, chance.shape[1]), _FLOOR)
+    value[chosen] = np.maximum(chance - best, _FLOOR)
     inside = np.flatnonzero(chosen.any(axis=0))
     first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, logs.size - 1)
     step = logs[1] - logs[0]
-    place = np.arange(0.0, last - first, FINE / step)
+    place = np.arange(0.0, last - first, _FINE / step)
     low = first + np.minimum(place.astype(np.int64), last - first - 1)
     s = (place - (low - first))[None, :, None]
     a, b, c, d = (value[:, np.clip(low + i, 0, logs.size - 1)] for i in (-1, 0, 1, 2))
     cubic = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
-    weight = np.exp(np.minimum(cubic, MOST_OVER)).sum(axis=(0, 2))
+    weight = np.exp(np.minimum(cubic, _MOST_OVER)).sum(axis=(0, 2))
     total = float(weight.sum())
-    return logs[first] + place * step, weight / total, best + math.log(total * FINE / step)
+    return logs[first] + place * step, weight / total, best + math.log(total * _FINE / step)

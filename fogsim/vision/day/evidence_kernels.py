@@ -24,11 +24,11 @@ from fogsim.vision.day.row_kernels import (
 
 Floats = NDArray[np.float64]
 
-SHARED_NOISE, HIGHEST_OBSTACLE = 0.5 / 255.0, 0.12
+_SHARED_NOISE, _HIGHEST_OBSTACLE = 0.5 / 255.0, 0.12
 """Deviation of noise that neighbouring rows share, of full scale [-], and up to where things stand before the sky
 [rad]."""
 
-MOST_ALBEDO = 0.95
+_MOST_ALBEDO = 0.95
 """Most light of a road over the airlight [-]."""
 
 
@@ -102,11 +102,11 @@ def evidence(gram: Floats, half: float, law: Law, least_airlight: float, first: 
     _factor(gram, law, first, room)
     # Airlight and road are the first columns: the road reflects something, and less than the airlight.
     airlight, road = law.mean[AIRLIGHT], law.mean[ROAD]
-    apart, square = MOST_ALBEDO * airlight - road, gram[COLUMNS, COLUMNS]
+    apart, square = _MOST_ALBEDO * airlight - road, gram[COLUMNS, COLUMNS]
     a_square, r_square, d_square = 0.0, 0.0, 0.0
     for a in range(law.used.size):
         of_airlight, of_road, right = room.ends[a, 0], room.ends[a, 1], room.right[a]
-        both = MOST_ALBEDO * of_airlight - of_road
+        both = _MOST_ALBEDO * of_airlight - of_road
         square += room.square[a]
         airlight += of_airlight * right
         road += of_road * right
@@ -211,9 +211,9 @@ def evidence_grid(
             columns[:, SHIFT], columns[:, COLUMNS] = rows.by_row[r], rows.light[r]
             sky_gram[:] = 0.0
             hide[0] = surfaces[s, 2] * level * math.exp(-extinction * hidden) if hidden < FARTHEST else 0.0
-            hide[1] = HIGHEST_OBSTACLE
+            hide[1] = _HIGHEST_OBSTACLE
             sky_half = sky_pass(rows.slope[r], rows.noise[r], columns, place, size, hide, sky_gram)
-            shared, albedo = SHARED_NOISE * rows.slope[r], surfaces[s, :3] * level
+            shared, albedo = _SHARED_NOISE * rows.slope[r], surfaces[s, :3] * level
             road_pass(rows.noise[r], shared, columns, place, steps, albedo, hidden, rows.cuts, grams, halves)
             _of_lights(rows, r, laws, sky_gram, sky_half, grams, halves, room, out[c, t])
             for j in range(out.shape[2]):

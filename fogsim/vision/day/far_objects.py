@@ -10,27 +10,27 @@ from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.lines.horizon import Horizon
 
-BLOCKS = 80
+_BLOCKS = 80
 """Groups of columns that are judged, across the image."""
 
-ABOVE = 5
+_ABOVE = 5
 """Rows above the horizon that are looked at [px]: at the height of the camera's eye, where no crown overhangs."""
 
-SKY_HEIGHT, BRIGHTEST = 0.5, 0.9
+_SKY_HEIGHT, _BRIGHTEST = 0.5, 0.9
 """Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
 
-OWN_LANE = 0.2
+_OWN_LANE = 0.2
 """Columns to either side of the way ahead that do not count, over the image's: vehicles have dark windows above bright
 bodies [-]."""
 
-DARKER, BRIGHTER = 0.8, 0.15
+_DARKER, _BRIGHTER = 0.8, 0.15
 """Light over the airlight below which something stands there, and by how much the ground before it must be brighter to
 show that it stands farther away [-]."""
 
-LEAST_ROWS = 3
+_LEAST_ROWS = 3
 """Rows of ground that show that."""
 
-MOST_FAR = 0.2
+_MOST_FAR = 0.2
 """Share of the image's width in which things show that fog would hide, from which on there is no such fog [-]."""
 
 STANDS_OUT = "what stands at the horizon is darker than fog would leave it"
@@ -38,7 +38,7 @@ STANDS_OUT = "what stands at the horizon is darker than fog would leave it"
 
 def stands_out(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> bool:
     """Whether much is seen that fog of an extinction would hide; see `share_of_far_objects`."""
-    return share_of_far_objects(level, camera, horizon, extinction) > MOST_FAR
+    return share_of_far_objects(level, camera, horizon, extinction) > _MOST_FAR
 
 
 def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
@@ -51,26 +51,26 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     Takes `level` (rows, cols), `extinction` [1/m].
     """
     margin = 2.0 * horizon.standard_deviation + 1.0
-    first, last = math.floor(horizon.row - margin) - ABOVE, math.floor(horizon.row - margin)
+    first, last = math.floor(horizon.row - margin) - _ABOVE, math.floor(horizon.row - margin)
     ground = math.ceil(horizon.row + margin)
-    top = max(math.floor(last - SKY_HEIGHT * camera.height), 0)
-    if first < 0 or last <= top or ground + LEAST_ROWS >= camera.height or not extinction > 0.0:
+    top = max(math.floor(last - _SKY_HEIGHT * camera.height), 0)
+    if first < 0 or last <= top or ground + _LEAST_ROWS >= camera.height or not extinction > 0.0:
         return 0.0
     light = linear_luminance(level[top:], camera.response, camera.bits, camera.black_level)
-    per_block = max(light.shape[1] // BLOCKS, 1)
+    per_block = max(light.shape[1] // _BLOCKS, 1)
     count = light.shape[1] // per_block
     blocks = light[:, : count * per_block].reshape(light.shape[0], count, per_block).mean(axis=2)
-    aside = np.abs((np.arange(count) + 0.5) * per_block - camera.principal_point[0]) > OWN_LANE * camera.width
+    aside = np.abs((np.arange(count) + 0.5) * per_block - camera.principal_point[0]) > _OWN_LANE * camera.width
     blocks = blocks[:, aside]
-    airlight = float(np.quantile(blocks[: last - top], BRIGHTEST)) if aside.any() else 0.0
+    airlight = float(np.quantile(blocks[: last - top], _BRIGHTEST)) if aside.any() else 0.0
     if not airlight > 0.0:
         return 0.0
     blocks = blocks / airlight
     above, below = blocks[first - top : last - top].mean(axis=0), blocks[ground - top :]
-    depth = -np.log1p(-np.clip(above, 0.0, DARKER)) / extinction
+    depth = -np.log1p(-np.clip(above, 0.0, _DARKER)) / extinction
     foot = camera.row_distance / np.maximum(depth, 1e-3)
     rows = np.arange(below.shape[0])[:, None] + ground - horizon.row
-    before = (rows < foot - margin) & (below > above + BRIGHTER)
+    before = (rows < foot - margin) & (below > above + _BRIGHTER)
     counted = (rows < foot - margin).sum(axis=0)
-    seen = (above < DARKER) & (counted >= LEAST_ROWS) & (before.sum(axis=0) > 0.5 * counted)
+    seen = (above < _DARKER) & (counted >= _LEAST_ROWS) & (before.sum(axis=0) > 0.5 * counted)
     return float(seen.mean())

@@ -31,17 +31,17 @@ class Surfaces(NamedTuple):
     chance: Floats  # (n,)
 
 
-PATCHES, GRAIN, SHADOW, OBSTACLE = 0.08, 0.02, 0.28, 0.6
+_PATCHES, _GRAIN, _SHADOW, _OBSTACLE = 0.08, 0.02, 0.28, 0.6
 """Deviations of a road's light by patches, grain, shadows, and of things that hide it, over the road's own [-]."""
 
-USUAL_AIRLIGHT, AIRLIGHT_DEVIATION = 0.9, 0.7
-USUAL_ROAD, ROAD_DEVIATION = 0.35, 0.35
+_USUAL_AIRLIGHT, _AIRLIGHT_DEVIATION = 0.9, 0.7
+_USUAL_ROAD, _ROAD_DEVIATION = 0.35, 0.35
 """Airlight and road, over the light that 8 % of bins exceed, and their deviations [-]."""
 
 SURFACES = Surfaces(
-    albedo=USUAL_ROAD * np.array([
-        [PATCHES, GRAIN, 0.0], [0.3 * PATCHES, 0.3 * GRAIN, 0.0], [2.5 * PATCHES, 2.5 * GRAIN, 0.0],
-        [PATCHES, SHADOW, 0.0], [PATCHES, GRAIN, OBSTACLE], [PATCHES, GRAIN, OBSTACLE],
+    albedo=_USUAL_ROAD * np.array([
+        [_PATCHES, _GRAIN, 0.0], [0.3 * _PATCHES, 0.3 * _GRAIN, 0.0], [2.5 * _PATCHES, 2.5 * _GRAIN, 0.0],
+        [_PATCHES, _SHADOW, 0.0], [_PATCHES, _GRAIN, _OBSTACLE], [_PATCHES, _GRAIN, _OBSTACLE],
     ]),
     hidden=np.array([np.inf, np.inf, np.inf, np.inf, np.nan, 200.0]),
     chance=np.array([0.35, 0.25, 0.15, 0.12, 0.065, 0.065]),
@@ -71,15 +71,15 @@ def _lights() -> Lights:
             (darkening, False, 1, True, likely * 0.05),
         ]
     mean, deviation = np.zeros((len(rows), COLUMNS)), np.zeros((len(rows), COLUMNS))
-    mean[:, AIRLIGHT], deviation[:, AIRLIGHT] = USUAL_AIRLIGHT, AIRLIGHT_DEVIATION
-    mean[:, ROAD], deviation[:, ROAD] = USUAL_ROAD, ROAD_DEVIATION
-    deviation[:, SHEEN], deviation[:, WET] = 0.06 * USUAL_ROAD, 0.05
+    mean[:, AIRLIGHT], deviation[:, AIRLIGHT] = _USUAL_AIRLIGHT, _AIRLIGHT_DEVIATION
+    mean[:, ROAD], deviation[:, ROAD] = _USUAL_ROAD, _ROAD_DEVIATION
+    deviation[:, SHEEN], deviation[:, WET] = 0.06 * _USUAL_ROAD, 0.05
     deviation[:, VIGNETTING], deviation[:, STRAY], deviation[:, SKY] = 0.3, 0.02, 0.1
     for i, (darkening, wet, sky, tone, _) in enumerate(rows):
         if darkening:
             mean[i, DARKENING], deviation[i, DARKENING] = 0.32, 0.16
         if not sky:
-            deviation[i, OTHER_SKY] = AIRLIGHT_DEVIATION
+            deviation[i, OTHER_SKY] = _AIRLIGHT_DEVIATION
         if wet:
             deviation[i, WET] = 0.5
         if tone:

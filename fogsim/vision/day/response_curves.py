@@ -20,7 +20,7 @@ MOST_SLOPE = 12.0
 STATED = 0.45
 """Chance that a camera has the response that its description states [-]."""
 
-OTHERS = {
+_OTHERS = {
     "srgb": 0.12,
     "s .5": 0.15,
     "s 1": 0.07,
@@ -34,7 +34,7 @@ OTHERS = {
 """How likely the other curves are, before they are scaled to the rest of 1 [-]: sRGB, S-curves over it, soft
 shoulders, a film curve and powers."""
 
-OTHER_LINEAR = 0.02
+_OTHER_LINEAR = 0.02
 """The same for light itself [-]."""
 
 
@@ -50,9 +50,11 @@ class Curves(NamedTuple):
 def curves_of(camera: Camera) -> Curves:
     """Curves that a camera may have, the stated one first."""
     signal = np.linspace(0.0, 1.0, POINTS)
-    others = dict(OTHERS) if camera.response is not Response.SRGB else {n: c for n, c in OTHERS.items() if n != "srgb"}
+    others = (
+        dict(_OTHERS) if camera.response is not Response.SRGB else {n: c for n, c in _OTHERS.items() if n != "srgb"}
+    )
     if camera.response is not Response.LINEAR:
-        others["linear"] = OTHER_LINEAR
+        others["linear"] = _OTHER_LINEAR
     light = [exposure_of(signal, camera.response, camera.black_level)]
     light += [_inverse(name, signal) for name in others]
     weights = np.array(list(others.values()))
@@ -60,7 +62,7 @@ def curves_of(camera: Camera) -> Curves:
     return Curves(np.array(light), slope, np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum()]))
 
 
-WHITE, BRIGHT = 7.3, 0.95
+_WHITE, BRIGHT = 7.3, 0.95
 """Light at which a film curve reaches full scale that is not scaled to do so at 1, and signal from which on its light
 counts as full scale [-]."""
 
@@ -77,7 +79,7 @@ def _inverse(name: str, signal: Floats) -> Floats:
         out = respond(bent, Response.SRGB)
     elif kind == "film":
         # Scaled to full scale at its end, or as cameras use it: there hardly anything is so bright.
-        light = light if number else WHITE * light
+        light = light if number else _WHITE * light
         bent = light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)
         out = respond(bent / bent[-1], Response.SRGB)
         light = np.minimum(light / np.interp(BRIGHT, out, light), 1.0)

@@ -12,16 +12,16 @@ from fogsim.vision.day.bin_kernels import RowBins
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SKY_HEIGHT, SKY_BINS, SKY_WIDTH = 0.25, 8, 0.56
+_SKY_HEIGHT, _SKY_BINS, SKY_WIDTH = 0.25, 8, 0.56
 """How far above the horizon sky is read [rad], in how many bins, over what share of the columns."""
 
-HALF_LANE = 1.15
+_HALF_LANE = 1.15
 """Half the width of the road's strip [m]."""
 
-OUTER = 2.4
+_OUTER = 2.4
 """Half the width of the strip in which contrast is looked for [m]."""
 
-NEAR_HORIZON, SINGLE, STEP = 3.2, 6, 0.12
+_NEAR_HORIZON, _SINGLE, STEP = 3.2, 6, 0.12
 """Deviations of the horizon within which rows are read one by one, how many more of them, and the relative height of
 the bins below [-]."""
 
@@ -30,15 +30,15 @@ the bins below [-]."""
 def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
     """Lay bins over the image of a camera (`deviation` [px])."""
     bottom = camera.height - 1
-    around = NEAR_HORIZON * deviation + 1.0
+    around = _NEAR_HORIZON * deviation + 1.0
     step = max(round(deviation / 2.5), 1)
     edges = [math.floor(horizon - around)]
-    top = max(math.floor(horizon - SKY_HEIGHT * camera.focal_length), 0)
-    for edge in horizon - np.geomspace(around, max(horizon - top, around + 2.0), SKY_BINS + 1)[1:]:
+    top = max(math.floor(horizon - _SKY_HEIGHT * camera.focal_length), 0)
+    for edge in horizon - np.geomspace(around, max(horizon - top, around + 2.0), _SKY_BINS + 1)[1:]:
         if edges[-1] - math.floor(edge) >= 1 and edge >= 0.0:
             edges.append(math.floor(edge))
     edges = edges[::-1]
-    while edges[-1] < horizon + around + SINGLE * step:
+    while edges[-1] < horizon + around + _SINGLE * step:
         edges.append(edges[-1] + step)
     while edges[-1] < bottom:
         edges.append(edges[-1] + max(math.ceil(STEP * (edges[-1] - horizon)), step))
@@ -49,9 +49,9 @@ def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
     half = np.where(
         last < horizon - around,
         0.5 * SKY_WIDTH * camera.width,
-        np.maximum(HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
+        np.maximum(_HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
     )
-    wider = np.maximum(half, OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)
+    wider = np.maximum(half, _OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)
     sides = []
     for reach in (half, wider):
         # Of a mirrored camera these are the mirrored columns.

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 PATCHES, GRAIN, SHARED_ROWS = 30.0, 4.0, 8.0
 """Lengths over which albedo is alike, of patches and grain [m], and noise of rows [px]."""
 
-RATE = math.sqrt(3.0) / PATCHES
+_RATE = math.sqrt(3.0) / PATCHES
 """Rate of a Matérn process of order 3/2 of that length [1/m]."""
 
 SKY_VARIANCE = 0.10
@@ -55,9 +55,9 @@ def road_steps(place: Floats, noise: Floats, first: int) -> Floats:
         metres, rows = 0.0, 0.0
         if before >= 0:
             metres, rows = max(place[before, 1] - place[i, 1], 0.0), place[i, 3] - place[before, 3]
-        e = math.exp(-RATE * metres)
-        steps[i, 0], steps[i, 1] = e * (1.0 + RATE * metres), e * metres
-        steps[i, 2], steps[i, 3] = -e * RATE * RATE * metres, e * (1.0 - RATE * metres)
+        e = math.exp(-_RATE * metres)
+        steps[i, 0], steps[i, 1] = e * (1.0 + _RATE * metres), e * metres
+        steps[i, 2], steps[i, 3] = -e * _RATE * _RATE * metres, e * (1.0 - _RATE * metres)
         steps[i, 4], steps[i, 5] = math.exp(-metres / GRAIN), math.exp(-rows / SHARED_ROWS)
         steps[i, 6], steps[i, 7] = footprint(place[i, 2], PATCHES), footprint(place[i, 2], GRAIN)
         before = i
@@ -67,7 +67,7 @@ def road_steps(place: Floats, noise: Floats, first: int) -> Floats:
 @kernel
 def _advance(p: Floats, steps: Floats, i: int) -> None:
     """Predict the covariance of patches and their slope, grain, and noise that rows share (`p` (4, 4))."""
-    square = RATE * RATE
+    square = _RATE * _RATE
     f00, f01, f10, f11, f22, f33 = steps[i, 0], steps[i, 1], steps[i, 2], steps[i, 3], steps[i, 4], steps[i, 5]
     # Each process in its own long run: what is forgotten of it comes back as its variance.
     a, b, c = p[0, 0] - 1.0, p[0, 1], p[1, 1] - square
@@ -162,7 +162,7 @@ def road_pass(
     int64, `halves` (m,).
     """
     gram, whitened = np.zeros((COLUMNS + 1, COLUMNS + 1)), np.empty(COLUMNS + 1)
-    state, p, seen = np.zeros((4, COLUMNS + 1)), np.diag(np.array([1.0, RATE * RATE, 1.0, 1.0])), np.empty(3)
+    state, p, seen = np.zeros((4, COLUMNS + 1)), np.diag(np.array([1.0, _RATE * _RATE, 1.0, 1.0])), np.empty(3)
     half, cut = 0.0, 0
     for i in range(noise.size):
         while cut < cuts.size and cuts[cut] <= i:

@@ -23,20 +23,20 @@ the airlight's, two shapes of local tone mapping; and their number. The light it
 COMMON = DARKENING
 """How many of the columns, the first, have the same deviations under all lights."""
 
-DARKENING_ANGLE, SHEEN_ANGLE, SKY_ANGLE = 0.064, 0.06, 0.3
+_DARKENING_ANGLE, _SHEEN_ANGLE, _SKY_ANGLE = 0.064, 0.06, 0.3
 """Angles over which airlight darkens downward, sheen fades and a sky's brightness changes [rad]."""
 
-TONE_ANGLE, NEAR_TONE_ANGLE = 0.12, 0.04
+_TONE_ANGLE, _NEAR_TONE_ANGLE = 0.12, 0.04
 """Angles over which local tone mapping changes [rad]."""
 
-NODES, WEIGHTS = np.array([-0.7745966692414834, 0.0, 0.7745966692414834]), np.array([5.0, 8.0, 5.0]) / 18.0
+_NODES, _WEIGHTS = np.array([-0.7745966692414834, 0.0, 0.7745966692414834]), np.array([5.0, 8.0, 5.0]) / 18.0
 """Gauss and Legendre's three places within a row, and their weights."""
 
-MOST_CONTRAST, MOST_DOUBT = 1.2, 3.0
+_MOST_CONTRAST, _MOST_DOUBT = 1.2, 3.0
 """Greatest contrast across a road in clear air, relative to the airlight, and most that one row speaks against fog that
 leaves less [-]."""
 
-REFRACTION = 1.33**2
+_REFRACTION = 1.33**2
 """Squared refractive index of water [-]."""
 
 FARTHEST = 5000.0
@@ -68,8 +68,8 @@ class RowData(NamedTuple):
 @kernel
 def fresnel(sine: float) -> float:
     """Share of light that water mirrors under an angle above it."""
-    root = math.sqrt(REFRACTION - 1.0 + sine * sine)
-    across, along = (sine - root) / (sine + root), (REFRACTION * sine - root) / (REFRACTION * sine + root)
+    root = math.sqrt(_REFRACTION - 1.0 + sine * sine)
+    across, along = (sine - root) / (sine + root), (_REFRACTION * sine - root) / (_REFRACTION * sine + root)
     return 0.5 * (across * across + along * along)
 
 
@@ -93,27 +93,27 @@ def fill_columns(
         if sky > 0.0:
             angle = max(0.5 * (horizon - top) if sky < 1.0 else horizon - middle, 0.0) / focal
             columns[i, AIRLIGHT] = columns[i, OTHER_SKY] = sky
-            columns[i, SKY] = sky * angle / 0.1 * math.exp(-angle / SKY_ANGLE)
+            columns[i, SKY] = sky * angle / 0.1 * math.exp(-angle / _SKY_ANGLE)
         upper = max(top, horizon)
         for j in range(3 if sky < 1.0 else 0):
-            row = 0.5 * (upper + bottom) + 0.5 * (bottom - upper) * NODES[j]
+            row = 0.5 * (upper + bottom) + 0.5 * (bottom - upper) * _NODES[j]
             angle = max(row - horizon, 1e-4) / focal
-            weight = WEIGHTS[j] * (1.0 - sky)
+            weight = _WEIGHTS[j] * (1.0 - sky)
             slant = math.sqrt(1.0 + angle * angle)
             depth = min(height / angle, hidden)
             through = math.exp(-extinction * depth * slant)
             left += weight * through
             columns[i, AIRLIGHT] += weight * (1.0 - through)
             columns[i, ROAD] += weight * through
-            columns[i, DARKENING] -= weight * (1.0 - through) * (1.0 - math.exp(-angle / DARKENING_ANGLE))
-            columns[i, SHEEN] += weight * through * math.exp(-angle / SHEEN_ANGLE)
+            columns[i, DARKENING] -= weight * (1.0 - through) * (1.0 - math.exp(-angle / _DARKENING_ANGLE))
+            columns[i, SHEEN] += weight * through * math.exp(-angle / _SHEEN_ANGLE)
             columns[i, WET] += weight * through * fresnel(angle / slant)
             columns[i, STRAY] += weight
         angle = (middle - horizon) / focal
         off = (middle - lens[2]) / focal
         columns[i, VIGNETTING] = off * off
-        columns[i, TONE] = math.exp(-((angle / TONE_ANGLE) ** 2))
-        columns[i, NEAR_TONE] = math.exp(-((angle / NEAR_TONE_ANGLE) ** 2))
+        columns[i, TONE] = math.exp(-((angle / _TONE_ANGLE) ** 2))
+        columns[i, NEAR_TONE] = math.exp(-((angle / _NEAR_TONE_ANGLE) ** 2))
         below = max(angle, 0.25 / focal)
         place[i, 0] = left
         place[i, 1] = min(height / below, FARTHEST)
@@ -132,7 +132,7 @@ def contrast_across(contrast: Floats, place: Floats, size: int) -> float:
     total = 0.0
     for i in range(size, place.shape[0]):
         noise = contrast[1, i]
-        apart = (contrast[0, i] - MOST_CONTRAST * place[i, 0]) / noise - 3.0
+        apart = (contrast[0, i] - _MOST_CONTRAST * place[i, 0]) / noise - 3.0
         if apart > 0.0:
-            total -= min(0.5 * apart * apart, MOST_DOUBT)
+            total -= min(0.5 * apart * apart, _MOST_DOUBT)
     return total

@@ -14,10 +14,10 @@ from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
 from fogsim.vision.day.verdict import DISAGREE, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
-ALIKE = 0.1
+_ALIKE = 0.1
 """Difference of ln k up to which two answers are the same [-]."""
 
-POSSIBLY, MOSTLY = 0.35, 0.6
+_POSSIBLY, _MOSTLY = 0.35, 0.6
 """Probabilities of a wet road, local tone mapping or a clipped sky from which on an estimate that knows none of them
 does not count against the day model's answer, and against its silence [-]."""
 
@@ -94,7 +94,7 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if verdict.doubt > MOST_DOUBT:
         return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
     if verdict.reason:
-        return _of_day(own, verdict) if verdict.outside > MOSTLY else own
+        return _of_day(own, verdict) if verdict.outside > _MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure else own
 
 
@@ -107,7 +107,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
     middle = own.extinction if keeps else 0.5 * (own.extinction + verdict.extinction)
     if (spanning := _spanning(own, middle, verdict)) is not None:
         return spanning
-    if verdict.outside > POSSIBLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
+    if verdict.outside > _POSSIBLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
         return _of_day(own, verdict)
     if keeps:
         return own
@@ -115,7 +115,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
 
 
 def _are_alike(own: Estimate, verdict: DayVerdict) -> bool:
-    return own.extinction > 0.0 and abs(math.log(own.extinction / verdict.extinction)) < ALIKE
+    return own.extinction > 0.0 and abs(math.log(own.extinction / verdict.extinction)) < _ALIKE
 
 
 def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:

@@ -8,40 +8,40 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 from fogsim.vision.day.day_fit import DayFit
 from fogsim.vision.day.hypotheses import LIGHTS
 
-FOG, LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
+_FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
 
-SLACK = 1.15
+_SLACK = 1.15
 """Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
 
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
 
-A_ROAD, LIKELY_A_ROAD, SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
+_A_ROAD, _LIKELY_A_ROAD, _SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
 """Logarithms of the evidence of a road over that of none from which on there is one, it is believed where another
 method has no answer, and against another one's [-]."""
 
-EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
+_EVEN_SURFACES, _USUAL_SURFACES, _LEAST_USUAL, _LEAST_SKY = 2, 3, 0.8, 0.5
 """How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least
 probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
 
-CLIPPING = 0.4
+_CLIPPING = 0.4
 """Probability that the airlight is not even, where a clipped sky does not show it [-]."""
 
-DENSEST = 13.5
+_DENSEST = 13.5
 """Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
 
-HARDLY_STATED = 0.03
+_HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
-LEAST_CONTRAST = 0.08
+_LEAST_CONTRAST = 0.08
 """Least contrast of far road to near road over the sky for fog to show [-]."""
 
-DARK = 6.0 / 255.0
+_DARK = 6.0 / 255.0
 """Light of the brightest rows below which it is no day, over full scale [-]."""
 
-MOSTLY_CLIPPED = 0.5
+_MOSTLY_CLIPPED = 0.5
 """Share of the sky's bins beyond which clipping is a reason [-]."""
 
 DISAGREE = "how the road fades and how its image brightens disagree"
@@ -86,7 +86,7 @@ class DayVerdict:
     @property
     def reach(self) -> float:
         """Distance up to which it speaks of the fog [m]."""
-        return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], FOG))))
+        return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
 
 
 def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
@@ -98,17 +98,17 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
     is_clear = low > CLEAR
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
     by_light = fit.lights
-    usual = float(fit.surfaces[:USUAL_SURFACES].sum())
-    outside = max(float(by_light[LIGHTS.is_unusual].sum()), CLIPPING if fit.clipped > 0.0 else 0.0)
-    shows = fit.below(FOG) > LEAST_FOG and fit.contrast > LEAST_CONTRAST
+    usual = float(fit.surfaces[:_USUAL_SURFACES].sum())
+    outside = max(float(by_light[LIGHTS.is_unusual].sum()), _CLIPPING if fit.clipped > 0.0 else 0.0)
+    shows = fit.below(_FOG) > _LEAST_FOG and fit.contrast > _LEAST_CONTRAST
     answers = is_clear or (shows and high < WIDEST * low)
-    is_road = fit.fog_over_none > A_ROAD
+    is_road = fit.fog_over_none > _A_ROAD
     sky = float(by_light[LIGHTS.sky == 1].sum())
-    is_sky = sky > LEAST_SKY or fit.clipped > 0.0
-    is_sure = fit.fog_over_none > LIKELY_A_ROAD and usual > LEAST_USUAL and is_sky
-    is_sure = is_sure and low > DENSEST
-    even = float(fit.surfaces[:EVEN_SURFACES].sum())
-    is_even = fit.fog_over_none > SURELY_A_ROAD and even > LEAST_USUAL and fit.responses[0] > HARDLY_STATED
+    is_sky = sky > _LEAST_SKY or fit.clipped > 0.0
+    is_sure = fit.fog_over_none > _LIKELY_A_ROAD and usual > _LEAST_USUAL and is_sky
+    is_sure = is_sure and low > _DENSEST
+    even = float(fit.surfaces[:_EVEN_SURFACES].sum())
+    is_even = fit.fog_over_none > _SURELY_A_ROAD and even > _LEAST_USUAL and fit.responses[0] > _HARDLY_STATED
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
@@ -120,23 +120,23 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
         is_even=is_even,
         outside=outside if is_sure and is_even else 0.0,
         doubt=fit.doubt,
-        response_deviation=fit.response_deviation if fit.below(FOG) > LEAST_FOG else 0.0,
+        response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
         is_road=is_road,
     )
 
 
 def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     """Why a posterior is no answer."""
-    hidden = sky < LEAST_SKY or float(fit.surfaces[USUAL_SURFACES + 1 :].sum()) > LEAST_SKY
-    wet = float(fit.lights[LIGHTS.is_wet].sum()) > LEAST_SKY
+    hidden = sky < _LEAST_SKY or float(fit.surfaces[_USUAL_SURFACES + 1 :].sum()) > _LEAST_SKY
+    wet = float(fit.lights[LIGHTS.is_wet].sum()) > _LEAST_SKY
     reasons = (
-        (fit.brightest < DARK, "too dark: this is a daytime method"),
-        (fit.clipped > MOSTLY_CLIPPED, "the sky is clipped, and the airlight not known: expose for the sky"),
-        (fit.contrast < LEAST_CONTRAST, "the road is nearly as bright as the airlight, or brighter"),
+        (fit.brightest < _DARK, "too dark: this is a daytime method"),
+        (fit.clipped > _MOSTLY_CLIPPED, "the sky is clipped, and the airlight not known: expose for the sky"),
+        (fit.contrast < _LEAST_CONTRAST, "the road is nearly as bright as the airlight, or brighter"),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
         (wet, "the road may be wet: it mirrors the sky as fog would veil it"),
-        (fit.responses[0] < HARDLY_STATED, "the camera does not have the response that its description states"),
+        (fit.responses[0] < _HARDLY_STATED, "the camera does not have the response that its description states"),
     )
     said = (reason for holds, reason in reasons if holds)
     return next(said, "the extinction is not observable: too little road is seen")
@@ -144,4 +144,4 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Whether two intervals of visibility have something in common, or almost (`one`, `other` (float, float) [m])."""
-    return one[0] <= SLACK * other[1] and other[0] <= SLACK * one[1]
+    return one[0] <= _SLACK * other[1] and other[0] <= _SLACK * one[1]

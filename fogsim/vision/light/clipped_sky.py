@@ -12,13 +12,13 @@ from fogsim.values.camera_response import exposure_of
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.pixel_kernels import Pixels
 
-LEAST, MOST = 0.002, 0.98
+_LEAST, _MOST = 0.002, 0.98
 """Shares of clipped pixels below which nothing is missing, and above which what is missing cannot be known [-]."""
 
-LOWER = 0.3
+_LOWER = 0.3
 """Which of the pixels that are not clipped lie below the lower of the two lights that are looked at [-]."""
 
-ROUNDS = 16
+_ROUNDS = 16
 """Rounds of the search for the light behind a clipped mean: each halves its error at least."""
 
 _NORMAL = NormalDist()
@@ -61,7 +61,7 @@ def darker_by(fall: float, headroom: float, spread: float) -> tuple[float, float
     if spread <= 0.0:
         return fall, 0.0
     true = fall
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         above = (headroom + true) / spread
         lost = spread * (_NORMAL.pdf(above) - above * (1.0 - _NORMAL.cdf(above)))
         true = fall - lost
@@ -73,18 +73,18 @@ def _censored(values: Pixels, camera: Camera) -> tuple[float, float]:
     top = 2**camera.bits - 1
     upto = np.cumsum(np.bincount(values, minlength=top + 1)) / max(values.size, 1)
     share = 1.0 - float(upto[top - 1])
-    if not LEAST <= share <= MOST:
+    if not _LEAST <= share <= _MOST:
         return 0.0, 0.0
     # Two values between which pixel values change, and the shares of pixels below them: rounding changes neither.
-    lower = int(np.argmin(np.abs(upto[: top - 1] - LOWER * upto[top - 1])))
-    if upto[lower] < LEAST:
+    lower = int(np.argmin(np.abs(upto[: top - 1] - _LOWER * upto[top - 1])))
+    if upto[lower] < _LEAST:
         return 0.0, 0.0
     high, low = (
         float(v)
         for v in 255.0 * exposure_of(np.array([top - 0.5, lower + 0.5]) / top, camera.response, camera.black_level)
     )
     above, below = _NORMAL.inv_cdf(1.0 - share), _NORMAL.inv_cdf(float(upto[lower]))
-    if above - below < LEAST:
+    if above - below < _LEAST:
         return 0.0, 0.0
     noise = (high - low) / (above - below)
     mean = float(linear_table(camera.response, camera.bits, camera.black_level)[values].mean(dtype=np.float64))

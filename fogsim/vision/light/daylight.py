@@ -13,31 +13,31 @@ from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile, span_medians
 from fogsim.vision.light.pixel_kernels import Pixels
 
-BRIGHT_SHARE = 0.75
+_BRIGHT_SHARE = 0.75
 """Share of the sky that is no brighter than what counts as its brightness: woods and glows may cover the rest [-]."""
 
-SKY_ELEVATIONS, SKY_ROWS, SKY_STEP = (0.12, 0.25), 12, 4
+_SKY_ELEVATIONS, _SKY_ROWS, _SKY_STEP = (0.12, 0.25), 12, 4
 """Between which angles above the horizon that is looked at [rad], for lamps light the fog along the horizon most, in
 how many rows, and in every which column [px]."""
 
-NEAREST, FARTHEST, ROAD_ROWS = 6.0, 12.0, 9
+_NEAREST, FARTHEST, _ROAD_ROWS = 6.0, 12.0, 9
 """Between which distances the road is looked at, the farther one being at least half as much again as the nearest that
 is seen [m], and in how many rows."""
 
-HIDES_ABOVE = 20.0
+_HIDES_ABOVE = 20.0
 """Distance within which a vehicle ahead may hide sky or roof above the lane [m]."""
 
-HALF_LANE, ASIDE = 1.2, (4.0, 7.0)
+_HALF_LANE, _ASIDE = 1.2, (4.0, 7.0)
 """Half the width of the own lane's middle, and the strips next to it that low beams light least [m]."""
 
-LAMP, LAMPS_SHARE, DARK_SKY = 250.0, 0.004, 140.0
+_LAMP, _LAMPS_SHARE, _DARK_SKY = 250.0, 0.004, 140.0
 """Luminance of what may be a lamp in the sky, least share of the sky's pixels that lamps cover [-], and most luminance
 that the sky has in the median where lamps stand out of it [linear grey levels]."""
 
-BEAM = 1.15
+_BEAM = 1.15
 """Luminance of the own lane over that of both sides from which on it may be a beam's [-]."""
 
-OVERHEAD = 0.08
+_OVERHEAD = 0.08
 """Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
 Strip = tuple[NDArray[np.int64], NDArray[np.int64]]
@@ -69,16 +69,16 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     """
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)
-    sky, road = columns_apart(luminance[:-ROAD_ROWS], SKY_STEP), luminance[-ROAD_ROWS:]
+    sky, road = columns_apart(luminance[:-_ROAD_ROWS], _SKY_STEP), luminance[-_ROAD_ROWS:]
     lane = _row_medians(road, view.lane)
-    middle, aside = camera.principal_point[0], OVERHEAD * camera.focal_length
+    middle, aside = camera.principal_point[0], _OVERHEAD * camera.focal_length
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
-    overhead = np.ascontiguousarray(luminance[:-ROAD_ROWS, first:last])
-    hidden = overhead.size == 0 or (lead is not None and lead.distance < HIDES_ABOVE)
-    above = quantile(sky if hidden else overhead, BRIGHT_SHARE)
-    if median(lane) > min(above, quantile(sky, BRIGHT_SHARE)):
+    overhead = np.ascontiguousarray(luminance[:-_ROAD_ROWS, first:last])
+    hidden = overhead.size == 0 or (lead is not None and lead.distance < _HIDES_ABOVE)
+    above = quantile(sky if hidden else overhead, _BRIGHT_SHARE)
+    if median(lane) > min(above, quantile(sky, _BRIGHT_SHARE)):
         return "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog"
-    shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY
+    shining = float(np.count_nonzero(sky >= _LAMP)) >= _LAMPS_SHARE * sky.size and median(sky) < _DARK_SKY
     if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):
         return "lamps light the sky and the road: this is a daytime method"
     return ""
@@ -87,20 +87,20 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
 @functools.lru_cache(maxsize=8)
 def _view_of(camera: Camera) -> _View:
     last = camera.height - 1
-    nearest = max(camera.row_distance / max(last - camera.horizon_row, 1.0), NEAREST)
-    distance = np.geomspace(nearest, max(FARTHEST, 1.5 * nearest), ROAD_ROWS)
+    nearest = max(camera.row_distance / max(last - camera.horizon_row, 1.0), _NEAREST)
+    distance = np.geomspace(nearest, max(FARTHEST, 1.5 * nearest), _ROAD_ROWS)
     rows = np.minimum(np.rint(camera.horizon_row + camera.row_distance / distance).astype(np.int64), last)
-    sides = ((-HALF_LANE, HALF_LANE), (-ASIDE[1], -ASIDE[0]), ASIDE)
+    sides = ((-_HALF_LANE, _HALF_LANE), (-_ASIDE[1], -_ASIDE[0]), _ASIDE)
     seen = np.concatenate((_sky_rows(camera), np.maximum(rows, 0)))
     return _View(seen, *(_strip(distance, camera, *side) for side in sides))
 
 
 def _sky_rows(camera: Camera) -> NDArray[np.int64]:
     """Rows well above the horizon; the upper half of what is above it where the image ends below them."""
-    low, high = (camera.horizon_row - angle * camera.focal_length for angle in SKY_ELEVATIONS)
+    low, high = (camera.horizon_row - angle * camera.focal_length for angle in _SKY_ELEVATIONS)
     top = max(math.floor(high), 0)
     bottom = max(math.floor(low), math.floor(0.5 * (top + camera.horizon_row)))
-    return np.unique(np.linspace(top, max(bottom, top), SKY_ROWS).astype(np.int64))
+    return np.unique(np.linspace(top, max(bottom, top), _SKY_ROWS).astype(np.int64))
 
 
 def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: float) -> Strip:
@@ -122,4 +122,4 @@ def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArr
     """Whether the own lane is brighter than both of its sides."""
     beside = np.maximum(left, right)
     seen = np.isfinite(lane / np.maximum(beside, 1e-3))
-    return bool(seen.any() and median(lane[seen] / np.maximum(beside[seen], 1e-3)) > BEAM)
+    return bool(seen.any() and median(lane[seen] / np.maximum(beside[seen], 1e-3)) > _BEAM)

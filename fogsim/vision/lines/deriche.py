@@ -11,7 +11,7 @@ from fogsim.vision.lines.edges import EdgeDetector
 
 Image = NDArray[np.float32]
 
-ALPHA = 1.0
+_ALPHA = 1.0
 """Deriche's α: the smaller, the smoother; 0.5 for noisy and 1.5 for sharp images [1/px]."""
 
 REACH = 7.0
@@ -19,7 +19,7 @@ REACH = 7.0
 
 
 @lru_cache(maxsize=8)
-def smoothing_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
+def smoothing_kernel(alpha: float = _ALPHA) -> NDArray[np.float64]:
     """Deriche's smoothing, h(n) = s (α|n| + 1) e^(−α|n|), of sum 1.
 
     Returns read-only; what the recursion of the same α converges to, cut off at `REACH` (2 n + 1,). Takes `alpha`
@@ -33,7 +33,7 @@ def smoothing_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=8)
-def derivative_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
+def derivative_kernel(alpha: float = _ALPHA) -> NDArray[np.float64]:
     """Deriche's derivative, ∝ n e^(−α|n|), of response 1 to a slope of 1 per pixel.
 
     Returns read-only, to be correlated with an image; the slope's sum is Σ n² e^(−α|n|) = 2 e (1 + e) / (1 − e)³ with e
@@ -51,7 +51,7 @@ def _taps(alpha: float) -> NDArray[np.float64]:
     return np.arange(-reach, reach + 1, dtype=np.float64)
 
 
-TAPS = math.ceil(REACH / ALPHA)
+_TAPS = math.ceil(REACH / _ALPHA)
 """Taps on either side of the middle one: known to the compiler, which then does without the loops over them."""
 
 
@@ -72,7 +72,7 @@ def derivatives(image: Image, across: Image, down: Image) -> None:
 
 def _half(weights: NDArray[np.float64]) -> Image:
     """From the middle one on: the rest is its mirror image."""
-    return weights[TAPS:].astype(np.float32)
+    return weights[_TAPS:].astype(np.float32)
 
 
 @kernel
@@ -82,19 +82,19 @@ def _derivatives(image: Image, smooth: Image, derivative: Image, across: Image, 
     Pixels at equal distances are added first, so that a mirrored image gives the same to the last bit.
     """
     rows, cols = image.shape
-    line = np.empty((2, cols + 2 * TAPS), np.float32)
+    line = np.empty((2, cols + 2 * _TAPS), np.float32)
     for row in range(rows):
         for col in range(cols):
             mean, slope = smooth[0] * image[row, col], np.float32(0.0)
-            for tap in range(1, TAPS + 1):
+            for tap in range(1, _TAPS + 1):
                 lower, upper = image[min(row + tap, rows - 1), col], image[max(row - tap, 0), col]
                 mean += smooth[tap] * (lower + upper)
                 slope += derivative[tap] * (lower - upper)
-            line[0, TAPS + col], line[1, TAPS + col] = mean, slope
-        line[:, :TAPS], line[:, TAPS + cols :] = line[:, TAPS : TAPS + 1], line[:, TAPS + cols - 1 : TAPS + cols]
+            line[0, _TAPS + col], line[1, _TAPS + col] = mean, slope
+        line[:, :_TAPS], line[:, _TAPS + cols :] = line[:, _TAPS : _TAPS + 1], line[:, _TAPS + cols - 1 : _TAPS + cols]
         for col in range(cols):
-            slope, mean = np.float32(0.0), smooth[0] * line[1, TAPS + col]
-            for tap in range(1, TAPS + 1):
-                slope += derivative[tap] * (line[0, TAPS + col + tap] - line[0, TAPS + col - tap])
-                mean += smooth[tap] * (line[1, TAPS + col + tap] + line[1, TAPS + col - tap])
+            slope, mean = np.float32(0.0), smooth[0] * line[1, _TAPS + col]
+            for tap in range(1, _TAPS + 1):
+                slope += derivative[tap] * (line[0, _TAPS + col + tap] - line[0, _TAPS + col - tap])
+                mean += smooth[tap] * (line[1, _TAPS + col + tap] + line[1, _TAPS + col - tap])
             across[row, col], down[row, col] = slope, mean

@@ -17,13 +17,13 @@ from fogsim.vision.light.medians import columns_apart, median, row_medians
 
 Image = NDArray[np.float32]
 
-EDGE_FACTOR = 10.0
+_EDGE_FACTOR = 10.0
 """Gradient of an edge in multiples of the road's own median gradient, which is noise and asphalt grain [-]."""
 
 MIN_GRADIENT = 1.5
 """Smallest gradient that can be an edge [linear grey levels per px]: that of the quantisation of 8 bits."""
 
-SMOOTH_TAPS = 2
+_SMOOTH_TAPS = 2
 """Taps of the smoothing on either side of the middle one: known to the compiler, which then does without that loop."""
 
 _FLAT, _UPRIGHT = math.tan(math.radians(22.5)), math.tan(math.radians(67.5))
@@ -59,7 +59,7 @@ def smoothed(luminance: Image) -> Image:
 
 def _gaussian() -> Image:
     """Weights from the middle one on: the rest is its mirror image."""
-    weights = np.exp(-0.5 * np.arange(SMOOTH_TAPS + 1) ** 2)
+    weights = np.exp(-0.5 * np.arange(_SMOOTH_TAPS + 1) ** 2)
     return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
 
@@ -102,7 +102,7 @@ class EdgeDetector:
             medians = row_medians(columns_apart(down, self._of_row))
             slope = np.clip(medians, -fog_slope, 0.0).astype(np.float32)
         squared_lengths(across, down, slope, self._squares)
-        high = max(EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
+        high = max(_EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
         trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
         return Edges(self._pixels, high, self._gradient)
 
@@ -228,18 +228,18 @@ def _follow(marks: NDArray[np.uint8], width: int, waiting: NDArray[np.int64], co
 def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """Smooth down the columns and along each row; what lies outside is as the border (`image`, `out` (rows, cols))."""
     rows, cols = image.shape
-    line = np.empty(cols + 2 * SMOOTH_TAPS, np.float32)
+    line = np.empty(cols + 2 * _SMOOTH_TAPS, np.float32)
     for row in range(rows):
         for col in range(cols):
             value = weights[0] * image[row, col]
-            for tap in range(1, SMOOTH_TAPS + 1):
+            for tap in range(1, _SMOOTH_TAPS + 1):
                 value += weights[tap] * (image[min(row + tap, rows - 1), col] + image[max(row - tap, 0), col])
-            line[SMOOTH_TAPS + col] = value
-        line[:SMOOTH_TAPS], line[SMOOTH_TAPS + cols :] = line[SMOOTH_TAPS], line[SMOOTH_TAPS + cols - 1]
+            line[_SMOOTH_TAPS + col] = value
+        line[:_SMOOTH_TAPS], line[_SMOOTH_TAPS + cols :] = line[_SMOOTH_TAPS], line[_SMOOTH_TAPS + cols - 1]
         for col in range(cols):
-            value = weights[0] * line[SMOOTH_TAPS + col]
-            for tap in range(1, SMOOTH_TAPS + 1):
-                value += weights[tap] * (line[SMOOTH_TAPS + col + tap] + line[SMOOTH_TAPS + col - tap])
+            value = weights[0] * line[_SMOOTH_TAPS + col]
+            for tap in range(1, _SMOOTH_TAPS + 1):
+                value += weights[tap] * (line[_SMOOTH_TAPS + col + tap] + line[_SMOOTH_TAPS + col - tap])
             out[row, col] = value
 
 

@@ -11,22 +11,22 @@ from fogsim.vision.lines.vanishing_point import Lines, VanishingPoint, all_pairs
 
 Floats = NDArray[np.float64]
 
-ANGLES, OFFSET_STEP = 360, 2.0
+_ANGLES, _OFFSET_STEP = 360, 2.0
 """Bins of the accumulator: directions of the gradient round the circle, and px between offsets."""
 
-MOST_POINTS = 8000
+_MOST_POINTS = 8000
 """Edge pixels that are looked at."""
 
-SAMPLES = 48
+_SAMPLES = 48
 """Pairs of lines that are drawn: with 30 % good lines one pair is good with a probability of 0.99 (negru2013)."""
 
-PEAKS, VOTES = 16, 30
+_PEAKS, _VOTES = 16, 30
 """Most lines that are taken from the accumulator, and fewest votes of one."""
 
-CONSENSUS = 5.0
+_CONSENSUS = 5.0
 """Distance at which a line passes through a point in the choice of lines [px]."""
 
-SMALLEST_ANGLE = 0.15
+_SMALLEST_ANGLE = 0.15
 """Angle between two lines below which their crossing says little [rad]."""
 
 
@@ -42,17 +42,17 @@ def consensus_vanishing_point(
     Returns None if no two lines agree. Takes `edges` (rows, cols) uint8, `guess` [px], `reach` [px].
     """
     points = edge_points(gradient.across, gradient.down, edges, guess[0], guess[1])
-    found, votes = hough_peaks(points, reach, PEAKS, VOTES)
+    found, votes = hough_peaks(points, reach, _PEAKS, _VOTES)
     normal = np.array([(math.cos(angle), math.sin(angle)) for angle in found[:, 0]]).reshape(-1, 2)
     lines = Lines(normal, found[:, 1].copy())
     passing = _passing_lines(lines, votes)
     first, second = all_pairs(len(passing))
-    crossed = crossings(lines, passing[first], passing[second], math.sin(SMALLEST_ANGLE))
+    crossed = crossings(lines, passing[first], passing[second], math.sin(_SMALLEST_ANGLE))
     crossed = crossed[~np.isnan(crossed[:, 0])]
     if not crossed.size:
         return None
     column, row = crossed.mean(axis=0)
-    spread = float(crossed[:, 1].std()) if len(crossed) > 1 else CONSENSUS
+    spread = float(crossed[:, 1].std()) if len(crossed) > 1 else _CONSENSUS
     score = float(votes[passing].sum())
     return VanishingPoint(guess[0] + float(column), guess[1] + float(row), max(spread, 1.0), len(passing), score)
 
@@ -63,10 +63,10 @@ def _passing_lines(lines: Lines, votes: Floats) -> NDArray[np.int64]:
     if count < 2:
         return np.empty(0, np.int64)
     # The same pairs for the same number of lines: an estimate is a function of the image.
-    draws = np.random.default_rng(count).integers(0, count, (SAMPLES, 2))
-    crossed = crossings(lines, draws[:, 0].copy(), draws[:, 1].copy(), math.sin(SMALLEST_ANGLE))
-    best = crossed[int(np.argmax(supports(lines, votes, crossed, CONSENSUS)))]
-    return np.flatnonzero(np.abs(lines.misses(best)) <= CONSENSUS)
+    draws = np.random.default_rng(count).integers(0, count, (_SAMPLES, 2))
+    crossed = crossings(lines, draws[:, 0].copy(), draws[:, 1].copy(), math.sin(_SMALLEST_ANGLE))
+    best = crossed[int(np.argmax(supports(lines, votes, crossed, _CONSENSUS)))]
+    return np.flatnonzero(np.abs(lines.misses(best)) <= _CONSENSUS)
 
 
 @kernel
@@ -79,12 +79,12 @@ def edge_points(
     (rows, cols), `edges` (rows, cols) uint8, `col`, `row` [px].
     """
     rows, cols = edges.shape
-    out = np.empty((MOST_POINTS, 3))
+    out = np.empty((_MOST_POINTS, 3))
     count = 0
     for v in range(max(int(row) + 8, 1), rows - 1):
         line = edges[v]
         for u in range(1, cols - 1):
-            if line[u] == 0 or count == MOST_POINTS:
+            if line[u] == 0 or count == _MOST_POINTS:
                 continue
             gx, gy = float(across[v, u]), float(down[v, u])
             size = math.hypot(gx, gy)
@@ -113,16 +113,16 @@ def hough_peaks(points: Floats, reach: float, most: int, least: int) -> tuple[Fl
     Returns direction θ of each line's normal [rad] and offset ρ [px] of u cos θ + v sin θ = ρ; votes (n,). Takes
     `points` (n, 3), `reach` [px].
     """
-    offsets = int(2.0 * reach / OFFSET_STEP) + 1
-    cells = np.zeros((ANGLES, offsets), np.int32)
-    unit = 2.0 * math.pi / ANGLES
-    cosine, sine = np.cos(np.arange(ANGLES) * unit), np.sin(np.arange(ANGLES) * unit)
+    offsets = int(2.0 * reach / _OFFSET_STEP) + 1
+    cells = np.zeros((_ANGLES, offsets), np.int32)
+    unit = 2.0 * math.pi / _ANGLES
+    cosine, sine = np.cos(np.arange(_ANGLES) * unit), np.sin(np.arange(_ANGLES) * unit)
     for i in range(points.shape[0]):
         nearest = math.floor(points[i, 2] / unit + 0.5)
         for turn in range(-3, 4):
-            angle = (nearest + turn) % ANGLES
+            angle = (nearest + turn) % _ANGLES
             rho = points[i, 0] * cosine[angle] + points[i, 1] * sine[angle]
-            place = math.floor((rho + reach) / OFFSET_STEP + 0.5)
+            place = math.floor((rho + reach) / _OFFSET_STEP + 0.5)
             if 0 <= place < offsets:
                 cells[angle, place] += 1
     lines, votes = np.empty((most, 2)), np.empty(most)
@@ -132,10 +132,10 @@ def hough_peaks(points: Floats, reach: float, most: int, least: int) -> tuple[Fl
         angle, place = best // offsets, best % offsets
         if cells[angle, place] < least:
             break
-        lines[count, 0], lines[count, 1] = angle * unit, place * OFFSET_STEP - reach
+        lines[count, 0], lines[count, 1] = angle * unit, place * _OFFSET_STEP - reach
         votes[count] = cells[angle, place]
         count += 1
         for turn in range(-4, 5):
             for near in range(max(int(place) - 4, 0), min(int(place) + 5, offsets)):
-                cells[(angle + turn) % ANGLES, near] = 0
+                cells[(angle + turn) % _ANGLES, near] = 0
     return lines[:count].copy(), votes[:count].copy()

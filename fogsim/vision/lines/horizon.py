@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.core.parameters import Range
 from fogsim.values.camera import Camera
 
-MIN_COLS, MIN_ROWS = 32, 16
+_MIN_COLS, MIN_ROWS = 32, 16
 """A road narrower than this, or lower below its horizon, shows no curve [px]."""
 
 PITCH_DEVIATION = math.radians(0.1)
@@ -80,6 +80,6 @@ def why_no_road(camera: Camera) -> str:
         return "the camera lies on its side or is upside-down"
     if not 4.0 <= camera.horizon_row <= camera.height - 1:
         return f"the horizon (row {camera.horizon_row:.1f}) is outside the image"
-    if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
+    if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < _MIN_COLS:
         return "the image is too small to show a curve"
     return ""

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from fogsim.vision.lines.vanishing_point import VanishingPoint, crossings, sloped_lines
 
-HALVES = (1.0, -1.0)
+_HALVES = (1.0, -1.0)
 """Sign of du/dv of the lines left and right of the vanishing point turned by: lines are sought in each half alone."""
 
-LEAST_PIXELS = 12
+_LEAST_PIXELS = 12
 """Fewest edge pixels that make a line."""
 
 
@@ -42,11 +42,11 @@ def hough_lines(edges: NDArray[np.uint8], first_row: int, lowest_angle: float) -
     Takes `edges` (rows, cols) uint8, `lowest_angle` [rad].
     """
     lower = np.ascontiguousarray(edges[first_row:])
-    threshold = max(LEAST_PIXELS, lower.shape[0] // 12)
+    threshold = max(_LEAST_PIXELS, lower.shape[0] // 12)
     found = []
     # OpenCV's angle is that of the normal: 0 for an upright line, π/2 for one along the rows.
     most = 0.5 * math.pi - lowest_angle
-    for side in HALVES:
+    for side in _HALVES:
         # Its cells are not the same to both sides: the lines of the other half are sought in the mirrored image.
         half = lower if side > 0 else np.ascontiguousarray(lower[:, ::-1])
         peaks: NDArray[Any] | None = cv2.HoughLinesWithAccumulator(
@@ -66,7 +66,7 @@ def hough_lines(edges: NDArray[np.uint8], first_row: int, lowest_angle: float) -
 
 def longest_pair(lines: Sequence[LaneLine]) -> tuple[LaneLine, LaneLine] | None:
     """Longest line left and right of the vanishing point, of lines in order of length; None if a side has none."""
-    left, right = (next((line for line in lines if side * line.slope < 0), None) for side in HALVES)
+    left, right = (next((line for line in lines if side * line.slope < 0), None) for side in _HALVES)
     return None if left is None or right is None else (left, right)
 
 

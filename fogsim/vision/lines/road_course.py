@@ -30,35 +30,35 @@ from fogsim.vision.lines.sags_ahead import SagsAhead, curvature_covariance, sag_
 
 Floats = NDArray[np.float64]
 
-BEND_DEVIATION, BEND_LENGTH = 1.0 / 500.0, 400.0
+_BEND_DEVIATION, _BEND_LENGTH = 1.0 / 500.0, 400.0
 """Standard deviation of horizontal curvature where a road is curved [1/m], and the length over which it changes [m]."""
 
-CURVED_SHARE = 0.3
+_CURVED_SHARE = 0.3
 """Share of roads' length in sags and on crests, and of that in bends, that matter [-]."""
 
-TANGENT = 0.07
+_TANGENT = 0.07
 """Standard deviation of the angle between the road and the camera's axis [rad]."""
 
-FAR_ROWS = 0.05
+_FAR_ROWS = 0.05
 """Angle below the horizon up to which every row is looked at [rad]."""
 
-BENT = 1.0 / 450.0
+_BENT = 1.0 / 450.0
 """Curvature that is taken off, to either side, where no straight lines are seen [1/m]."""
 
-SPREAD = 0.06
+_SPREAD = 0.06
 """How far apart tangents of a bent road's lines may cross the horizon [rad]."""
 
-WIDEST = 0.45
+_WIDEST = 0.45
 """Greatest width of a mark [m]."""
 
-FARTHEST_MARK = 6.0
+_FARTHEST_MARK = 6.0
 """How far to a side marks are sought [m]. What seems farther stands up, as a guard rail does. Edges of what is no
 narrow stripe, such as the verge, are faint and wander."""
 
-LEAST_POINTS, MOST_SCATTER = 30, 0.6
+_LEAST_POINTS, _MOST_SCATTER = 30, 0.6
 """Fewest points of a course, and greatest root mean square of their residuals [px]."""
 
-SHOWN = 0.5
+_SHOWN = 0.5
 """Probability from which on a road counts as curved [-]."""
 
 
@@ -98,7 +98,7 @@ def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
     """What is known of the road's course where no lines show it: that it is straight, if not for sure."""
     covariance = np.zeros((1 + PIECES, 1 + PIECES))
     covariance[0, 0] = horizon.standard_deviation**2
-    covariance[1:, 1:] = CURVED_SHARE * sag_covariance()
+    covariance[1:, 1:] = _CURVED_SHARE * sag_covariance()
     straight = np.zeros(PIECES)
     return RoadCourse(
         column=camera.principal_point[0],
@@ -120,10 +120,10 @@ def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: H
 
     Returns None if too few lines show one that is to be believed.
     """
-    points = stripe_middles(_points(seen, image, camera, horizon), WIDEST / camera.mount_height)
+    points = stripe_middles(_points(seen, image, camera, horizon), _WIDEST / camera.mount_height)
     fit = _fitted(points, 0.0, camera, horizon)
     if fit is None:
-        bent = [_fitted(points, curvature, camera, horizon) for curvature in (BENT, -BENT)]
+        bent = [_fitted(points, curvature, camera, horizon) for curvature in (_BENT, -_BENT)]
         found = [one for one in bent if one is not None]
         if not found:
             return None
@@ -138,16 +138,16 @@ def _fitted(points: Points, curvature: float, camera: Camera, horizon: Horizon) 
     ahead = points.below > LIMITS[-1] * focal
     straightened = Points((points.across - bend / points.below)[ahead], points.below[ahead], points.kind[ahead])
     lines = straight_lines(straightened, camera, horizon)
-    marks = (lines.kind == RIDGE) & (np.abs(lines.slope) * camera.mount_height < FARTHEST_MARK)
+    marks = (lines.kind == RIDGE) & (np.abs(lines.slope) * camera.mount_height < _FARTHEST_MARK)
     if not marks.any():
         return None
     lines = lines.chosen(marks)
-    lines = lines.chosen(np.abs(lines.offset - _middle(lines)) <= SPREAD * focal)
+    lines = lines.chosen(np.abs(lines.offset - _middle(lines)) <= _SPREAD * focal)
     if lines.slope.size < 2 or float(np.ptp(lines.slope)) < LEAST_TURN:
         return None
     precision = _precision(camera, horizon.standard_deviation)
     fit = fit_course(points, lines, bend, precision, unit, camera.mount_height, focal)
-    believed = fit.span >= LEAST_TURN and fit.points >= LEAST_POINTS and fit.scatter <= MOST_SCATTER
+    believed = fit.span >= LEAST_TURN and fit.points >= _LEAST_POINTS and fit.scatter <= _MOST_SCATTER
     return fit if believed and abs(fit.unknown[ROW]) <= AGREES * horizon.standard_deviation else None
 
 
@@ -162,8 +162,8 @@ def _middle(lines: RoadLines) -> float:
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
     unknown, covariance = fit.unknown, fit.covariance
-    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], curvature_covariance(BEND_DEVIATION, BEND_LENGTH))
-    if bent < SHOWN:
+    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
+    if bent < _SHOWN:
         unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
     kept = np.array([ROW, *range(SAG, BEND)])
     ahead = SagsAhead(unknown[kept] + horizon.row * (kept == ROW), covariance[np.ix_(kept, kept)])
@@ -171,7 +171,7 @@ def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
     apart = (unknown - flat)[kept]
     within = sagging * ahead.covariance + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
-    if sagging < SHOWN:
+    if sagging < _SHOWN:
         unknown, share = flat, sagging
     else:
         share = 1.0 - sagging
@@ -191,7 +191,7 @@ def _share(mean: Floats, covariance: Floats, prior: Floats) -> float:
     """Probability that curvatures are not all 0 (Savage and Dickey's ratio)."""
     exponent = 0.5 * float(matrix_product(mean, matrix_product(inverse_of(covariance), mean)))
     logarithm = min(exponent + 0.5 * (_log_determinant(covariance) - _log_determinant(prior)), 50.0)
-    odds = CURVED_SHARE / (1.0 - CURVED_SHARE) * math.exp(logarithm)
+    odds = _CURVED_SHARE / (1.0 - _CURVED_SHARE) * math.exp(logarithm)
     return odds / (1.0 + odds)
 
 
@@ -215,7 +215,7 @@ def _without(unknown: Floats, covariance: Floats, which: slice) -> tuple[Floats,
 def _points(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horizon) -> Points:
     """Add points of every far row."""
     top = max(math.ceil(horizon.row + LIMITS[-1] * camera.focal_length) - 2, 0)
-    bottom = min(math.ceil(horizon.row + FAR_ROWS * camera.focal_length), camera.height - 1)
+    bottom = min(math.ceil(horizon.row + _FAR_ROWS * camera.focal_length), camera.height - 1)
     place, kind = row_points(image.pixels, image.tables, np.arange(top, bottom, dtype=np.int64))
     lies, near = may_lie_on_road(place, 1), seen.points.below >= bottom - horizon.row
     return Points(
@@ -229,7 +229,7 @@ def _points(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horiz
 def _precision(camera: Camera, row_deviation: float) -> Floats:
     """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
     out = np.zeros((SLOPE, SLOPE))
-    out[COLUMN, COLUMN], out[ROW, ROW] = (TANGENT * camera.focal_length) ** -2, row_deviation**-2
+    out[COLUMN, COLUMN], out[ROW, ROW] = (_TANGENT * camera.focal_length) ** -2, row_deviation**-2
     out[SAG:BEND, SAG:BEND] = inverse_of(sag_covariance())
-    out[BEND:, BEND:] = inverse_of(curvature_covariance(BEND_DEVIATION, BEND_LENGTH))
+    out[BEND:, BEND:] = inverse_of(curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
     return out

@@ -21,23 +21,23 @@ COLUMN, ROW, SAG, BEND, SLOPE = 0, 1, 2, 2 + PIECES, 2 + 2 * PIECES
 """Unknowns: column and row in which the road's tangent under the camera vanishes [px], vertical and horizontal
 curvature by piece [1/m], and each line's slope [-]."""
 
-TOP = 0.3
+_TOP = 0.3
 """Least change of the row by the inverse distance, relative to a plane's: nearer to its top, a crest hides itself."""
 
 LIMITS = (0.05, 0.05, 0.036, 0.026, 0.019, 0.014, 0.011, 0.008, 0.008)
 """Angle below the horizon down to which lines have been followed after each step [rad]."""
 
-REACH, NEAREST_REACH = 4.0, 1.0
+REACH, _NEAREST_REACH = 4.0, 1.0
 """Distance along a row within which points belong to a line, at first and in the end [px]."""
 
-FEW_POINTS = 4.0
+_FEW_POINTS = 4.0
 """Fewest points of a line while it is followed."""
 
-CROOKED = 0.04
+_CROOKED = 0.04
 """By how much a line that was painted straight is none [px]."""
 
 
-BENT_WITHIN_ROW = 0.5
+_BENT_WITHIN_ROW = 0.5
 """By how much points of a line are misplaced that bends within a row's height, over its change of slope [-]."""
 
 
@@ -85,7 +85,7 @@ def row_on_plane(below: float, sag: Floats, unit: float, height: float, start: f
             rise += sag[piece] * offset
             grade += sag[piece] * change
         slope = 1.0 - (rise - distance * grade) / height
-        if slope < TOP:
+        if slope < _TOP:
             break
         step = (below - row * (1.0 - rise / height)) / slope
         row += max(step, -0.5 * row)
@@ -168,8 +168,8 @@ def fit_course(
         for m in range(count):
             number = fit.number[m]
             scatter = max(fit.squares[m] / max(number, 1.0), LEAST_SCATTER**2)
-            fit.weight[m] = 1.0 / (3.0 * scatter + number * CROOKED**2) if number >= FEW_POINTS else 0.0
-        reach = max(0.8 * reach, NEAREST_REACH)
+            fit.weight[m] = 1.0 / (3.0 * scatter + number * _CROOKED**2) if number >= _FEW_POINTS else 0.0
+        reach = max(0.8 * reach, _NEAREST_REACH)
     return _posterior(fit, inverse)
 
 
@@ -211,7 +211,7 @@ def _add_points(
             residual = points.across[i] - unknown[COLUMN] - slope * plane - aside
             fit.number[line] += 1.0
             fit.squares[line] += residual * residual
-            crooked = BENT_WITHIN_ROW * tilt / plane
+            crooked = _BENT_WITHIN_ROW * tilt / plane
             weight = fit.weight[line] / (1.0 + fit.weight[line] * crooked * crooked)
             _add_equation(derivative, line, slope + tilt, plane, (residual, weight), normal, gradient)
 

@@ -15,11 +15,11 @@ Floats = NDArray[np.float64]
 LEAST_POINTS, LEAST_TURN = 10.0, 0.4
 """Fewest points of a line, and least difference of two lines' slopes for their crossing to say anything [-]."""
 
-LEAST_SCATTER, ALIKE, CROOKED = 0.12, 3.0, 0.12
+LEAST_SCATTER, _ALIKE, _CROOKED = 0.12, 3.0, 0.12
 """Least deviation of a point from its line [px], how many neighbouring points err together, and by how much a line
 that was painted straight is none [px]."""
 
-COLUMN, ROW, BEND, SLOPE = range(4)
+_COLUMN, _ROW, BEND, _SLOPE = range(4)
 """Unknowns of the fit: the vanishing point [px], the bend [px²], and from the fourth on each line's slope [-]."""
 
 
@@ -186,10 +186,10 @@ def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, 
     Takes `column`, `row` [px], `bend_deviation` [px²].
     """
     count = lines.slope.size
-    size = SLOPE + count
+    size = _SLOPE + count
     fit = _Fit(np.zeros(size), lines.kind, np.full(count, 0.5), np.zeros(count))
     unknown, reach = fit.unknown, 3.0
-    unknown[COLUMN], unknown[ROW], unknown[SLOPE:] = column, row, lines.slope
+    unknown[_COLUMN], unknown[_ROW], unknown[_SLOPE:] = column, row, lines.slope
     inverse: Floats = np.eye(size)
     line_of = np.empty(points.across.size, np.int64)
     for _ in range(5):
@@ -199,22 +199,22 @@ def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, 
         right[BEND] = -unknown[BEND] / bend_deviation**2
         for line in range(count):
             _add_equations(points, fit, line_of, line, normal, right)
-        normal[COLUMN, COLUMN] += 1e-6
-        normal[ROW, ROW] += 1e-3
+        normal[_COLUMN, _COLUMN] += 1e-6
+        normal[_ROW, _ROW] += 1e-3
         for a in range(size):
             for b in range(a):
                 normal[a, b] = normal[b, a]
         inverse = inverse_of(normal)
         step = times(inverse, right)
-        step[ROW] = min(max(step[ROW], -5.0), 5.0)
+        step[_ROW] = min(max(step[_ROW], -5.0), 5.0)
         unknown += step
         reach = max(0.6 * reach, 1.0)
     low, high, used, total = np.inf, -np.inf, 0, 0.0
     for line in range(count):
         if fit.number[line] >= LEAST_POINTS:
-            low, high = min(low, unknown[SLOPE + line]), max(high, unknown[SLOPE + line])
+            low, high = min(low, unknown[_SLOPE + line]), max(high, unknown[_SLOPE + line])
             used, total = used + 1, total + fit.number[line]
-    return RoadFit(unknown[COLUMN], unknown[ROW], float(inverse[ROW, ROW]), used, high - low, total)
+    return RoadFit(unknown[_COLUMN], unknown[_ROW], float(inverse[_ROW, _ROW]), used, high - low, total)
 
 
 @kernel
@@ -222,7 +222,7 @@ def _assign_points(points: Points, fit: _Fit, reach: float, line_of: NDArray[np.
     """Give each point to the nearest line of its kind within reach, −1 for none; count and scatter follow."""
     across, below, kind = points
     unknown, kinds, scatter, number = fit
-    column, row, bend = unknown[COLUMN], unknown[ROW], unknown[BEND]
+    column, row, bend = unknown[_COLUMN], unknown[_ROW], unknown[BEND]
     squares = np.zeros(number.size)
     number[:] = 0.0
     for i in range(across.size):
@@ -233,7 +233,7 @@ def _assign_points(points: Points, fit: _Fit, reach: float, line_of: NDArray[np.
         nearest = np.inf
         for m in range(number.size):
             if kinds[m] == kind[i]:
-                apart = abs(across[i] - column - unknown[SLOPE + m] * y - bend / y)
+                apart = abs(across[i] - column - unknown[_SLOPE + m] * y - bend / y)
                 if apart < min(nearest, max(4.0 * scatter[m], 0.6), reach):
                     nearest, line_of[i] = apart, m
         if line_of[i] >= 0:
@@ -250,8 +250,8 @@ def _add_equations(
 ) -> None:
     """Add the normal equations of one line's points, above the diagonal."""
     across, below, _ = points
-    column, row, bend, slope = fit.unknown[COLUMN], fit.unknown[ROW], fit.unknown[BEND], fit.unknown[SLOPE + line]
-    number, s = fit.number[line], SLOPE + line
+    column, row, bend, slope = fit.unknown[_COLUMN], fit.unknown[_ROW], fit.unknown[BEND], fit.unknown[_SLOPE + line]
+    number, s = fit.number[line], _SLOPE + line
     normal[s, s] = 1e-3
     if number < LEAST_POINTS:
         return
@@ -267,16 +267,16 @@ def _add_equations(
         n11, n12, n1s = n11 + by_row * by_row, n12 + by_row * by_bend, n1s + by_row * y
         n22, n2s, nss = n22 + by_bend * by_bend, n2s + by_bend * y, nss + y * y
         r0, r1, r2, rs = r0 + residual, r1 + by_row * residual, r2 + by_bend * residual, rs + y * residual
-    weight = 1.0 / (ALIKE * max(fit.scatter[line], LEAST_SCATTER) ** 2 + number * CROOKED**2)
-    normal[COLUMN, COLUMN] += weight * n00
-    normal[COLUMN, ROW] += weight * n01
-    normal[COLUMN, BEND] += weight * n02
-    normal[ROW, ROW] += weight * n11
-    normal[ROW, BEND] += weight * n12
+    weight = 1.0 / (_ALIKE * max(fit.scatter[line], LEAST_SCATTER) ** 2 + number * _CROOKED**2)
+    normal[_COLUMN, _COLUMN] += weight * n00
+    normal[_COLUMN, _ROW] += weight * n01
+    normal[_COLUMN, BEND] += weight * n02
+    normal[_ROW, _ROW] += weight * n11
+    normal[_ROW, BEND] += weight * n12
     normal[BEND, BEND] += weight * n22
-    normal[COLUMN, s], normal[ROW, s], normal[BEND, s] = weight * n0s, weight * n1s, weight * n2s
+    normal[_COLUMN, s], normal[_ROW, s], normal[BEND, s] = weight * n0s, weight * n1s, weight * n2s
     normal[s, s] += weight * nss
-    right[COLUMN] += weight * r0
-    right[ROW] += weight * r1
+    right[_COLUMN] += weight * r0
+    right[_ROW] += weight * r1
     right[BEND] += weight * r2
     right[s] = weight * rs

@@ -24,28 +24,28 @@ from fogsim.vision.lines.vanishing_point import VanishingPoint, all_pairs, cross
 
 Floats = NDArray[np.float64]
 
-MOST_ROWS = 100
+_MOST_ROWS = 100
 """Rows that are looked at, evenly from below the horizon to the image's bottom."""
 
 CLEAR_OF_HORIZON = 0.025
 """Angle below the horizon from which lines are looked at: 50 to 60 m ahead [rad]."""
 
-YAW, YAW_STEP = math.radians(4.0), 0.006
+_YAW, _YAW_STEP = math.radians(4.0), 0.006
 """How far the road may run to either side of the camera's axis, and the step in which that is tried [rad]."""
 
-STEEPEST, SLOPE_STEP = 6.5, 0.035
+_STEEPEST, _SLOPE_STEP = 6.5, 0.035
 """Columns per row of lines that are sought, and the cells of their slopes [-]."""
 
 MOST_LINES = 12
 """Lines that are kept."""
 
-TOLERANCE = 3.0
+_TOLERANCE = 3.0
 """How far a line may pass by the point in which the others meet [px]."""
 
 BEND = 5e-4
 """Standard deviation of a road's bend, half its curvature times the camera's height [-]: a radius of 1500 m."""
 
-FLAT, DRAWN = math.radians(0.012), 0.05
+_FLAT, _DRAWN = math.radians(0.012), 0.05
 """Standard deviations of a vanishing point's row by roads that are not quite flat [rad], and by how images are drawn,
 scaled and compressed [px]."""
 
@@ -77,7 +77,7 @@ def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLin
 
 def straight_lines(points: Points, camera: Camera, horizon: Horizon) -> RoadLines:
     """Straight lines through points that are not too near to the horizon."""
-    rows, (offsets, slopes) = _rows(camera, horizon), _cells(YAW * camera.focal_length)
+    rows, (offsets, slopes) = _rows(camera, horizon), _cells(_YAW * camera.focal_length)
     near = _below(points, rows[0] - horizon.row)
     found = hough_road_lines(near, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
     return refitted_lines(near, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
@@ -103,15 +103,15 @@ def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> Van
 
     Returns None if no two lines meet near the assumed horizon.
     """
-    first = first_point(seen.lines, AGREES * horizon.standard_deviation + 2.0)
+    first = _first_point(seen.lines, AGREES * horizon.standard_deviation + 2.0)
     if first is None:
         return None
-    lines = lines_through(seen.lines, first, TOLERANCE)
+    lines = _lines_through(seen.lines, first, _TOLERANCE)
     if lines.slope.size < 2:
         return None
     points = _below(seen.points, _first_row(camera, horizon) - horizon.row)
     fit = fit_road_lines(points, lines, *first, BEND * camera.focal_length**2)
-    deviation = math.hypot(math.sqrt(fit.variance), FLAT * camera.focal_length, DRAWN)
+    deviation = math.hypot(math.sqrt(fit.variance), _FLAT * camera.focal_length, _DRAWN)
     apart = AGREES * math.hypot(horizon.standard_deviation, deviation)
     if fit.lines < 2 or fit.span < LEAST_TURN or not abs(fit.row) <= apart:
         return None
@@ -119,7 +119,7 @@ def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> Van
     return VanishingPoint(*place, deviation, fit.lines, fit.points)
 
 
-def lines_through(lines: RoadLines, point: tuple[float, float], tolerance: float) -> RoadLines:
+def _lines_through(lines: RoadLines, point: tuple[float, float], tolerance: float) -> RoadLines:
     """Lines that pass a point (`point` [px], `tolerance` [px])."""
     return lines.chosen(np.abs(lines.offset + lines.slope * point[1] - point[0]) <= tolerance)
 
@@ -139,7 +139,7 @@ def _points(image: LinearPixels, rows: NDArray[np.int64], camera: Camera, horizo
     return Points(place[lies, 0] - camera.principal_point[0], place[lies, 1] - horizon.row, kind[lies])
 
 
-def first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
+def _first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
     """Crossing of two lines, near the expected point, through which lines with most points pass: column and row.
 
     Takes `farthest` [px].
@@ -149,7 +149,7 @@ def first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None
     crossed = crossings(lines, first, second, LEAST_TURN)
     aside = np.abs(crossed[:, 1])
     # Of points that are about as good, the one nearer to the expected row.
-    support = supports(lines, found.points, crossed, TOLERANCE) * (1.0 - 0.3 * aside / farthest)
+    support = supports(lines, found.points, crossed, _TOLERANCE) * (1.0 - 0.3 * aside / farthest)
     support[~(aside <= farthest)] = 0.0
     if not support.any():
         return None
@@ -161,13 +161,13 @@ def first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None
 @functools.lru_cache(maxsize=8)
 def _cells(reach: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Offsets [px] and slopes of the lines that are voted for; they belong to all who ask."""
-    offsets = np.linspace(-reach, reach, 2 * math.ceil(YAW / YAW_STEP) + 1)
-    return offsets, np.linspace(-STEEPEST, STEEPEST, 2 * round(STEEPEST / SLOPE_STEP) + 1)
+    offsets = np.linspace(-reach, reach, 2 * math.ceil(_YAW / _YAW_STEP) + 1)
+    return offsets, np.linspace(-_STEEPEST, _STEEPEST, 2 * round(_STEEPEST / _SLOPE_STEP) + 1)
 
 
 def _rows(camera: Camera, horizon: Horizon) -> NDArray[np.int64]:
     first = _first_row(camera, horizon)
-    step = max(math.ceil((camera.height - first) / MOST_ROWS), 1)
+    step = max(math.ceil((camera.height - first) / _MOST_ROWS), 1)
     return np.arange(first, camera.height - 1, step, dtype=np.int64)
 
 

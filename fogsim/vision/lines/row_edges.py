@@ -11,34 +11,34 @@ from fogsim.vision.lines.edges import peak_offset
 RISING, FALLING, RIDGE = 0, 1, 2
 """Kinds of points: edges to the brighter and to the darker side, and the middle of a narrow bright stripe."""
 
-NARROW = 5.5
+_NARROW = 5.5
 """Width up to which a bright stripe is one point [px]: blurred together, its edges seem further apart than they are."""
 
-EDGE_IN_NOISE = 6.0
+_EDGE_IN_NOISE = 6.0
 """Least gradient of an edge, in deviations of the row's own gradients [-]."""
 
-SAMPLED = 64
+_SAMPLED = 64
 """Gradients of a row that show how much they scatter, as many from either side."""
 
-LEAST_GRADIENT = 0.7
+_LEAST_GRADIENT = 0.7
 """Least gradient of an edge [linear grey levels per px]."""
 
 REACH, SMOOTHING = 4, 1.3
 """Half-width of the derivative's kernel, and deviation of the Gaussian that it is the derivative of [px]."""
 
-MOST_A_ROW, MOST_POINTS = 48, 4000
+_MOST_A_ROW, _MOST_POINTS = 48, 4000
 """Points that are kept of a row, and of an image."""
 
 KINDS = 3
 """How many kinds of points there are."""
 
-NEXT, MISSED = 0.75, 2
+_NEXT, _MISSED = 0.75, 2
 """Columns by which an upright edge may lean from one of its points to the next [px], and rows between that miss it."""
 
-LEAN, PLACED = 0.1, 0.5
+_LEAN, _PLACED = 0.1, 0.5
 """Columns per row by which it may lean in all [-], and how surely its ends are placed [px]."""
 
-LEAST_HEIGHT, UPRIGHT_POINTS = 5.0, 3
+_LEAST_HEIGHT, _UPRIGHT_POINTS = 5.0, 3
 """Height from which an edge is seen to stand [px], and of how many points."""
 
 
@@ -54,7 +54,7 @@ def row_points(
     `tables` (channels, levels), `rows` (n,) int64.
     """
     cols = pixels.shape[1]
-    place, kind = np.empty((MOST_POINTS, 2)), np.empty(MOST_POINTS, np.int64)
+    place, kind = np.empty((_MOST_POINTS, 2)), np.empty(_MOST_POINTS, np.int64)
     line, slope = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     tap = np.arange(REACH + 1).astype(np.float64)
     weight = tap * np.exp(-0.5 * (tap / SMOOTHING) ** 2)
@@ -64,7 +64,7 @@ def row_points(
     l4, l3, l2, l1 = line, line[1:], line[2:], line[3:]
     r1, r2, r3, r4 = line[5:], line[6:], line[7:], line[8:]
     inner = slope[REACH:]
-    edge, sign = np.empty(MOST_A_ROW), np.empty(MOST_A_ROW, np.int64)
+    edge, sign = np.empty(_MOST_A_ROW), np.empty(_MOST_A_ROW, np.int64)
     count = 0
     for row in rows:
         row_luminance(pixels, tables, row, line)
@@ -77,8 +77,8 @@ def row_points(
             )
         found = _row_edges(slope, edge, sign)
         i = 0
-        while i < found and count < MOST_POINTS:
-            stripe = i + 1 < found and sign[i] > 0 and sign[i + 1] < 0 and edge[i + 1] - edge[i] < NARROW
+        while i < found and count < _MOST_POINTS:
+            stripe = i + 1 < found and sign[i] > 0 and sign[i + 1] < 0 and edge[i + 1] - edge[i] < _NARROW
             place[count, 1] = row
             if stripe:
                 place[count, 0], kind[count] = 0.5 * (edge[i] + edge[i + 1]), RIDGE
@@ -95,13 +95,13 @@ def _row_edges(slope: NDArray[np.float32], edge: NDArray[np.float64], sign: NDAr
     """Peaks of a row's gradient that stand out of it; returns how many."""
     cols = slope.size
     # Half of a row's gradients, at least, are noise and texture.
-    sample, ordered = np.empty(SAMPLED, np.float32), np.empty(SAMPLED, np.float32)
-    step = max((cols - 2 * REACH) // SAMPLED, 1)
-    for i in range(SAMPLED // 2):
+    sample, ordered = np.empty(_SAMPLED, np.float32), np.empty(_SAMPLED, np.float32)
+    step = max((cols - 2 * REACH) // _SAMPLED, 1)
+    for i in range(_SAMPLED // 2):
         sample[2 * i] = abs(slope[min(REACH + i * step, cols - 1)])
         sample[2 * i + 1] = abs(slope[max(cols - 1 - REACH - i * step, 0)])
     middle = median_of_few(sample, ordered)
-    least = np.float32(max(EDGE_IN_NOISE * middle / 0.6745, LEAST_GRADIENT))
+    least = np.float32(max(_EDGE_IN_NOISE * middle / 0.6745, _LEAST_GRADIENT))
     found = 0
     for col in range(REACH + 1, cols - REACH - 1):
         here = abs(slope[col])
@@ -139,9 +139,9 @@ def may_lie_on_road(place: NDArray[np.float64], step: int) -> NDArray[np.bool_]:
         nearest, near = -1, np.inf
         for j in range(below, count):
             apart = abs(place[j, 0] - place[i, 0])
-            if place[j, 1] > (place[i, 1] + (1 + MISSED) * step if nearest < 0 else place[nearest, 1]):
+            if place[j, 1] > (place[i, 1] + (1 + _MISSED) * step if nearest < 0 else place[nearest, 1]):
                 break
-            if first[j] == j and apart <= NEXT and apart < near:
+            if first[j] == j and apart <= _NEXT and apart < near:
                 nearest, near = j, apart
         if nearest >= 0:
             first[nearest], last[first[i]] = first[i], nearest
@@ -151,5 +151,5 @@ def may_lie_on_road(place: NDArray[np.float64], step: int) -> NDArray[np.bool_]:
         top, foot = first[i], last[first[i]]
         height = place[foot, 1] - place[top, 1]
         lean = abs(place[foot, 0] - place[top, 0])
-        free[i] = points[top] < UPRIGHT_POINTS or height < LEAST_HEIGHT or lean > LEAN * height + PLACED
+        free[i] = points[top] < _UPRIGHT_POINTS or height < _LEAST_HEIGHT or lean > _LEAN * height + _PLACED
     return free

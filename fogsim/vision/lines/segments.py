@@ -14,25 +14,25 @@ from fogsim.vision.lines.vanishing_point import Lines, VanishingPoint, crossings
 
 Floats = NDArray[np.float64]
 
-LOWEST_ANGLE, STEEPEST_ANGLE = math.radians(8.0), math.radians(80.0)
+_LOWEST_ANGLE, _STEEPEST_ANGLE = math.radians(8.0), math.radians(80.0)
 """Angles to the rows between which a segment can lie along the road: roofs are flatter, posts are steeper [rad]."""
 
-LEAST_LENGTH = 0.03
+_LEAST_LENGTH = 0.03
 """Share of the image's width below which a segment's direction says too little."""
 
-SKY = 0.4
+_SKY = 0.4
 """Share of the image's height above which there is no road."""
 
 LONGEST = 40
 """Segments whose intersections are tried, the longest: 400 pairs at most."""
 
-FIRST_REACH = 0.02
+_FIRST_REACH = 0.02
 """Sine of the angle within which a segment points at an intersection, at first [-]."""
 
-PLACE_DEVIATION = 0.3
+_PLACE_DEVIATION = 0.3
 """Standard deviation of an edge pixel across its segment [px]."""
 
-STRAIGHTNESS = 0.1
+_STRAIGHTNESS = 0.1
 """Standard deviation of a line of the road from a straight one [px]."""
 
 
@@ -94,7 +94,9 @@ def _segments(luminance: NDArray[np.float32]) -> _Segments:
     length = np.hypot(along[:, 0], along[:, 1])
     angle = np.arctan2(np.abs(along[:, 1]), np.abs(along[:, 0]))
     bottom, top = ends[:, [1, 3]].max(axis=1), ends[:, [1, 3]].min(axis=1)
-    kept = (length > LEAST_LENGTH * cols) & (angle > LOWEST_ANGLE) & (angle < STEEPEST_ANGLE) & (bottom > SKY * rows)
+    kept = (
+        (length > _LEAST_LENGTH * cols) & (angle > _LOWEST_ANGLE) & (angle < _STEEPEST_ANGLE) & (bottom > _SKY * rows)
+    )
     normal = np.stack((-along[kept, 1], along[kept, 0]), axis=1) / length[kept, None]
     middle = 0.5 * (ends[kept, :2] + ends[kept, 2:])
     lean = np.sign(along[kept, 0] * along[kept, 1])
@@ -109,7 +111,7 @@ def _first_point(segments: _Segments, rows: int, cols: int) -> Floats | None:
     points = crossings(segments.lines, np.repeat(lefts, rights.size), np.tile(rights, lefts.size), 0.0)
     column, row = points.T
     points = points[(row >= 0.0) & (row <= 0.8 * rows) & (column >= 0.1 * cols) & (column <= 0.9 * cols)]
-    pointing = segments.pointing(points, np.maximum(FIRST_REACH * segments.distance(points), 1.0))
+    pointing = segments.pointing(points, np.maximum(_FIRST_REACH * segments.distance(points), 1.0))
     length = np.where(_both_ways(segments, pointing), (pointing * segments.length).sum(axis=1), 0.0)
     return points[int(np.argmax(length))] if length.any() else None
 
@@ -124,8 +126,8 @@ def _fitted(segments: _Segments, point: Floats) -> RoadSegments | None:
     for _ in range(6):
         far = segments.distance(point)
         # A straight line through n pixels: 1/n for its place, 12 d²/n³ for its direction.
-        by_pixels = PLACE_DEVIATION**2 * (1.0 / segments.length + 12.0 * far**2 / segments.length**3)
-        deviation = np.sqrt(by_pixels) + STRAIGHTNESS
+        by_pixels = _PLACE_DEVIATION**2 * (1.0 / segments.length + 12.0 * far**2 / segments.length**3)
+        deviation = np.sqrt(by_pixels) + _STRAIGHTNESS
         pointing = segments.pointing(point, 3.0 * deviation)
         if not _both_ways(segments, pointing):
             return None

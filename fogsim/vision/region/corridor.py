@@ -11,20 +11,20 @@ from fogsim.vision.light.medians import span_medians
 from fogsim.vision.region.profile import RoadCurve, path_lengths
 from fogsim.vision.region.road_image import SATURATED, RoadImage
 
-HALF_ROAD = 2.5
+_HALF_ROAD = 2.5
 """How far to either side of the vehicle's axis the ground is surely road [m]."""
 
-LEAST_HALF = 3.0
+_LEAST_HALF = 3.0
 """Half width of the corridor about the horizon, where it would be narrower [px]."""
 
-HALF_BESIDE, BESIDE = 6.0, 8.0
+_HALF_BESIDE, _BESIDE = 6.0, 8.0
 """The same where a tracked vehicle hides the own lane [m], and by how much it is wider to either side than what is
 hidden [px]."""
 
-HALF_VEHICLE, VEHICLE_MARGIN = 1.5, 2.0
+_HALF_VEHICLE, _VEHICLE_MARGIN = 1.5, 2.0
 """What a tracked vehicle hides either side of the axis, and how much nearer than measured its foot may be [m]."""
 
-FEWEST = 3
+_FEWEST = 3
 """Fewest pixels that make a row's median."""
 
 
@@ -33,16 +33,16 @@ def hide_vehicle(
     road: RoadImage,
     camera: Camera,
     lead: LeadMeasurement | None,
-    half_width: float = HALF_VEHICLE,
+    half_width: float = _HALF_VEHICLE,
 ) -> float:
     """Take what a tracked vehicle may cover out of a region.
 
     Returns half the width of what is hidden [px]; 0 without a vehicle. Takes `region` (rows, cols) uint8, `half_width`
     [m].
     """
-    if lead is None or not lead.distance > VEHICLE_MARGIN:
+    if lead is None or not lead.distance > _VEHICLE_MARGIN:
         return 0.0
-    free = max(lead.distance - VEHICLE_MARGIN, 1.0)
+    free = max(lead.distance - _VEHICLE_MARGIN, 1.0)
     foot = math.ceil(camera.horizon_row + camera.row_distance / free) - road.first_row
     half = half_width * camera.focal_length / free
     middle = camera.principal_point[0] - road.first_column
@@ -70,13 +70,13 @@ def corridor_curve(
     below = np.arange(rows, dtype=np.float64) + (road.first_row - horizon_row)
     # A lateral offset x at a depth z is α x / z columns, and z is λ / (v − v_h).
     per_metre = camera.focal_length / camera.row_distance
-    wide, least = (HALF_BESIDE, hidden + BESIDE) if hidden > 0.0 else (HALF_ROAD, LEAST_HALF)
+    wide, least = (_HALF_BESIDE, hidden + _BESIDE) if hidden > 0.0 else (_HALF_ROAD, _LEAST_HALF)
     half = np.maximum(wide * per_metre * np.abs(below), least) if own_lane else np.full(rows, float(cols))
     half = np.minimum(half, float(cols))
     middle = axis - road.first_column
     left, right = np.ceil(middle - half).astype(np.int64), np.floor(middle + half).astype(np.int64)
     # Every pixel counts: a picture and its mirror image have the same.
-    medians = span_medians(road.luminance, region, left, right, 1 << 30, FEWEST)
+    medians = span_medians(road.luminance, region, left, right, 1 << 30, _FEWEST)
     weight = ((medians.number > 0) & (medians.luminance < SATURATED)).astype(np.float64)
     tilt = (below + (horizon_row - camera.principal_point[1])) / camera.focal_length
     distance = path_lengths(below, camera.row_distance, np.sqrt(1.0 + tilt**2))

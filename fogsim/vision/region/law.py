@@ -12,19 +12,19 @@ from fogsim.vision.region.profile import RoadCurve, path_lengths
 
 Floats = NDArray[np.float64]
 
-BLOCKS = 10
+_BLOCKS = 10
 """Stretches of road, each in the same ratio of distances, whose residuals are taken to be independent."""
 
-PATTERNS = 24
+_PATTERNS = 24
 """Curves that are drawn again from one."""
 
-ALBEDO_DEVIATION = 0.03
+_ALBEDO_DEVIATION = 0.03
 """Relative deviation of k by slow changes of a road's reflectance, which look like fog [-]."""
 
-ABSORBED = 1.3
+_ABSORBED = 1.3
 """By how much more a road's texture moves an estimate than its residuals say: the fit has taken some of it up [-]."""
 
-SMALLEST = 0.05
+_SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
@@ -44,8 +44,8 @@ def transmittance(optical: Floats | float, below_horizon: Floats) -> Floats:
 
     Takes `optical` [px], `below_horizon` [px].
     """
-    ends = [np.maximum(below_horizon + part, SMALLEST) for part in (-0.5, 0.0, 0.5)]
-    top, middle, bottom = (np.exp(-optical / end) * (end > SMALLEST) for end in ends)
+    ends = [np.maximum(below_horizon + part, _SMALLEST) for part in (-0.5, 0.0, 0.5)]
+    top, middle, bottom = (np.exp(-optical / end) * (end > _SMALLEST) for end in ends)
     return np.asarray((top + 4.0 * middle + bottom) / 6.0)
 
 
@@ -72,7 +72,7 @@ def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
     return LawFit(airlight, airlight - drop, model, left / drop if drop > 0.0 else math.inf)
 
 
-def redrawn(curve: RoadCurve, model: Floats) -> Floats:
+def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
     """Curves as the same fog over other road would make: a model, and its residuals with their signs changed at random.
 
     Residuals of neighbouring rows belong together, for patches of a road spread over several, so they change in blocks
@@ -83,13 +83,13 @@ def redrawn(curve: RoadCurve, model: Floats) -> Floats:
     """
     below = np.maximum(curve.below_horizon, 1.0)
     log = np.log(below / below[0]) if below[0] > 0.0 else np.zeros(below.size)
-    block = np.minimum((BLOCKS * log / max(float(log[-1]), 1e-9)).astype(np.int64), BLOCKS - 1)
+    block = np.minimum((_BLOCKS * log / max(float(log[-1]), 1e-9)).astype(np.int64), _BLOCKS - 1)
     residual = np.where(curve.weight > 0.0, curve.luminance - model, 0.0)
     return np.asarray(model[:, None] + residual[:, None] * _signs()[block])
 
 
 def _signs() -> Floats:
-    return np.random.default_rng(2015).choice([-1.0, 1.0], (BLOCKS, PATTERNS))
+    return np.random.default_rng(2015).choice([-1.0, 1.0], (_BLOCKS, _PATTERNS))
 
 
 Read = Callable[[RoadCurve, Floats], Floats]
@@ -101,10 +101,10 @@ def extinction_deviation(curve: RoadCurve, extinction: float, read: Read, horizo
 
     Returns [1/m]; infinite where curves like this one give nothing. Takes `extinction` [1/m], `horizon_deviation` [px].
     """
-    by_road = ABSORBED * spread(read(curve, redrawn(curve, law_fit(curve, extinction).model)), extinction)
+    by_road = _ABSORBED * spread(read(curve, _redrawn(curve, law_fit(curve, extinction).model)), extinction)
     moved = [_read_below(curve, side * horizon_deviation, read) for side in (1.0, -1.0)]
     by_horizon = max((abs(k - extinction) for k in moved if math.isfinite(k)), default=math.inf)
-    return math.hypot(by_road, by_horizon, ALBEDO_DEVIATION * extinction)
+    return math.hypot(by_road, by_horizon, _ALBEDO_DEVIATION * extinction)
 
 
 def _read_below(curve: RoadCurve, shift: float, read: Read) -> float:

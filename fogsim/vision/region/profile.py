@@ -9,7 +9,7 @@ from fogsim.core.jit import kernel
 from fogsim.vision.light.medians import row_medians
 from fogsim.vision.region.road_region import Band
 
-MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and gain nothing
+_MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and gain nothing
 
 
 def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float64]:
@@ -21,7 +21,7 @@ def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float
     Returns rows ``band.top`` … ``band.bottom`` from the top down. Takes `luminance` (rows, cols).
     """
     width = band.right - band.left + 1
-    block = -(-width // MAX_BLOCKS)
+    block = -(-width // _MAX_BLOCKS)
     count = width // block
     left = band.left + (width - count * block) // 2
     strip = luminance[band.top : band.bottom + 1, left : left + count * block]

@@ -12,7 +12,7 @@ from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile
 from fogsim.vision.lines.horizon import Horizon, levelled
 
-MIN_COLS, MIN_ROWS = 32, 16
+_MIN_COLS, MIN_ROWS = 32, 16
 """[px] A road narrower than this, or lower below its horizon, shows no curve."""
 
 MIN_AIRLIGHT = 6.0
@@ -24,10 +24,10 @@ MIN_CONTRAST = 6.0
 SATURATED = 250.0
 """Luminance that is clipped, or so near that noise is [linear grey levels]."""
 
-SKY_SHARE = 0.05
+_SKY_SHARE = 0.05
 """Share of the image's height above the horizon that is taken along [-]."""
 
-SKY_HEIGHT = 0.12
+_SKY_HEIGHT = 0.12
 """How far above the horizon the airlight is looked for [rad]: over a wood that stands along the horizon."""
 
 
@@ -66,15 +66,15 @@ def road_image(
     rows, cols = image.shape[:2]
     if not 1.0 <= horizon.row <= rows - 1:
         raise CannotTellError(f"the horizon (row {horizon.row:.1f}) is outside the image")
-    if rows - 1 - horizon.row < MIN_ROWS or cols < MIN_COLS:
+    if rows - 1 - horizon.row < MIN_ROWS or cols < _MIN_COLS:
         raise CannotTellError("the image is too small to show a curve")
     sky_end = math.ceil(horizon.row)
-    first = max(0, sky_end - 4 - round(SKY_SHARE * rows))
+    first = max(0, sky_end - 4 - round(_SKY_SHARE * rows))
     level = levelled(image, camera)
     left, right = columns or (0, cols)
     response = (camera.response, camera.bits, camera.black_level) if linear else (Response.LINEAR, camera.bits)
     luminance = linear_luminance(level[first:, left:right], *response)
-    top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
+    top = min(first, max(0, sky_end - round(_SKY_HEIGHT * camera.focal_length)))
     above = linear_luminance(columns_apart(level[top:sky_end:2], 4), *response)
     airlight = quantile(above, 0.9)
     seed = median(luminance[-1])

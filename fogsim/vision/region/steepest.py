@@ -9,23 +9,23 @@ from fogsim.vision.region.profile import RoadCurve
 
 Floats = NDArray[np.float64]
 
-LEAST_REACH = 1.5
+_LEAST_REACH = 1.5
 """Rows to either side over which a slope is taken at least [px]."""
 
-PLACES, HIGHEST = 96, 0.6
+_PLACES, _HIGHEST = 96, 0.6
 """Places at which the slope is looked at, evenly in ln(v − v_h), and the first of them below the horizon [px]."""
 
-SEEN = 0.7
+_SEEN = 0.7
 """Share of the rows of a window that must be seen [-]."""
 
-PEAK = 0.85
+_PEAK = 0.85
 """Share of the steepest slope from which on places count for that of the peak [-]."""
 
-NEAREST_OF_RISE, FARTHEST_OF_RISE = 1.2, 0.2
+_NEAREST_OF_RISE, _FARTHEST_OF_RISE = 1.2, 0.2
 """Rows between which the steepest is sought, over the row about which the luminance changes most in ln(v − v_h), which
 by Koschmieder's law is twice the inflection's [-]."""
 
-STEPS = 4
+_STEPS = 4
 """How often the law's own steepest row is compared with the one that is seen."""
 
 
@@ -34,7 +34,7 @@ def places(curve: RoadCurve) -> Floats:
 
     Returns v − v_h, ascending [px].
     """
-    return np.asarray(np.geomspace(HIGHEST, max(float(curve.below_horizon[-1]), 2.0 * HIGHEST), PLACES))
+    return np.asarray(np.geomspace(_HIGHEST, max(float(curve.below_horizon[-1]), 2.0 * _HIGHEST), _PLACES))
 
 
 def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
@@ -46,7 +46,7 @@ def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     `luminance` (n, m).
     """
     at, rows = places(curve), curve.below_horizon[:, None]
-    half = np.maximum(reach * at, LEAST_REACH)
+    half = np.maximum(reach * at, _LEAST_REACH)
     weight = curve.weight[:, None]
     columns = np.concatenate(
         (weight, weight * rows, weight * rows**2, weight * luminance, weight * rows * luminance), axis=1
@@ -56,7 +56,7 @@ def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     count, by_row, by_square = within[:, :1], within[:, 1:2], within[:, 2:3]
     by_light, by_both = np.split(within[:, 3:], 2, axis=1)
     spread = count * by_square - by_row**2
-    seen = (count[:, 0] >= SEEN * 2.0 * half) & (at + half <= rows[-1, 0] + 0.5)
+    seen = (count[:, 0] >= _SEEN * 2.0 * half) & (at + half <= rows[-1, 0] + 0.5)
     slope = -(count * by_both - by_row * by_light) / np.maximum(spread, 1e-9)
     return np.asarray(np.where(seen[:, None], slope, -np.inf))
 
@@ -78,7 +78,7 @@ def steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     slope = slopes(curve, luminance, reach)
     # A step of noise near the horizon may be steeper than dense fog, but is no large one.
     rise = at[np.argmax(slope * at[:, None], axis=0)]
-    near = (at[:, None] <= NEAREST_OF_RISE * rise) & (at[:, None] >= FARTHEST_OF_RISE * rise)
+    near = (at[:, None] <= _NEAREST_OF_RISE * rise) & (at[:, None] >= _FARTHEST_OF_RISE * rise)
     return _peaks(at, np.ascontiguousarray(np.where(near, slope, -np.inf)))
 
 
@@ -96,9 +96,9 @@ def _peaks(at: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.fl
         if not most > 0.0:
             continue
         first, last = best, best
-        while first > 0 and slope[first - 1, column] >= PEAK * most:
+        while first > 0 and slope[first - 1, column] >= _PEAK * most:
             first -= 1
-        while last + 1 < count and slope[last + 1, column] >= PEAK * most:
+        while last + 1 < count and slope[last + 1, column] >= _PEAK * most:
             last += 1
         middle, reach = 0.5 * (first + last), 0.5 * (last - first)
         # A parabola of least squares: x and x² − mean are independent over places evenly about the middle.
@@ -134,7 +134,7 @@ def fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> F
     """
     seen = steepest_rows(curve, luminance, reach)
     optical = 2.0 * seen
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         law = -transmittance(optical * slants(curve)[:, None], curve.below_horizon[:, None])
         optical = optical * np.clip(seen / steepest_rows(curve, law, reach), 0.5, 2.0)
     return np.asarray(optical / curve.row_distance)

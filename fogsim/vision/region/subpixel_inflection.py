@@ -12,13 +12,13 @@ from fogsim.vision.region.profile import RoadCurve
 
 Floats = NDArray[np.float64]
 
-CANDIDATES, HIGHEST = 120, 0.7
+_CANDIDATES, _HIGHEST = 120, 0.7
 """Candidates between rows, evenly in ln(v − v_h), and the first of them below the horizon [px]."""
 
-ABOUT = 3.5
+_ABOUT = 3.5
 """Ratio of v − v_h, either way, to the candidate's, of the rows that its level and slope are taken from [-]."""
 
-FEWEST_ROWS = 4.0
+_FEWEST_ROWS = 4.0
 """Rows that a level and a slope need at least."""
 
 
@@ -35,9 +35,9 @@ def subpixel_inflections(
     (m,). Takes `luminance` (n, m) [linear grey levels].
     """
     below, weight = curve.below_horizon, curve.weight
-    at = np.geomspace(HIGHEST, max(float(below[-1]), 2.0 * HIGHEST), CANDIDATES)
+    at = np.geomspace(_HIGHEST, max(float(below[-1]), 2.0 * _HIGHEST), _CANDIDATES)
     shape = transmittance(2.0 * at[:, None] * slants(curve), below)
-    about = weight * (below <= ABOUT * at[:, None] + 1.0) * (below >= at[:, None] / ABOUT - 1.0)
+    about = weight * (below <= _ABOUT * at[:, None] + 1.0) * (below >= at[:, None] / _ABOUT - 1.0)
     count, by_shape, by_square = about.sum(axis=1), (about * shape).sum(axis=1), (about * shape**2).sum(axis=1)
     light, both = matrix_product(about, luminance), matrix_product(about * shape, luminance)
     turn = (count * by_square - by_shape**2)[:, None]
@@ -52,7 +52,7 @@ def subpixel_inflections(
     all_light, all_both = (weight[:, None] * luminance).sum(axis=0), matrix_product(shape * weight, luminance)
     error = squares - 2.0 * airlight * all_light + 2.0 * drop * all_both
     error += airlight**2 * total - 2.0 * airlight * drop * shapes[:, None] + drop**2 * shape_squares[:, None]
-    sure = (count >= FEWEST_ROWS) & (turn[:, 0] > 1e-9) & (at <= below[-1] / 1.2)
+    sure = (count >= _FEWEST_ROWS) & (turn[:, 0] > 1e-9) & (at <= below[-1] / 1.2)
     error = np.where(sure[:, None] & (drop > 0.0), error, np.inf)
     return _least(at, error, float(total))
 

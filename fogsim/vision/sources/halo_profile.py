@@ -13,29 +13,29 @@ from fogsim.vision.sources.tree_kernels import AREA
 UP = (0.0, -1.0)
 """Direction of a halo that drifts nowhere: away from the road [px]."""
 
-LEAST_DRIFT = 0.5
+_LEAST_DRIFT = 0.5
 """Drift of the centre below which a halo has no direction of its own [px]."""
 
-JUMP, STRAIGHTNESS = 0.5, 0.4
+_JUMP, _STRAIGHTNESS = 0.5, 0.4
 """Step of a centre over the radius of its component, and its drift over its way: where a step is larger and this less
 a centre wanders [-]."""
 
-LEAST_FALL = 0.2
+_LEAST_FALL = 0.2
 """How far the threshold falls at least before a source leaks or merges with a much larger one, over the first [-]."""
 
 REACH = 0.12
 """Length of a profile over the width of the picture [-]."""
 
-RISE = 8.0
+_RISE = 8.0
 """A profile ends where it has risen by so much above its lowest: there is another source [levels of 255]."""
 
-SATURATED = 0.98
+_SATURATED = 0.98
 """Level over the largest along a profile down to which a sensor counts as saturated [-]."""
 
-MOST_HEIGHT = 127.5
+_MOST_HEIGHT = 127.5
 """H50 of a lamp that saturates before the dark [levels of 255]."""
 
-NARROWEST = 0.25
+_NARROWEST = 0.25
 """Width below which no flank is resolved [px]."""
 
 
@@ -60,7 +60,7 @@ class Halo:
     @property
     def sharpness(self) -> float:
         """Br50 times H50 over what that can be [levels of 255 a pixel]: large for lamps that stand out of the dark."""
-        return self.steepness * self.height / MOST_HEIGHT
+        return self.steepness * self.height / _MOST_HEIGHT
 
 
 def halos_of(tree: SourceTree) -> tuple[Halo, ...]:
@@ -74,14 +74,14 @@ def is_selected(tree: SourceTree, source: int) -> bool:
     last = int(tree.last[source])
     if last < 0:
         return False
-    soon = tree.thresholds[last] > (1.0 - LEAST_FALL) * tree.thresholds[0]
+    soon = tree.thresholds[last] > (1.0 - _LEAST_FALL) * tree.thresholds[0]
     if soon and (tree.leaked[source] or _is_satellite(tree, source)):
         return False
     centres = tree.centres(source)
     steps = np.hypot(*np.diff(centres, axis=0).T)
     radius = np.sqrt(tree.areas(source)[1:] / math.pi)
-    jumps = bool((steps > np.maximum(JUMP * radius, LEAST_DRIFT)).any())
-    return not jumps or math.dist(centres[-1], centres[0]) >= STRAIGHTNESS * float(steps.sum())
+    jumps = bool((steps > np.maximum(_JUMP * radius, _LEAST_DRIFT)).any())
+    return not jumps or math.dist(centres[-1], centres[0]) >= _STRAIGHTNESS * float(steps.sum())
 
 
 def _is_satellite(tree: SourceTree, source: int) -> bool:
@@ -93,7 +93,7 @@ def _is_satellite(tree: SourceTree, source: int) -> bool:
 def direction_of(tree: SourceTree, source: int) -> tuple[float, float]:
     """Direction into which the centre of a branch drifts, by regression; `UP` where it stays."""
     centres = tree.centres(source)
-    if math.dist(centres[-1], centres[0]) < LEAST_DRIFT:
+    if math.dist(centres[-1], centres[0]) < _LEAST_DRIFT:
         return UP
     u, v = (centres - centres.mean(axis=0)).T
     # The longest axis of the centres' scatter: a regression in which neither coordinate is the one without error.
@@ -140,7 +140,7 @@ def _falling(profile: NDArray[np.float64]) -> NDArray[np.float64]:
     """The profile up to where it is lowest before it rises again."""
     if not len(profile):
         return profile
-    risen = np.flatnonzero(profile > np.minimum.accumulate(profile) + RISE)
+    risen = np.flatnonzero(profile > np.minimum.accumulate(profile) + _RISE)
     before = profile[: risen[0]] if len(risen) else profile
     return before[: int(np.argmin(before)) + 1]
 
@@ -154,8 +154,8 @@ def half_of(profile: NDArray[np.float64]) -> tuple[float, float] | None:
     height = 0.5 * (top - float(profile[-1]))
     if height <= 0.0:
         return None
-    end = _crossing(profile, SATURATED * top)
-    return height, max(_crossing(profile, top - height) - end, NARROWEST)
+    end = _crossing(profile, _SATURATED * top)
+    return height, max(_crossing(profile, top - height) - end, _NARROWEST)
 
 
 def _crossing(profile: NDArray[np.float64], threshold: float) -> float:

@@ -22,31 +22,31 @@ from fogsim.vision.sources.tree_kernels import (
     TOP,
 )
 
-SEED_SHARE, LEAST_SEED = 0.94, 160
+_SEED_SHARE, _LEAST_SEED = 0.94, 160
 """First threshold over the brightest pixel of the picture [-], and the least that it may be [levels of 255]."""
 
-LAST_SHARE, THRESHOLDS = 0.35, 32
+_LAST_SHARE, _THRESHOLDS = 0.35, 32
 """Last threshold over the first [-], and how many there are, even in level as the paper's."""
 
-LEAST_AREA, LARGEST_SHARE = 6.0, 0.06
+_LEAST_AREA, _LARGEST_SHARE = 6.0, 0.06
 """Fewest pixels of a source, since noise makes specks of a few [px], and the most as a share of the picture [-]."""
 
-MOST_ELONGATED, LEAST_COMPACT = 2.5, 0.75
+_MOST_ELONGATED, _LEAST_COMPACT = 2.5, 0.75
 """Longest axis of a source over its shortest, and its area over that of an ellipse of the same second moments [-].
 
 The border of a source is rough where noise carries pixels over the threshold, so that its length is meaningless.
 """
 
-MOST_COMPONENTS, MOST_SOURCES = 256, 48
+_MOST_COMPONENTS, _MOST_SOURCES = 256, 48
 """How many bright components are looked at, and how many of them, the largest, may be sources."""
 
-BRIGHT_SHARE = 0.08
+_BRIGHT_SHARE = 0.08
 """Share of the picture from which on bright pixels are no lamps but daylight or a picture that is saturated [-]."""
 
 GROWTH = 5.0
 """Growth from one threshold to the next from which on a component has met something bright (the paper's) [-]."""
 
-LARGEST_HALO, BUDGET = 0.08, 0.12
+_LARGEST_HALO, _BUDGET = 0.08, 0.12
 """Shares of the picture that one halo may cover, and that are looked at in all [-]."""
 
 
@@ -91,22 +91,22 @@ def source_tree(image: Pixels, bits: int = 8) -> SourceTree:
     layers = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
     level = tree_kernels.brightest_channel(layers, bits - 8)
     brightest = int(level.max())
-    first = math.ceil(SEED_SHARE * brightest)
-    if first < LEAST_SEED:
+    first = math.ceil(_SEED_SHARE * brightest)
+    if first < _LEAST_SEED:
         return _no_tree(level, f"no lamp: the brightest pixel has {brightest} levels of 255")
-    most = int(BRIGHT_SHARE * level.size)
-    label, found = tree_kernels.find_components(level, first, MOST_COMPONENTS, most)
+    most = int(_BRIGHT_SHARE * level.size)
+    label, found = tree_kernels.find_components(level, first, _MOST_COMPONENTS, most)
     if not len(found):
         return _no_tree(
-            level, f"more than {BRIGHT_SHARE:.0%} of the picture is as bright as lamps: daylight, or saturated"
+            level, f"more than {_BRIGHT_SHARE:.0%} of the picture is as bright as lamps: daylight, or saturated"
         )
     kept = _potential_sources(found, level.size)
     if not len(kept):
         return _no_tree(level, "nothing bright has the shape of a lamp")
     _renumber(label, found, kept)
-    thresholds = np.unique(np.linspace(LAST_SHARE * first, first, THRESHOLDS).round().astype(np.int64))[::-1].copy()
+    thresholds = np.unique(np.linspace(_LAST_SHARE * first, first, _THRESHOLDS).round().astype(np.int64))[::-1].copy()
     of_level = np.searchsorted(-thresholds, -np.arange(256), side="left")
-    limits = tree_kernels.Limits(GROWTH, LARGEST_HALO * level.size, int(BUDGET * level.size))
+    limits = tree_kernels.Limits(GROWTH, _LARGEST_HALO * level.size, int(_BUDGET * level.size))
     flooded = tree_kernels.flood(level, label, np.ascontiguousarray(found[kept]), of_level, limits)
     return SourceTree(level, thresholds, *flooded)
 
@@ -119,10 +119,10 @@ def _no_tree(level: NDArray[np.uint8], trouble: str) -> SourceTree:
 def _potential_sources(found: NDArray[np.float64], pixels: int) -> NDArray[np.int64]:
     """Numbers of the components that are small, round and whole enough for a lamp: the largest of them, in order."""
     area = found[:, AREA]
-    fits = (area >= LEAST_AREA) & (area <= LARGEST_SHARE * pixels)
-    fits &= (elongation(found) <= MOST_ELONGATED) & (compactness(found) >= LEAST_COMPACT)
+    fits = (area >= _LEAST_AREA) & (area <= _LARGEST_SHARE * pixels)
+    fits &= (_elongation(found) <= _MOST_ELONGATED) & (_compactness(found) >= _LEAST_COMPACT)
     kept = np.flatnonzero(fits)
-    return np.sort(kept[np.argsort(-area[kept], kind="stable")[:MOST_SOURCES]])
+    return np.sort(kept[np.argsort(-area[kept], kind="stable")[:_MOST_SOURCES]])
 
 
 def _axes(found: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -137,13 +137,13 @@ def _axes(found: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
     return middle + spread, np.maximum(middle - spread, 1e-9)
 
 
-def elongation(found: NDArray[np.float64]) -> NDArray[np.float64]:
+def _elongation(found: NDArray[np.float64]) -> NDArray[np.float64]:
     """Longest over shortest axis of components [-]."""
     longest, shortest = _axes(found)
     return np.sqrt(longest / shortest)
 
 
-def compactness(found: NDArray[np.float64]) -> NDArray[np.float64]:
+def _compactness(found: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of components over that of ellipses with the same second moments: 1 for a disk, 0.95 for a square [-]."""
     longest, shortest = _axes(found)
     return np.asarray(found[:, AREA] / (4.0 * math.pi * np.sqrt(longest * shortest)))

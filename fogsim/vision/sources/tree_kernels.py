@@ -17,10 +17,10 @@ these, first and last column and row."""
 MEASURES = 10
 """How many columns there are."""
 
-FREE = np.int32(0)
+_FREE = np.int32(0)
 """Label of pixels that belong to no component; components count from 1."""
 
-WAITING = np.int32(-1)
+_WAITING = np.int32(-1)
 """Label of pixels that have been found and wait for their level."""
 
 
@@ -80,7 +80,7 @@ def find_components(
     count, pixels = 0, 0
     for row in range(rows):
         for col in range(cols):
-            if level[row, col] < threshold or label[row, col] != FREE:
+            if level[row, col] < threshold or label[row, col] != _FREE:
                 continue
             if count == most or pixels == most_pixels:
                 return label, measures[: count if pixels < most_pixels else 0]
@@ -98,7 +98,7 @@ def find_components(
                         y, x = v + dv, u + du
                         if not (0 <= y < rows and 0 <= x < cols) or level[y, x] < threshold:
                             continue
-                        if label[y, x] == FREE and pixels < most_pixels:
+                        if label[y, x] == _FREE and pixels < most_pixels:
                             label[y, x] = count
                             stack[waiting] = y * cols + x
                             waiting += 1
@@ -146,12 +146,12 @@ def _find(
     now, row, col = of_level[level[at // cols, at % cols]], at // cols, at % cols
     for step in range(4):
         v, u = row + (step == 0) - (step == 1), col + (step == 2) - (step == 3)
-        if not (0 <= v < rows and 0 <= u < cols) or label[v, u] != FREE:
+        if not (0 <= v < rows and 0 <= u < cols) or label[v, u] != _FREE:
             continue
         when, number = max(of_level[level[v, u]], now), front.used[0]
         if when >= len(front.first) or number >= len(front.pixel):
             continue
-        label[v, u] = WAITING
+        label[v, u] = _WAITING
         front.pixel[number], front.source[number] = v * cols + u, source
         front.following[number], front.first[when] = front.first[when], number
         front.used[0] += 1
@@ -226,7 +226,7 @@ def _fill(
         pixel, owner = front.pixel[number], _root(branches.parent, front.source[number])
         v, u = pixel // cols, pixel % cols
         if branches.ended[owner]:
-            label[v, u] = FREE
+            label[v, u] = _FREE
             continue
         label[v, u] = owner + 1
         _add(branches.now[owner], u, v)

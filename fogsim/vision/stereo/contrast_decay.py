@@ -13,19 +13,19 @@ Floats = NDArray[np.float64]
 STEP = 1.35
 """Ratio of the disparities at both ends of a class of distances [-]."""
 
-FEWEST = 20
+_FEWEST = 20
 """Fewest edges that a class needs for its contrast."""
 
-BEST = 0.95
+_BEST = 0.95
 """Quantile of a class's contrasts that stands for its darkest things before the airlight [-]."""
 
-INTRINSIC, INTRINSIC_DEVIATION = 0.95, 0.08
+_INTRINSIC, _INTRINSIC_DEVIATION = 0.95, 0.08
 """Contrast of those without fog, and the standard deviation of its logarithm over scenes [-]."""
 
-SCATTER = 0.12
+_SCATTER = 0.12
 """Standard deviation of ln contrast from class to class [-]."""
 
-STEPS = 8
+_STEPS = 8
 """Iterations of the fit, whose weights go by what it finds."""
 
 
@@ -56,9 +56,9 @@ def contrast_classes(edges: SeenEdges, scale: float, deviation: float, least: fl
     while far > least:
         near, far = far, far / STEP
         inside = (edges.disparity <= near) & (edges.disparity > max(far, least))
-        if np.count_nonzero(inside) >= FEWEST:
+        if np.count_nonzero(inside) >= _FEWEST:
             disparity = float(np.median(edges.disparity[inside]))
-            best = float(np.quantile(edges.contrast[inside], BEST))
+            best = float(np.quantile(edges.contrast[inside], _BEST))
             found.append(ContrastClass(scale / disparity, deviation / disparity, best))
     return found
 
@@ -70,15 +70,15 @@ def fit_decay(classes: list[ContrastClass]) -> ContrastDecay:
     that lies far off counts less (Student's t of four degrees of freedom).
     """
     distance, relative, contrast = (np.array(column) for column in zip(*classes, strict=True))
-    seen, prior = np.log(contrast), math.log(INTRINSIC)
+    seen, prior = np.log(contrast), math.log(_INTRINSIC)
     k, start = max(float(np.mean((prior - seen) / distance)), 0.0), prior
     spread = 0.0
-    for _ in range(STEPS):
-        variance = SCATTER**2 + (k * distance * relative) ** 2
+    for _ in range(_STEPS):
+        variance = _SCATTER**2 + (k * distance * relative) ** 2
         off = seen - start + k * distance
         weight = 5.0 / (4.0 + off**2 / variance) / variance
         # Normal equations of (start, −k), the first with its prior.
-        known = 1.0 / INTRINSIC_DEVIATION**2
+        known = 1.0 / _INTRINSIC_DEVIATION**2
         a, b, c = known + weight.sum(), (weight * distance).sum(), (weight * distance**2).sum()
         p, q = known * prior + (weight * seen).sum(), (weight * distance * seen).sum()
         determinant = a * c - b * b

@@ -13,22 +13,22 @@ from fogsim.vision.light.luminance import linear_luminance
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 Floats = NDArray[np.float64]
 
-BLOCK = 11
+_BLOCK = 11
 """Side of the blocks that are compared, odd [px]."""
 
-ACROSS = 7
+_ACROSS = 7
 """Width over which the contrast of an edge is taken [px]: its blur by lens and sampling lies within."""
 
-UNIQUE = 10
+_UNIQUE = 10
 """By how much the best disparity must beat others [%]."""
 
-NEAREST = 10.0
+_NEAREST = 10.0
 """Nearest distance whose disparities are searched [m]."""
 
-ROOM = 16
+_ROOM = 16
 """Numbers of disparities that are searched come in multiples of this [px]."""
 
-BELOW_ROAD = 1.35
+_BELOW_ROAD = 1.35
 """Disparity over that of a flat road in the same row below which nothing can be: under the road [-]."""
 
 
@@ -49,24 +49,24 @@ def seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, lea
     """
     light = linear_luminance(left, camera.response, camera.bits, camera.black_level)
     smooth = cv2.blur(light, (3, 3))
-    strip = np.ones((1, ACROSS), np.uint8)
+    strip = np.ones((1, _ACROSS), np.uint8)
     bright, dark = cv2.dilate(smooth, strip), cv2.erode(smooth, strip)
     contrast = (bright - dark) / np.maximum(bright, 1e-6)
     slope = np.abs(cv2.filter2D(smooth, -1, np.array([[-1.0, 0.0, 0.0, 0.0, 1.0]])))
     is_edge = (slope >= cv2.dilate(slope, np.ones((1, 5), np.uint8))) & (contrast >= least)
-    shift = _disparities(_grey(left), _grey(right), camera.focal_length * baseline / NEAREST)
+    shift = _disparities(_grey(left), _grey(right), camera.focal_length * baseline / _NEAREST)
     # What lies under the road, or so near that its disparity was not sought, is a false match.
     road = _road_disparity(camera, baseline)[:, None]
-    is_edge &= (shift > 0.0) & (BELOW_ROAD * shift + 0.5 >= road) & (road * NEAREST <= camera.focal_length * baseline)
+    is_edge &= (shift > 0.0) & (_BELOW_ROAD * shift + 0.5 >= road) & (road * _NEAREST <= camera.focal_length * baseline)
     return SeenEdges(shift[is_edge].astype(np.float64), contrast[is_edge].astype(np.float64))
 
 
 def _disparities(left: NDArray[np.uint8], right: NDArray[np.uint8], most: float) -> NDArray[np.float32]:
     """Disparities (rows, cols) [px]; negative where there is none."""
-    matcher = cv2.StereoBM.create(ROOM * math.ceil((most + 2.0) / ROOM), BLOCK)
+    matcher = cv2.StereoBM.create(_ROOM * math.ceil((most + 2.0) / _ROOM), _BLOCK)
     matcher.setMinDisparity(-1)
     matcher.setPreFilterCap(31)
-    matcher.setUniquenessRatio(UNIQUE)
+    matcher.setUniquenessRatio(_UNIQUE)
     matcher.setDisp12MaxDiff(1)
     return np.asarray(matcher.compute(left, right), np.float32) / 16.0
 

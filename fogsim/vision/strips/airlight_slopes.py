@@ -21,22 +21,22 @@ from fogsim.vision.strips.sky import Sky
 
 Floats = NDArray[np.float64]
 
-LEAST_SLOPE, SURELY = 0.6, 2.0
+_LEAST_SLOPE, _SURELY = 0.6, 2.0
 """Least slope of a sky over its level [1/rad], and least in its standard deviations, for the airlight to be taken for
 uneven. Over snow it is less, and hardly matters; rows of houses that fog hides upward have up to 0.5."""
 
-OTHER_LIGHT = 0.2
+_OTHER_LIGHT = 0.2
 """Relative deviation of the sky's slope by what else differs: the sky above the fog, droplets, land that is not even
 [-].
 """
 
-LEVEL_DEVIATION = 0.01
+_LEVEL_DEVIATION = 0.01
 """Relative deviation of the airlight's level by that [-]."""
 
-LENS_DEVIATION = 0.1
+_LENS_DEVIATION = 0.1
 """Deviation of a lens's vignetting where the sky below which it shows brightens otherwise than evenly [-]."""
 
-ANY_SLOPE = 2.0
+_ANY_SLOPE = 2.0
 """Standard deviation of the slope of a sky, over its level, above airlight that is even [1/rad]: that of the CIE
 overcast sky behind thin fog."""
 
@@ -48,7 +48,7 @@ over the darkest land, and by the right droplets alone 3 to 5 %."""
 USUAL_EXTINCTION = 0.03
 """Extinction at which the shape of the airlight is taken where none is known yet [1/m]."""
 
-ROWS = 24
+_ROWS = 24
 """Places of the sky that a straight line is laid through."""
 
 
@@ -77,13 +77,13 @@ def darkening_priors(
     """What sky and horizon say about airlight that is not even, by droplets; nothing under a sky that is even."""
     if not _brightens(sky):
         return ()
-    of_level = LEVEL_DEVIATION * sky.luminance
+    of_level = _LEVEL_DEVIATION * sky.luminance
     uneven = prior._replace(
         below=math.hypot(prior.below, of_level),
         above=math.hypot(prior.above, of_level),
-        vignetting_deviation=math.hypot(prior.vignetting_deviation, LENS_DEVIATION),
+        vignetting_deviation=math.hypot(prior.vignetting_deviation, _LENS_DEVIATION),
         slope=sky.slope,
-        slope_deviation=math.hypot(sky.slope_deviation, OTHER_LIGHT * sky.slope),
+        slope_deviation=math.hypot(sky.slope_deviation, _OTHER_LIGHT * sky.slope),
     )
     lines = [_lines(droplets, *sky.heights) for droplets in range(len(slope_table().below))]
     return tuple(
@@ -94,14 +94,14 @@ def darkening_priors(
 
 def _brightens(sky: Sky) -> bool:
     """Whether the sky surely brightens upward."""
-    return not sky.is_clipped and sky.slope >= max(LEAST_SLOPE * sky.luminance, SURELY * sky.slope_deviation)
+    return not sky.is_clipped and sky.slope >= max(_LEAST_SLOPE * sky.luminance, _SURELY * sky.slope_deviation)
 
 
 @cache
 def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats]:
     """Mean slope of the airlight between two heights [rad], and where a parabola has it at the horizon."""
     table = slope_table()
-    height = np.linspace(lowest, highest, ROWS)
+    height = np.linspace(lowest, highest, _ROWS)
     above = np.array([np.interp(height, table.angle, row) for row in table.above[droplets]])
     bend, slope, level = np.polynomial.polynomial.polyfit(height, above.T, 2)[::-1]
     return slope + bend * (lowest + highest), level
@@ -129,7 +129,7 @@ def slope_cost(prior: JointPrior) -> float:
     """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky."""
     if prior.rise.size == 0:
         return 0.0
-    scale = ANY_SLOPE * prior.airlight
+    scale = _ANY_SLOPE * prior.airlight
     return 2.0 * math.log(prior.slope_deviation / scale) - (prior.slope / scale) ** 2
 
 
@@ -149,7 +149,7 @@ def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION)
 
     Takes `extinction` [1/m].
     """
-    if sky.is_clipped or sky.slope <= SURELY * sky.slope_deviation:
+    if sky.is_clipped or sky.slope <= _SURELY * sky.slope_deviation:
         return None
     table, chances = slope_table(), np.array(DROPLET_CHANCES)
     between = _between_depths(extinction * camera.mount_height)
@@ -165,7 +165,7 @@ def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION)
     mean = (chances[:, None] * shapes).sum(axis=0)
     spread = np.sqrt((chances[:, None] * (shapes - mean) ** 2).sum(axis=0))
     higher = (chances * darker * [above for _, above in lines]).sum()
-    unsure = math.hypot(OTHER_LIGHT, sky.slope_deviation / sky.slope)
+    unsure = math.hypot(_OTHER_LIGHT, sky.slope_deviation / sky.slope)
     return RowAirlight(sky.luminance / (1.0 + float(higher)), 1.0 + mean, np.hypot(spread, unsure * mean))
 
 

@@ -20,20 +20,20 @@ from fogsim.core.jit import kernel
 CONSTANT_DEVIATION = 0.5
 """Deviation of a strip's albedo from its first guess, relative to it [-]: all but free."""
 
-OUTLIER = 4.0
+_OUTLIER = 4.0
 """Innovation beyond which a row shows something else than this road, in standard deviations [-]."""
 
 LEFT_OUT_COST, HIDDEN_COST = 9.0, 3.5
 """Added to minus twice the log likelihood for a bin that is an outlier (expected to be rare, with any luminance up to
 the airlight's equally likely), or that is behind an obstacle, compared to one in use [-]."""
 
-FIRST = 4
+_FIRST = 4
 """State of the first strip's constant: before it come drift, its slope, sheen and airlight."""
 
 USED, HIDDEN = 1, 2
 """What `used` says of bins in use, and of those behind an obstacle; 0 of outliers and where there is no datum."""
 
-OUTLIERS_OF_OBSTACLE = 3
+_OUTLIERS_OF_OBSTACLE = 3
 """Fewest outliers that make an obstacle."""
 
 
@@ -124,8 +124,8 @@ def _predict(
     for j in range(size):
         first, second = covariance[0, j], covariance[1, j]
         covariance[0, j], covariance[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
-    for a in range(FIRST - 1, size, 2):
-        kept = keep if a >= FIRST else cloud
+    for a in range(_FIRST - 1, size, 2):
+        kept = keep if a >= _FIRST else cloud
         for j in range(width):
             state[a, j] *= kept
         for j in range(size):
@@ -133,8 +133,8 @@ def _predict(
     for j in range(size):
         first, second = covariance[j, 0], covariance[j, 1]
         covariance[j, 0], covariance[j, 1] = f00 * first + f01 * second, f10 * first + f11 * second
-        covariance[j, FIRST - 1] *= cloud
-        for a in range(FIRST + 1, size, 2):
+        covariance[j, _FIRST - 1] *= cloud
+        for a in range(_FIRST + 1, size, 2):
             covariance[j, a] *= keep
     value = albedo.drift_deviation**2
     slope = (math.sqrt(3.0) / albedo.drift_length * albedo.drift_deviation) ** 2
@@ -143,21 +143,21 @@ def _predict(
     cross = f00 * f10 * value + f01 * f11 * slope
     covariance[0, 1] -= cross
     covariance[1, 0] -= cross
-    covariance[FIRST - 1, FIRST - 1] += (1.0 - cloud * cloud) * albedo.cloud_deviation**2
-    for a in range(FIRST + 1, size, 2):
+    covariance[_FIRST - 1, _FIRST - 1] += (1.0 - cloud * cloud) * albedo.cloud_deviation**2
+    for a in range(_FIRST + 1, size, 2):
         covariance[a, a] += (1.0 - keep * keep) * albedo.patch_deviation**2
 
 
 @kernel
 def _initial_covariance(strips: int, albedo: Albedo) -> NDArray[np.float64]:
     """Covariance of drift, its slope, sheen, airlight, and each strip's constant and patches before all is seen."""
-    covariance = np.zeros((FIRST + 2 * strips, FIRST + 2 * strips))
+    covariance = np.zeros((_FIRST + 2 * strips, _FIRST + 2 * strips))
     covariance[0, 0] = albedo.drift_deviation**2
     covariance[1, 1] = 3.0 * (albedo.drift_deviation / albedo.drift_length) ** 2
     covariance[2, 2] = albedo.sheen_deviation**2
-    covariance[FIRST - 1, FIRST - 1] = albedo.cloud_deviation**2
+    covariance[_FIRST - 1, _FIRST - 1] = albedo.cloud_deviation**2
     for strip in range(strips):
-        first = FIRST + 2 * strip
+        first = _FIRST + 2 * strip
         covariance[first, first] = CONSTANT_DEVIATION**2
         covariance[first + 1, first + 1] = albedo.patch_deviation**2
     return covariance
@@ -237,11 +237,11 @@ def _mark_outliers(
     for strip in range(used.shape[0]):
         shares, first = (
             _shares(residuals.scale[strip, i], residuals.veil[strip, i], airlight, change),
-            FIRST + 2 * strip,
+            _FIRST + 2 * strip,
         )
         total = _covariance_with_bin(covariance, shares, first, room)
         innovation = residuals.columns[strip, i, 0] - _shown(state[:, 0], shares, first)
-        is_road = innovation * innovation <= OUTLIER**2 * (total + residuals.noise[strip, i])
+        is_road = innovation * innovation <= _OUTLIER**2 * (total + residuals.noise[strip, i])
         used[strip, i] = USED if is_road else 0
 
 
@@ -276,7 +276,7 @@ def whiten(
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
                 continue
-            first, shares = FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
+            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
             total = _covariance_with_bin(covariance, shares, first, gain) + noise[strip, i]
             for j in range(width):
                 innovation[j] = columns[strip, i, j] - _shown(state[:, j], shares, first)
@@ -291,7 +291,7 @@ def whiten(
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
                 out.innovations[strip, i, j] = innovation[j] * weight
-    out.constants[:] = state[FIRST::2]
+    out.constants[:] = state[_FIRST::2]
     return log_determinant + math.log(product)
 
 
@@ -310,7 +310,7 @@ def hide_behind_obstacles(noise: NDArray[np.float64], used: NDArray[np.uint8]) -
             seen += 1
             if used[strip, i] != USED:
                 outliers += 1
-                if outliers >= OUTLIERS_OF_OBSTACLE and 2 * outliers > seen:
+                if outliers >= _OUTLIERS_OF_OBSTACLE and 2 * outliers > seen:
                     foot = i
         for i in range(foot, noise.shape[1]):
             changed = changed or used[strip, i] == USED

@@ -13,7 +13,7 @@ from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.strip_geometry import LANES, StripGeometry, laid_along
 
-MOST_ASIDE = 0.6
+_MOST_ASIDE = 0.6
 """Deviation of a bent road's place up to which strips are on the road [m]."""
 
 
@@ -36,7 +36,7 @@ def course_geometry(geometry: StripGeometry, camera: Camera, course: RoadCourse)
     aside, unsure = course_kernels.sideways(distance, course.bend, course.bend_covariance)
     across, heading = camera.focal_length / distance, course.column
     left, right = (heading + across * (aside + side) for side in (sides[:, :1], sides[:, 1:]))
-    right = np.where(hidden | (unsure > MOST_ASIDE), left, right)
+    right = np.where(hidden | (unsure > _MOST_ASIDE), left, right)
     placed = laid_along(geometry, left, right, camera)
     extent = np.where(hidden, 1.0, unit * 2.0 * half / np.maximum(middle**2 - half**2, 1e-9))
     return replace(placed, below=middle + shift, half=half, distance=distance, extent=extent)

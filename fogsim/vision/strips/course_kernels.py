@@ -12,13 +12,13 @@ from fogsim.vision.lines.road_course_kernels import PIECES, row_on_plane, turned
 
 Floats = NDArray[np.float64]
 
-GRAIN, GRAIN_LENGTH = 0.02, 3.0
+_GRAIN, _GRAIN_LENGTH = 0.02, 3.0
 """Deviation of the albedo along a road, relative to it [-], and the length over which it forgets itself [m]."""
 
-ROUNDING = 0.1
+_ROUNDING = 0.1
 """Deviation of a bin's mean that quantisation leaves [linear grey levels]."""
 
-EXTINCTION, AIRLIGHT, SHIFT, ROAD = range(4)
+EXTINCTION, _AIRLIGHT, _SHIFT, _ROAD = range(4)
 """Unknowns of the joint fit, linearised; from the fourth on the road's luminance in each strip."""
 
 
@@ -79,9 +79,9 @@ def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats
     grey levels], [px], [1/m], `height` [m].
     """
     strips, count = seen.used.shape
-    size = ROAD + strips
+    size = _ROAD + strips
     normal, mixed = np.zeros((size, size)), np.zeros((size, PIECES))
-    normal[AIRLIGHT, AIRLIGHT], normal[SHIFT, SHIFT] = deviations[0] ** -2, deviations[1] ** -2
+    normal[_AIRLIGHT, _AIRLIGHT], normal[_SHIFT, _SHIFT] = deviations[0] ** -2, deviations[1] ** -2
     column, moved = np.zeros(size), np.zeros(PIECES)
     for strip in range(strips):
         for i in range(count):
@@ -93,14 +93,14 @@ def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats
             drop = seen.road - seen.airlight
             by_length = -drop * seen.extinction * left
             column[:] = 0.0
-            column[EXTINCTION], column[AIRLIGHT] = -drop * length * left, 1.0 - left
-            column[SHIFT], column[ROAD + strip] = by_length * length / rows, left
+            column[EXTINCTION], column[_AIRLIGHT] = -drop * length * left, 1.0 - left
+            column[_SHIFT], column[_ROAD + strip] = by_length * length / rows, left
             for piece in range(PIECES):
                 # A secant as long as the deviation: what fog hides of the road can change no more.
                 farther = deviations[2 + piece] * turned(seen.distance[i], piece)[0] / height
                 moved[piece] = drop * left * -math.expm1(-seen.extinction * length * farther) / deviations[2 + piece]
-            grain = (GRAIN * seen.road * left) ** 2 * max(GRAIN_LENGTH / seen.extent[i], 1.0)
-            weight = 1.0 / (seen.noise**2 / max(seen.pixels[strip, i], 1.0) + ROUNDING**2 + grain)
+            grain = (_GRAIN * seen.road * left) ** 2 * max(_GRAIN_LENGTH / seen.extent[i], 1.0)
+            weight = 1.0 / (seen.noise**2 / max(seen.pixels[strip, i], 1.0) + _ROUNDING**2 + grain)
             for a in range(size):
                 for b in range(size):
                     normal[a, b] += weight * column[a] * column[b]
@@ -108,7 +108,7 @@ def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats
                     mixed[a, piece] += weight * column[a] * moved[piece]
     inverse = inverse_of(normal)
     out = np.zeros(1 + PIECES)
-    out[0] = -inverse[EXTINCTION, SHIFT] / deviations[1] ** 2
+    out[0] = -inverse[EXTINCTION, _SHIFT] / deviations[1] ** 2
     for piece in range(PIECES):
         for a in range(size):
             out[1 + piece] += inverse[EXTINCTION, a] * mixed[a, piece]

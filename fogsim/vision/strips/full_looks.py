@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from fogsim.vision.strips.joint_fit import EVERY, JointFit
 
-PERIOD = 0.5
+_PERIOD = 0.5
 """Time after which all hypotheses are tried again [s]."""
 
-WORSE, FEWER = 1.3, 0.05
+_WORSE, _FEWER = 1.3, 0.05
 """How many times as large the misfit may be as in the last full look, and by how much smaller the share of bins in use,
 for even fog still to suffice [-]."""
 
@@ -24,11 +24,11 @@ class Left:
 
     def is_due(self, time: float) -> bool:
         """Whether all hypotheses are to be tried in an image of a time [s]."""
-        return not self.time < time < self.time + PERIOD
+        return not self.time < time < self.time + _PERIOD
 
     def suffices(self, fit: JointFit) -> bool:
         """Whether even fog still explains the road about as well as in the full look."""
-        return fit.misfit <= WORSE * self.misfit and float(fit.used.mean()) >= self.used - FEWER
+        return fit.misfit <= _WORSE * self.misfit and float(fit.used.mean()) >= self.used - _FEWER
 
 
 def left_by(time: float, fit: JointFit) -> Left:

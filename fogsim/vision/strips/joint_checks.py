@@ -24,7 +24,7 @@ MAX_SCATTER = 0.22
 """Scatter across the own lane relative to its contrast to the airlight, beyond which it is no road [-]: marks, shadows
 and texture make at most 0.15, boards, stripes and writing at least 0.3."""
 
-STRAIGHT, LEAST_RISE = 0.018, 10.0
+_STRAIGHT, _LEAST_RISE = 0.018, 10.0
 """Deviation from a straight line, relative to that line's rise, below which a curve is a ramp [-], and least rise for
 that to be seen [pixel values of 8 bits]. Fog of whatever density leaves at least 0.028: its curve is hollow near the
 camera and level at the horizon."""
@@ -56,4 +56,4 @@ def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> boo
     slope = float(matrix_product(rows, values)) / float(matrix_product(rows, rows))
     rest = values - values.mean() - slope * rows
     rise = -slope * float(np.ptp(rows))
-    return rise > LEAST_RISE and float(np.sqrt(np.mean(rest**2))) < STRAIGHT * rise
+    return rise > _LEAST_RISE and float(np.sqrt(np.mean(rest**2))) < _STRAIGHT * rise

@@ -18,20 +18,20 @@ from fogsim.vision.strips.strip_geometry import StripGeometry
 
 Floats = NDArray[np.float64]
 
-PATCH_LENGTH, DRIFT_LENGTH = 3.0, 30.0
+_PATCH_LENGTH, _DRIFT_LENGTH = 3.0, 30.0
 """Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
 
-SHEEN = (0.04, 0.04)
+_SHEEN = (0.04, 0.04)
 """Part of the sky's light that asphalt reflects at grazing angles, and its standard deviation [-]."""
 
 ALBEDOS = (
-    Albedo(0.015, PATCH_LENGTH, 0.005, DRIFT_LENGTH),
-    Albedo(0.015, PATCH_LENGTH, 0.04, DRIFT_LENGTH),
-    Albedo(0.015, PATCH_LENGTH, 0.02, DRIFT_LENGTH, *SHEEN),
-    Albedo(0.015, PATCH_LENGTH, 0.12, DRIFT_LENGTH, *SHEEN),
-    Albedo(0.04, PATCH_LENGTH, 0.05, DRIFT_LENGTH, *SHEEN),
-    Albedo(0.08, PATCH_LENGTH, 0.1, DRIFT_LENGTH, *SHEEN),
-    Albedo(0.2, PATCH_LENGTH, 0.3, DRIFT_LENGTH, *SHEEN),
+    Albedo(0.015, _PATCH_LENGTH, 0.005, _DRIFT_LENGTH),
+    Albedo(0.015, _PATCH_LENGTH, 0.04, _DRIFT_LENGTH),
+    Albedo(0.015, _PATCH_LENGTH, 0.02, _DRIFT_LENGTH, *_SHEEN),
+    Albedo(0.015, _PATCH_LENGTH, 0.12, _DRIFT_LENGTH, *_SHEEN),
+    Albedo(0.04, _PATCH_LENGTH, 0.05, _DRIFT_LENGTH, *_SHEEN),
+    Albedo(0.08, _PATCH_LENGTH, 0.1, _DRIFT_LENGTH, *_SHEEN),
+    Albedo(0.2, _PATCH_LENGTH, 0.3, _DRIFT_LENGTH, *_SHEEN),
 )
 """How the albedo may wander: what is tried, before airlight that is as uneven as the sky."""
 
@@ -41,42 +41,42 @@ ALBEDO_CHANCES = (0.5, 0.25, 0.08, 0.05, 0.07, 0.04, 0.01)
 EVERY = tuple(range(len(ALBEDOS)))
 """All of them."""
 
-NEGLIGIBLE = 1e-3
+_NEGLIGIBLE = 1e-3
 """Probability below which an albedo need not be tried in the next images of a drive [-]."""
 
-SMOOTH, EXPLAINED = 4, 1.0
+_SMOOTH, _EXPLAINED = 4, 1.0
 """How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried
 [-]: they explain nothing then."""
 
-EXTINCTIONS = 28
+_EXTINCTIONS = 28
 """Extinctions of the first search, evenly in ln k."""
 
 ALIKE = 0.3
 """Difference of ln k below which two starts lead to the same answer [-]."""
 
-CLEAR_MISFIT = 1.5
+_CLEAR_MISFIT = 1.5
 """Misfit below which all lanes' answer needs no other [-]."""
 
-STEPS, MORE_STEPS = 10, 5
+_STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
 
 LEAST_BINS = 8
 """Fewest bins of the own lane for a fit."""
 
-MOST_VIGNETTING = 0.6
+_MOST_VIGNETTING = 0.6
 """Most that a lens takes of a bin's light [-]."""
 
-DISAGREEMENT = 2.0
+_DISAGREEMENT = 2.0
 """Standard deviations by which a neighbouring strip may change the extinction [-]."""
 
 MODEL_DEVIATION = 0.01
 """Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
 
-SURE = 0.03
+_SURE = 0.03
 """Relative deviation of k up to which the own lane's answer judges its neighbours [-]: one that is less sure, as where
 something stands in that lane, is itself more easily wrong than they."""
 
-OVERCONFIDENCE = 1.0
+_OVERCONFIDENCE = 1.0
 """How much farther than its deviation says such an answer may be off [-]."""
 
 
@@ -143,7 +143,7 @@ def _answers(
     """Answers under one prior, each with its cost, in which how likely the albedo is beforehand is counted."""
     bins = strip_bins(curves, geometry, prior)
     best = _from_near(bins, near, prior)
-    most = len(ALBEDOS) if best.misfit > EXPLAINED else SMOOTH
+    most = len(ALBEDOS) if best.misfit > _EXPLAINED else _SMOOTH
     found = [(0, best)]
     found += [(a, _refined(bins, ALBEDOS[a], prior, best.theta, MORE_STEPS)) for a in albedos if 0 < a < most]
     cost = slope_cost(prior) + prior.cost
@@ -154,7 +154,7 @@ def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) 
     """Strips as the kernels take them, the lens's vignetting undone."""
     luminance, variance, vignetting = curves.luminance, curves.variance, prior.vignetting
     if vignetting != 0.0:
-        gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, MOST_VIGNETTING))
+        gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, _MOST_VIGNETTING))
         luminance, variance = gain * luminance, gain**2 * variance
     darker, by_row = darkening_of_bins(geometry.grazing, geometry.below, prior)
     return Bins(
@@ -185,7 +185,7 @@ def _from_near(bins: Bins, near: JointFit | None, prior: JointPrior) -> Solution
 
 
 def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
-    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, EXTINCTIONS), prior)
+    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, _EXTINCTIONS), prior)
 
 
 def extinction_grid(bins: Bins, count: int) -> Floats:
@@ -204,7 +204,7 @@ def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shi
     theta = [*start, shift, 0.0]
     if prior.rise.size:
         theta.append(joint_start_kernels.darkness_by_sky(prior, start[0], bins.eye)[0])
-    return _refined(bins, ALBEDOS[0], prior, np.array(theta), STEPS)
+    return _refined(bins, ALBEDOS[0], prior, np.array(theta), _STEPS)
 
 
 def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps: int) -> Solution:
@@ -243,7 +243,7 @@ def _average(answers: list[_Answer]) -> JointFit:
 def _of_weight(answers: list[_Answer], weight: Floats) -> tuple[int, ...]:
     """Albedos that are not negligible under all priors together."""
     share = np.bincount([answer.albedo for answer in answers], weight)
-    return tuple(np.flatnonzero(share > NEGLIGIBLE).tolist())
+    return tuple(np.flatnonzero(share > _NEGLIGIBLE).tolist())
 
 
 def _droplets(answers: list[_Answer]) -> tuple[float, ...]:
@@ -284,7 +284,7 @@ def with_neighbours(
     if best is None:
         return own
     agreed = agree(own, best)
-    if agreed and best.misfit < CLEAR_MISFIT:
+    if agreed and best.misfit < _CLEAR_MISFIT:
         return best
     if len(seen) == 1:
         return best if agreed else own
@@ -304,9 +304,9 @@ def _deviation(fit: JointFit) -> float:
 def agree(own: JointFit, more: JointFit) -> bool:
     """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978, eq. 2.2)."""
     sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
-    if own.extinction_deviation > SURE * own.extinction:
-        sharpened = (OVERCONFIDENCE * own.extinction_deviation) ** 2
-    return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
+    if own.extinction_deviation > _SURE * own.extinction:
+        sharpened = (_OVERCONFIDENCE * own.extinction_deviation) ** 2
+    return abs(more.extinction - own.extinction) <= _DISAGREEMENT * math.hypot(
         math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
     )
 
@@ -314,4 +314,4 @@ def agree(own: JointFit, more: JointFit) -> bool:
 def _alike(first: JointFit, second: JointFit) -> bool:
     """Whether two answers differ by no more than their deviations."""
     apart = math.hypot(first.extinction_deviation, second.extinction_deviation)
-    return abs(first.extinction - second.extinction) <= DISAGREEMENT * apart
+    return abs(first.extinction - second.extinction) <= _DISAGREEMENT * apart

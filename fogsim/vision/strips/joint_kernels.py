@@ -30,18 +30,18 @@ FIRST_DEPTH, DEPTH_STEP = 0.002, math.log(200.0) / 11.0
 """First of the optical heights of an eye by which the airlight's darkening goes [-], and the step of their
 logarithm."""
 
-NO_LEVELS: NDArray[np.float64] = np.zeros(0)
+_NO_LEVELS: NDArray[np.float64] = np.zeros(0)
 
 MOST_DARKER = 2.7
 """Most by which the airlight darkens toward the road, over black land with the eye on the ground [-]."""
 
-SHORT = 0.15
+_SHORT = 0.15
 """Height of a bin over its rows below the horizon up to which a series takes the place of Simpson's rule [-]."""
 
-NEAR_BINS = 12
+_NEAR_BINS = 12
 """Nearest bins that the first guess of the road's luminance is made of."""
 
-CONVERGED = 1e-3
+_CONVERGED = 1e-3
 """Step of k, relative to it and to the least that shows, below which no other is made [-]."""
 
 
@@ -92,8 +92,8 @@ class JointPrior(NamedTuple):
     # rise, level (levels,): slope [1/rad] of such a line over the airlight at the horizon, and by which part its level
     # there is above that, if the airlight darkens by 1 toward the road; by the optical height of the eye. None where it
     # counts as even
-    rise: NDArray[np.float64] = NO_LEVELS
-    level: NDArray[np.float64] = NO_LEVELS
+    rise: NDArray[np.float64] = _NO_LEVELS
+    level: NDArray[np.float64] = _NO_LEVELS
     droplets: int = 0  # Which sizes of them the latter are of
     # Minus twice the logarithm of how likely it is among several, over what its deviations differ by [-]
     cost: float = 0.0
@@ -122,7 +122,7 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
     Takes `below`, `half` [px], `path` [px·m], `k` [1/m].
     """
     value, by_k, by_shift = 0.0, 0.0, 0.0
-    if half < SHORT * below:
+    if half < _SHORT * below:
         distance = path / below
         x, share, middle = k * distance, (half / below) ** 2 / 6.0, math.exp(-k * distance)
         curve, bend = x * x - 2.0 * x, 2.0 * x - 2.0
@@ -161,12 +161,12 @@ def darkening(bins: Bins, i: int, level: int, on: float, shift: float) -> tuple[
 @kernel
 def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float, darker: float) -> float:
     """Luminance of a strip without fog: median of what its nearest bins say, given the fog."""
-    found = np.empty(NEAR_BINS)
+    found = np.empty(_NEAR_BINS)
     count, level, on = 0, 0, 0.0
     if darker > 0.0:
         level, on = eye_level(k, bins.eye, bins.darker.shape[0])
     for i in range(bins.below.size):
-        if bins.noise[strip, i] > 0.0 and count < NEAR_BINS:
+        if bins.noise[strip, i] > 0.0 and count < _NEAR_BINS:
             value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
             before = airlight
             if darker > 0.0:
@@ -368,6 +368,6 @@ def gauss_newton(
             break
         step = times(covariance, gradient)
         _move(theta, step, road, whitened.constants, unit, prior.shift_deviation)
-        if iteration >= 2 and abs(step[0]) < CONVERGED * (abs(theta[0]) + unit):
+        if iteration >= 2 and abs(step[0]) < _CONVERGED * (abs(theta[0]) + unit):
             iterations = min(iterations, iteration + 1)
     return Solution(theta, covariance, cost, squares / max(number, 1), road[0], whitened.used)

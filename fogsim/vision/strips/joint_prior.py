@@ -15,10 +15,10 @@ SKY_DEVIATION = 0.005
 OVEREXPOSURE = 0.15
 """How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
 
-HALF, MOSTLY = 0.5, 0.98
+_HALF, _MOSTLY = 0.5, 0.98
 """Shares of saturated pixels beyond which a sky may be brighter, and beyond which it gives only a lower bound [-]."""
 
-EVEN_SKY, CLOUD, MOST_CLOUD = 0.02, 1.5, 0.015
+_EVEN_SKY, _CLOUD, MOST_CLOUD = 0.02, 1.5, 0.015
 """Unevenness of a sky that trees before it and rounding make, how much of more of it the airlight before the road has,
 and the most of that [-]: clouds and dirt on the glass go on below the horizon."""
 
@@ -34,7 +34,7 @@ def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
         shift_deviation=horizon.standard_deviation,
         vignetting=sky.vignetting,
         vignetting_deviation=sky.vignetting_deviation,
-        cloud=min(CLOUD * max(sky.unevenness - EVEN_SKY, 0.0), MOST_CLOUD),
+        cloud=min(_CLOUD * max(sky.unevenness - _EVEN_SKY, 0.0), MOST_CLOUD),
     )
 
 
@@ -45,7 +45,7 @@ def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
         return sky.luminance, deviation, upward
     table = linear_table(camera.response, camera.bits, camera.black_level)
     level = float(table[-1] - table[-2]) * (2**camera.bits / 256.0)
-    if sky.saturated > MOSTLY:
+    if sky.saturated > _MOSTLY:
         return 255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0
     if sky.saturated < SATURATED_SHARE:
         # One of the colours is clipped: there is more light than the others show.
@@ -53,5 +53,5 @@ def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
     # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
     airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
     # Noise that is added after clipping tells nothing of what was clipped.
-    above = OVEREXPOSURE * 255.0 if sky.saturated > HALF else deviation + level
+    above = OVEREXPOSURE * 255.0 if sky.saturated > _HALF else deviation + level
     return airlight, deviation + level, above

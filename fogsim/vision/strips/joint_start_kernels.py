@@ -15,7 +15,7 @@ from fogsim.vision.strips.joint_kernels import (
     mean_transmittance,
 )
 
-GRAINY = 0.01
+_GRAINY = 0.01
 """Deviation of bins by the road's texture in the search with a constant albedo, relative to the airlight [-]."""
 
 
@@ -49,7 +49,7 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
     luminance, noise = bins.luminance, bins.noise
     strips, count = luminance.shape
     best, best_k, best_airlight = np.inf, extinctions[0], prior.airlight
-    scale = (GRAINY * prior.airlight) ** 2
+    scale = (_GRAINY * prior.airlight) ** 2
     stride = max(count // 36, 1)
     value = np.empty((count + stride - 1) // stride)
     base = np.ones(value.size)

@@ -22,32 +22,32 @@ from fogsim.vision.strips.strip_geometry import StripGeometry
 
 Floats = NDArray[np.float64]
 
-SURE, ALL_USED = 0.045, 0.97
+_SURE, _ALL_USED = 0.045, 0.97
 """Relative deviation of k up to which, and share of its bins in use from which on, the own lane needs no shade [-]."""
 
-EXTINCTIONS, FINER = 28, 15
+_EXTINCTIONS, _FINER = 28, 15
 """Extinctions of the search, evenly in ln k and a quarter apart, and how many more about the best of them: strips are
 divided only once, by what these say."""
 
-LEAST_GAIN, MOST_RATIO, LEAST_MIXED = 1.0, 0.6, 0.05
+_LEAST_GAIN, _MOST_RATIO, _LEAST_MIXED = 1.0, 0.6, 0.05
 """What a division is to gain in minus twice the log likelihood of a piece, the most that the shade's luminance is of
 the sun's, and the least share of bins that have both [-]: texture gains 0.3 to 0.9 with a ratio above 0.6, and fog that
 varies along the way leaves every bin with one of both."""
 
-LIT, SHADED = 0.65, 0.35
+_LIT, _SHADED = 0.65, 0.35
 """From where on, and up to where, in the logarithm between shade and sun, a pixel is lit or shaded [-]: between them
 lie penumbrae."""
 
-PLAIN = 5.0
+_PLAIN = 5.0
 """Least gap between what is lit and what is shaded, in deviations of pixels [-]: else noise would decide."""
 
-LEAST_BINS, ENOUGH = 4, 16
+_LEAST_BINS, _ENOUGH = 4, 16
 """Fewest bins of a strip in sun or in shade, and of the own lane in shade to be what the road is judged by."""
 
 NOTHING = np.zeros(0, np.bool_)
 """Bins in use of an answer that is only a start."""
 
-MISLED = 0.15
+_MISLED = 0.15
 """How likely a shadow's edge is taken for a line along the road, so that the assumed horizon is better than the seen
 [-]."""
 
@@ -64,9 +64,9 @@ class DividedRoad:
 
 def is_sure(own: JointFit | None, curves: StripCurves) -> bool:
     """Whether the own lane's fit explains it, so that shade on it need not be looked for."""
-    if own is None or own.hidden.any() or own.extinction_deviation > SURE * own.extinction:
+    if own is None or own.hidden.any() or own.extinction_deviation > _SURE * own.extinction:
         return False
-    return bool(own.used[0].sum() >= ALL_USED * (curves.variance[0] > 0).sum())
+    return bool(own.used[0].sum() >= _ALL_USED * (curves.variance[0] > 0).sum())
 
 
 def divided_road(
@@ -102,24 +102,24 @@ def shade_levels(
     """
     bins = strip_bins(curves, geometry, prior)
     pieces = pieces_of(pixels, np.stack([geometry.first, geometry.last]), geometry.left, geometry.right)
-    grid = extinction_grid(bins, EXTINCTIONS)
+    grid = extinction_grid(bins, _EXTINCTIONS)
     found = fit_levels(pieces, bins, grid, prior, noise, True)
-    if found.shaded > MOST_RATIO * found.lit or found.mixed < LEAST_MIXED:
+    if found.shaded > _MOST_RATIO * found.lit or found.mixed < _LEAST_MIXED:
         return None
     whole = fit_levels(pieces, bins, grid, prior, noise, False)
-    if whole.cost - found.cost < LEAST_GAIN:
+    if whole.cost - found.cost < _LEAST_GAIN:
         return None
     step = math.log(grid[1] / grid[0])
-    around = found.extinction * np.exp(np.linspace(-step, step, FINER + 2)[1:-1])
+    around = found.extinction * np.exp(np.linspace(-step, step, _FINER + 2)[1:-1])
     return fit_levels(pieces, bins, around, prior, noise, True)
 
 
 def _seen_or_stated(prior: JointPrior, stated: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
     """Prior with the seen horizon, and that with the stated one."""
-    seen = prior._replace(cost=-2.0 * math.log((1.0 - MISLED) / prior.shift_deviation))
+    seen = prior._replace(cost=-2.0 * math.log((1.0 - _MISLED) / prior.shift_deviation))
     shift, deviation = stated.row - camera.horizon_row, stated.standard_deviation
     return seen, prior._replace(
-        shift=shift, shift_deviation=deviation, cost=-2.0 * math.log(MISLED / max(deviation, prior.shift_deviation))
+        shift=shift, shift_deviation=deviation, cost=-2.0 * math.log(_MISLED / max(deviation, prior.shift_deviation))
     )
 
 
@@ -135,13 +135,13 @@ def _divided(
     """Strips in shade and in sun, each lane's after the other."""
     passed = np.exp(-levels.extinction * geometry.path / np.maximum(geometry.below, 1e-9))
     dark, light = math.log(levels.shaded), math.log(levels.lit)
-    above, under = (math.exp(dark + part * (light - dark)) for part in (LIT, SHADED))
-    seen = (curves.variance > 0) & ((above - under) * passed > PLAIN * noise)
+    above, under = (math.exp(dark + part * (light - dark)) for part in (_LIT, _SHADED))
+    seen = (curves.variance > 0) & ((above - under) * passed > _PLAIN * noise)
     every = np.full(passed.shape, math.inf)
     lit = np.stack([levels.airlight + (above - levels.airlight) * passed, every], axis=1)
     shaded = np.stack([-every, levels.airlight + (under - levels.airlight) * passed], axis=1)
     read = [strip_curves(pixels, geometry, noise, camera, free, None, limits) for limits in (shaded, lit)]
-    if (seen[0] & (read[0].variance[0] > 0)).sum() < ENOUGH:
+    if (seen[0] & (read[0].variance[0] > 0)).sum() < _ENOUGH:
         read.reverse()
     variance = [np.where(seen, one.variance, 0.0) for one in read]
     both = StripCurves(
@@ -150,5 +150,5 @@ def _divided(
             for values in ([one.luminance for one in read], variance, [one.scatter for one in read])
         )
     )
-    some = [strip for strip, one in enumerate(both.variance) if strip == 0 or (one > 0).sum() >= LEAST_BINS]
+    some = [strip for strip, one in enumerate(both.variance) if strip == 0 or (one > 0).sum() >= _LEAST_BINS]
     return both.only(some), geometry.only([strip // 2 for strip in some])

@@ -21,7 +21,7 @@ SATURATED_SHARE = 0.02
 UNKNOWN_VIGNETTING = 0.3
 """Standard deviation of a lens's vignetting where the sky does not show it [-]: most pictures are corrected."""
 
-UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.7, 1.5
+_UNEVEN, _LEAST_SEEN, _MOST_VIGNETTING = 0.02, 0.7, 1.5
 """Deviation of a lens's vignetting by skies that are brighter in the middle, least share of a sky's pixels that must
 show it, and most that it can be [-]."""
 
@@ -57,30 +57,30 @@ class Sky:
         return self.clipped > SATURATED_SHARE
 
 
-BRIGHTENS, SEEN_TO_BRIGHTEN = 0.6, 0.6
+_BRIGHTENS, _SEEN_TO_BRIGHTEN = 0.6, 0.6
 """Slope of a sky upward over its level from which on it surely brightens [1/rad], and least share of its pixels that
 must show that [-]: it is far from what the mean of its rows says."""
 
-LENS_UNEVENNESS = 0.026
+_LENS_UNEVENNESS = 0.026
 """Unevenness of a sky up to which it is used to estimate a lens's vignetting [-]."""
 
-SKY_ROWS = 24
+_SKY_ROWS = 24
 """Rows of sky that are looked at."""
 
-SKY_HEIGHT = 0.2
+_SKY_HEIGHT = 0.2
 """How far above the horizon sky is looked at [rad]; as far as the image goes if that is less."""
 
-DARKER = 0.012
+_DARKER = 0.012
 """Darkening from a row to the next below beyond which it is no longer sky that is seen, as a share [-]."""
 
-UNSEEN, CLOSE = 0.3, 0.01
+_UNSEEN, _CLOSE = 0.3, 0.01
 """Deviation of the sky's luminance for each radian that is hidden above the horizon [1/rad], but for so much [rad]."""
 
-MOST_HIDDEN = 0.14
+_MOST_HIDDEN = 0.14
 """Angle above the horizon up to which something may hide all of the sky, beyond which it is no road that lies ahead but
 a wall or a wood [rad]."""
 
-PATCHY, SCATTERED, BRIGHTER = 0.35, 0.004, 0.3
+_PATCHY, _SCATTERED, _BRIGHTER = 0.35, 0.004, 0.3
 """Share of a row that is alike, and relative scatter of the rows, beyond which trees may be taken for sky; by how much
 the sky may be brighter then, as a deviation [-]."""
 
@@ -91,28 +91,28 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     Returns None if there are no such rows, or something high hides the sky all along them. Takes `margin` [px].
     """
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
-    top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
+    top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:
         return None
-    rows = even_rows(top, bottom, SKY_ROWS)
+    rows = even_rows(top, bottom, _SKY_ROWS)
     side = camera.width // 6
     noise = sky_kernels.pixel_noise(image, rows)
     bright, share = sky_kernels.sky_rows(image, rows, side, camera.width - side, max(noise, 0.3))
     height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
-    darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
+    darker = max(_DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
     level, _, scatter, lowest = sky_kernels.level_at_horizon(bright, height, darker)
-    if lowest > MOST_HIDDEN:
+    if lowest > _MOST_HIDDEN:
         return None
     saturated, clipped = sky_kernels.saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
     free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
     shading = _shading(image, camera, rows[free], bright[free], noise, _Shading(level, scatter))
     level, scatter = shading.level, shading.deviation
-    unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
+    unseen = _UNSEEN * max(float(lowest) - margin / camera.focal_length - _CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
-    covered = median(share) < PATCHY and scatter > SCATTERED * level
-    upward = BRIGHTER * level if covered else deviation
+    covered = median(share) < _PATCHY and scatter > _SCATTERED * level
+    upward = _BRIGHTER * level if covered else deviation
     seen = height[free] if free.size else np.zeros(1)
     return Sky(
         luminance=level,
@@ -154,13 +154,13 @@ def _shading(
     found, covariance, seen, scatter = sky_kernels.sky_shading(image, rows, axis, bright, noise)
     level = float(found[0])
     unevenness = scatter / level if level > 0.0 else 0.0
-    if seen < (SEEN_TO_BRIGHTEN if found[2] > BRIGHTENS * level else LEAST_SEEN) or level <= 0.0:
+    if seen < (_SEEN_TO_BRIGHTEN if found[2] > _BRIGHTENS * level else _LEAST_SEEN) or level <= 0.0:
         return replace(unseen, unevenness=unevenness)
     vignetting, deviation = 0.0, UNKNOWN_VIGNETTING
     # What looks like a lens's shade under a more uneven sky are houses on both sides, which fade upward.
-    if unevenness <= LENS_UNEVENNESS:
-        vignetting = min(max(float(found[4]) / level, 0.0), MOST_VIGNETTING)
-        deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
+    if unevenness <= _LENS_UNEVENNESS:
+        vignetting = min(max(float(found[4]) / level, 0.0), _MOST_VIGNETTING)
+        deviation = min(math.hypot(_UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
     # Mean slope over the heights that are seen.
     ends = float(height.min() + height.max())
     variance = covariance[2, 2] + 2.0 * ends * covariance[2, 3] + ends**2 * covariance[3, 3]

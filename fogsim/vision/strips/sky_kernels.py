@@ -10,13 +10,13 @@ from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 
-SKY_SHARE, SKY_WIDTH = 7, 0.012
+_SKY_SHARE, _SKY_WIDTH = 7, 0.012
 """Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
 
-LEAST_SKY_ROWS = 4
+_LEAST_SKY_ROWS = 4
 """Rows of sky before it can end downward."""
 
-LEAST_SKY_HEIGHT, STEEPEST_SKY = 0.04, 0.8
+_LEAST_SKY_HEIGHT, _STEEPEST_SKY = 0.04, 0.8
 """Height that rows must span to show how the sky brightens upward [rad], and most that it does [1/rad]."""
 
 
@@ -43,8 +43,8 @@ def sky_rows(
         for j in range(count):
             samples[j] = pixel_luminance(image, rows[i], even_column(j, count, left - 0.5, right - 0.5))
         sort_few(samples, ordered)
-        centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
-        reach = max(2.5 * floor, SKY_WIDTH * centre)
+        centre, kept = float(ordered[count - 1 - count // _SKY_SHARE]), 0
+        reach = max(2.5 * floor, _SKY_WIDTH * centre)
         for _ in range(4):
             total, kept = 0.0, 0
             for value in ordered:
@@ -75,7 +75,7 @@ def level_at_horizon(
         drops[i] = bright[i - 1] - bright[i]
         twice = bright[max(i - 2, 0)] - bright[i]
         least = step * bright[i - 1]
-        if count >= LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
+        if count >= _LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
             break
         count = i + 1
     slopes = np.zeros(count * (count - 1) // 2 + 1)
@@ -85,8 +85,8 @@ def level_at_horizon(
             slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
             number += 1
     middle, slope = float(np.median(bright[:count])), 0.0
-    if height[0] - height[count - 1] > LEAST_SKY_HEIGHT:
-        slope = min(max(float(np.median(slopes[:number])), -STEEPEST_SKY * middle), STEEPEST_SKY * middle)
+    if height[0] - height[count - 1] > _LEAST_SKY_HEIGHT:
+        slope = min(max(float(np.median(slopes[:number])), -_STEEPEST_SKY * middle), _STEEPEST_SKY * middle)
     rest = bright[:count] - slope * height[:count]
     level = float(np.median(rest))
     return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
@@ -135,21 +135,21 @@ def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple
     return every / total, some / total
 
 
-SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
+_SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
 """Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
 
-TILT, BRIGHTENING, VIGNETTING = 0.3, 1.5, 0.5
+_TILT, _BRIGHTENING, _VIGNETTING = 0.3, 1.5, 0.5
 """Standard deviations of a sky's slopes sideways and upward [1/rad], and of its fall toward the corners [-], before it
 is looked at, relative to it."""
 
-LEAST_BEND, BENDING = 0.1, 2.5
+_LEAST_BEND, _BENDING = 0.1, 2.5
 """Standard deviation of the bend of a sky's slope upward where there is none, relative to the sky [1/rad²], and that of
 the bend over a slope [1/rad]."""
 
-SHADING_COLS = 32
+_SHADING_COLS = 32
 """Pixels of each row that are looked at."""
 
-ALIKE = 4.0
+_ALIKE = 4.0
 """How many of those pixels err together, since a sky is not quite even [-]."""
 
 
@@ -163,7 +163,7 @@ def sky_shading(
     next to their noise [linear grey levels] (5, 5). Takes `rows` (n,) int64, `axis` (4,) [px], `bright` (n,) [linear
     grey levels], `noise` [linear grey levels].
     """
-    cols, count = image.pixels.shape[1], SHADING_COLS
+    cols, count = image.pixels.shape[1], _SHADING_COLS
     level = float(np.median(bright))
     height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
     found = np.array([level, 0.0, 0.0, 0.0, 0.0])
@@ -175,17 +175,17 @@ def sky_shading(
         for i in range(rows.size):
             seen[i, j] = pixel_luminance(image, rows[i], col)
     number = 0
-    for relative in SHADING_SCALES:
+    for relative in _SHADING_SCALES:
         spread = (relative * level) ** 2 + (2.0 * noise) ** 2
         normal, right = np.zeros((5, 5)), np.zeros(5)
         normal[0, 0] = 1e-6
-        bend = LEAST_BEND + BENDING * abs(found[2]) / level
-        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, bend), (4, VIGNETTING)):
+        bend = _LEAST_BEND + _BENDING * abs(found[2]) / level
+        for a, deviation in ((1, _TILT), (2, _BRIGHTENING), (3, bend), (4, _VIGNETTING)):
             normal[a, a] = spread / (deviation * level) ** 2
         number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
         inverse = inverse_of(normal)
         found = times(inverse, right)
-        covariance = inverse * (ALIKE * max(squares / max(number, 1), noise * noise))
+        covariance = inverse * (_ALIKE * max(squares / max(number, 1), noise * noise))
     return found, covariance, number / seen.size, _scatter(seen, aside, height, above_axis, found, noise)
 
 

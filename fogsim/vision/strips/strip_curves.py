@@ -16,13 +16,13 @@ from fogsim.vision.strips.strip_geometry import StripGeometry
 
 Floats = NDArray[np.float64]
 
-GRAIN = 0.5
+_GRAIN = 0.5
 """Size of pieces of road whose albedo counts as independent next to the patches [m]."""
 
-ALL_PIXELS = np.array([[-math.inf], [math.inf]])
+_ALL_PIXELS = np.array([[-math.inf], [math.inf]])
 """Limits that every pixel is within [linear grey levels]."""
 
-HALF_VEHICLE = 1.3
+_HALF_VEHICLE = 1.3
 """Half the width that a tracked vehicle ahead may hide, its offset in the lane included [m]."""
 
 
@@ -54,7 +54,7 @@ def strip_curves(
     """Read the strips (`noise` [linear grey levels], `free` [m], `limits` (strips, 2, n) [linear grey levels])."""
     vehicle = np.array([math.inf, -math.inf, -math.inf])
     if math.isfinite(free):
-        reach, u0 = HALF_VEHICLE * camera.focal_length / free, camera.principal_point[0]
+        reach, u0 = _HALF_VEHICLE * camera.focal_length / free, camera.principal_point[0]
         vehicle = np.array([u0 - reach, u0 + reach, camera.horizon_row + camera.row_distance / free])
     if known is None:
         out = np.zeros((len(geometry.left), 3, geometry.first.size))
@@ -65,27 +65,27 @@ def strip_curves(
         linear_table(camera.response, camera.bits, camera.black_level),
     )
     metres = (geometry.right - geometry.left) * (geometry.distance / camera.focal_length)
-    pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
+    pieces = np.maximum(metres / _GRAIN, 1.0) * np.maximum(geometry.extent / _GRAIN, 1.0)
     if limits is None:
-        limits = np.broadcast_to(ALL_PIXELS, (len(out), 2, geometry.first.size)).copy()
+        limits = np.broadcast_to(_ALL_PIXELS, (len(out), 2, geometry.first.size)).copy()
     for strip, values in enumerate(out):
         bins = strip_kernels.StripBins(rows, np.stack([geometry.left[strip], geometry.right[strip]]), pieces[strip])
         strip_kernels.strip_bins(image, table, bins, vehicle, limits[strip], noise, values, known is not None)
     return StripCurves(out[:, 0], out[:, 1], out[:, 2])
 
 
-BONNET_SHARE, BONNET_ROWS = 0.3, 60
+_BONNET_SHARE, _BONNET_ROWS = 0.3, 60
 """Share of the road's rows that the own bonnet may cover, and how many of them are looked at."""
 
-BONNET_STEP, BONNET_OUTLIER = 0.03, 6.0
+_BONNET_STEP, _BONNET_OUTLIER = 0.03, 6.0
 """Least step of luminance at the bonnet's edge, relative to the airlight, and in median changes over as many rows."""
 
 
 def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int:
     """Lowest row that shows road, above the own vehicle's bonnet or dashboard (`airlight` [linear grey levels])."""
     bottom = camera.height - 1
-    top = math.floor(bottom - BONNET_SHARE * (bottom - camera.horizon_row))
-    rows = even_rows(bottom, top, BONNET_ROWS)[::-1]
+    top = math.floor(bottom - _BONNET_SHARE * (bottom - camera.horizon_row))
+    rows = even_rows(bottom, top, _BONNET_ROWS)[::-1]
     if rows.size < 8:
         return bottom
     level = strip_kernels.middle_levels(image, rows)
@@ -93,7 +93,7 @@ def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int
     mean = (level[:-2] + level[1:-1] + level[2:]) / 3.0
     change = mean[5:] - mean[:-5]
     apart = np.abs(change - median(change))
-    steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * median(apart)))
+    steps = np.flatnonzero(apart > max(_BONNET_STEP * airlight, _BONNET_OUTLIER * median(apart)))
     return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
 
 
@@ -111,13 +111,13 @@ def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
     return StripCurves(mean, np.where(seen, variance, 0.0).sum(axis=0) / count**2, scatter)
 
 
-CLIPPED = 0.95 * 255.0
+_CLIPPED = 0.95 * 255.0
 """Brighter than this a row has lost some of its light where the sky is clipped [linear grey levels]."""
 
 
 def without_clipped(curves: StripCurves) -> StripCurves:
     """Leave out bins so bright that their noise, or one of their colours, is clipped."""
-    return replace(curves, variance=np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
+    return replace(curves, variance=np.where(curves.luminance > _CLIPPED, 0.0, curves.variance))
 
 
 def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:

@@ -10,16 +10,16 @@ from fogsim.core.jit import kernel
 from fogsim.vision.light.medians import MOST_SAMPLES, median_of_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 
-LEAST_DEVIATION = 0.1
+_LEAST_DEVIATION = 0.1
 """Least deviation of a bin's mean: what quantisation leaves [linear grey levels]."""
 
-QUIET, SMOOTHED = 0.3, 1.0
+_QUIET, _SMOOTHED = 0.3, 1.0
 """Pixel noise, in levels, below which an image was compressed, and the deviation that this leaves in a mean [-]."""
 
-KEPT = 2.5
+_KEPT = 2.5
 """Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
 
-MOST_COLUMNS = 128
+_MOST_COLUMNS = 128
 """Columns of a row that are looked at for airlight, or up to twice as many."""
 
 
@@ -63,7 +63,7 @@ def _core(samples: NDArray[np.float32], ordered: NDArray[np.float32], floor: flo
             low += 1
         else:
             high -= 1
-    reach = KEPT * max(1.4826 * float(apart), floor)
+    reach = _KEPT * max(1.4826 * float(apart), floor)
     total, square, kept, away = 0.0, 0.0, 0, 0.0
     for value in ordered:
         offset = float(value) - middle
@@ -118,10 +118,10 @@ def strip_bins(
             row = row + 1 if row < rows[1, i] else rows[0, i]
         if taken < 2 or taken < 0.25 * wanted:
             continue
-        mean, deviation, scatter = _core(samples[:taken], ordered[:taken], max(noise, 2.0 * LEAST_DEVIATION))
+        mean, deviation, scatter = _core(samples[:taken], ordered[:taken], max(noise, 2.0 * _LEAST_DEVIATION))
         texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), bins.pieces[i])
         out[0, i], out[2, i] = mean, scatter
-        out[1, i] = noise**2 / taken + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
+        out[1, i] = noise**2 / taken + texture + _LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
 
 
 @kernel
@@ -131,8 +131,8 @@ def _coarseness(mean: float, deviation: float, noise: float, table: NDArray[np.f
     level = max(float(table[place + 1] - table[place]), 1e-6)
     # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
     rounding = math.exp(-4.0 * (math.pi * deviation / level) ** 2) / 12.0
-    quiet = max(1.0 - noise / (QUIET * level), 0.0)
-    return level**2 * (rounding + (SMOOTHED * quiet) ** 2)
+    quiet = max(1.0 - noise / (_QUIET * level), 0.0)
+    return level**2 * (rounding + (_SMOOTHED * quiet) ** 2)
 
 
 @kernel
@@ -157,7 +157,7 @@ def airlight_shares(
     Takes `rows` (n,) int64, `columns` (int, int), `airlight` [linear grey levels].
     """
     shares: NDArray[np.float64] = np.zeros(rows.size)
-    step = max((columns[1] - columns[0]) // MOST_COLUMNS, 1)
+    step = max((columns[1] - columns[0]) // _MOST_COLUMNS, 1)
     for i in range(rows.size):
         count = 0
         for column in range(columns[0], columns[1], step):

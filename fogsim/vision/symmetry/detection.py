@@ -15,44 +15,44 @@ from fogsim.vision.symmetry.vote_kernels import pair_votes, peaks, triangle_vote
 
 Floats = NDArray[np.float32]
 
-USUAL = 7.0
+_USUAL = 7.0
 """Radius to which larger signs are shrunk, so that each costs the same [px]."""
 
 SMALLER, LARGER = 0.65, 1.3
 """Radii of a sign in the picture over that which the map says [-]."""
 
-EVEN = 0.5
+_EVEN = 0.5
 """Share of pixels whose gradient is taken for noise [-]."""
 
-LEAST_NOISE = 0.08
+_LEAST_NOISE = 0.08
 """Standard deviation of the gradient of a picture without noise: rounding to whole grey levels [grey levels/px]."""
 
-LEAST_GRADIENT = 4.0
+_LEAST_GRADIENT = 4.0
 """Gradient of an edge over its noise [-]."""
 
-LEAST_SHARE, UNWARNED_SHARE = 0.66, 0.85
+_LEAST_SHARE, _UNWARNED_SHARE = 0.66, 0.85
 """Share of its outline that a sign must show where the map has one, and anywhere else [-]."""
 
-SURPRISE, UNWARNED_SURPRISE = 9.0, 14.0
+_SURPRISE, _UNWARNED_SURPRISE = 9.0, 14.0
 """Negative logarithm of the probability that edges which lie at random bear an outline out as well [-]; in one of the
 tiles of a whole picture, for any of them."""
 
-FITTING = 1.5
+_FITTING = 1.5
 """Area about a place on an outline in which an edge fits, times the share of directions that do [px]."""
 
-INDEPENDENT = 2.5
+_INDEPENDENT = 2.5
 """Distance along an outline from which edges are independent [px]."""
 
-CANDIDATES = 6
+_CANDIDATES = 6
 """Middles that are looked at in each region by the votes of opposite sides."""
 
-TRIANGLES = (0.74, 0.81, 0.88)
+_TRIANGLES = (0.74, 0.81, 0.88)
 """Sizes for which triangles' sides vote for their middles, over the largest that is looked for [-]."""
 
-APART = 0.8
+_APART = 0.8
 """Least distance between the middles of two signs, over the sum of their radii [-]."""
 
-TILE = 96
+_TILE = 96
 """Side of the tiles in which a whole picture is searched, in pixels of the shrunk picture."""
 
 
@@ -104,10 +104,10 @@ def detect_signs(
     if regions is None:
         searches = list(_tiles(pixels.shape[:2], radii))
         # So many tiles give chance as many occasions.
-        surprise, share = UNWARNED_SURPRISE + math.log(len(searches)), UNWARNED_SHARE
+        surprise, share = _UNWARNED_SURPRISE + math.log(len(searches)), _UNWARNED_SHARE
     else:
         searches = [(region, SMALLER, LARGER) for region in regions]
-        surprise, share = SURPRISE, LEAST_SHARE
+        surprise, share = _SURPRISE, _LEAST_SHARE
     share = share if least_strength is None else least_strength
     found: list[_Found] = []
     for region, smaller, larger in searches:
@@ -125,14 +125,14 @@ def _tiles(size: tuple[int, ...], radii: tuple[float, float]) -> Iterable[tuple[
     ratio = (radii[1] / radii[0]) ** (0.5 / octaves)
     for octave in range(octaves):
         radius = radii[0] * ratio ** (2 * octave + 1)
-        half = 0.5 * TILE * _factor(radius)
+        half = 0.5 * _TILE * _factor(radius)
         for v in np.arange(half, size[0] + half, 2 * half):
             for u in np.arange(half, size[1] + half, 2 * half):
                 yield SearchRegion(float(u), float(v), half, half, radius), 1.0 / ratio, ratio
 
 
 def _factor(radius: float) -> int:
-    return max(round(radius / USUAL), 1)
+    return max(round(radius / _USUAL), 1)
 
 
 def _search(pixels: Picture, region: SearchRegion, smallest: float, largest: float, least: float) -> list[_Found]:
@@ -162,12 +162,12 @@ def _in_piece(
     piece: Floats, box: tuple[float, float, float, float], smallest: float, largest: float
 ) -> Iterable[tuple[float, float, float, float, float]]:
     """Outlines (surprise, x, y, radius, share seen) for which there is evidence in a piece of a picture."""
-    points, number = edge_points(*clearest_gradients(piece, EVEN, LEAST_NOISE), LEAST_GRADIENT)
+    points, number = edge_points(*clearest_gradients(piece, _EVEN, _LEAST_NOISE), _LEAST_GRADIENT)
     if len(points) < SAMPLES // 4:
         return
     apart = max(round(0.4 * smallest), 1)
-    votes = [(pair_votes(points, number, 1.35 * smallest, 2.3 * largest), _EVEN_SIDED, CANDIDATES)]
-    sizes = (largest * np.array(TRIANGLES)).astype(np.float32)
+    votes = [(pair_votes(points, number, 1.35 * smallest, 2.3 * largest), _EVEN_SIDED, _CANDIDATES)]
+    sizes = (largest * np.array(_TRIANGLES)).astype(np.float32)
     for outlines, direction in ((_TIP_UP, 1.0), (_TIP_DOWN, -1.0)):
         votes += [(accumulated, outlines, 1) for accumulated in triangle_votes(points, number, sizes, direction)]
     radii = np.geomspace(smallest, largest, 8).astype(np.float32)
@@ -183,19 +183,19 @@ _EVEN_SIDED, _TIP_UP, _TIP_DOWN = OUTLINES[:3].copy(), OUTLINES[3:4].copy(), OUT
 
 def _surprise(share: float, radius: float, density: float) -> float:
     """Negative logarithm of the chance that so much of an outline is borne out, by its Chernoff bound [-]."""
-    chance = min(max(FITTING * density, 0.01), 0.9)
+    chance = min(max(_FITTING * density, 0.01), 0.9)
     if share <= chance:
         return 0.0
     gain = share * math.log(share / chance)
     if share < 1.0:
         gain += (1.0 - share) * math.log((1.0 - share) / (1.0 - chance))
-    return min(2.0 * math.pi * radius / INDEPENDENT, SAMPLES) * gain
+    return min(2.0 * math.pi * radius / _INDEPENDENT, SAMPLES) * gain
 
 
 def _distinct(found: Sequence[_Found]) -> tuple[SignDetection, ...]:
     """Most surprising of the detections in each place."""
     kept: list[SignDetection] = []
     for _, one in sorted(found, key=lambda each: (-each[0], each[1].u, each[1].v)):
-        if all(math.dist((one.u, one.v), (other.u, other.v)) > APART * (one.radius + other.radius) for other in kept):
+        if all(math.dist((one.u, one.v), (other.u, other.v)) > _APART * (one.radius + other.radius) for other in kept):
             kept.append(one)
     return tuple(kept)

@@ -11,7 +11,7 @@ from fogsim.vision.symmetry.edge_kernels import NX, NY, SNR, X, Y
 Floats = NDArray[np.float32]
 Numbers = NDArray[np.int32]
 
-OPPOSITE = -0.9
+_OPPOSITE = -0.9
 """Largest cosine between two gradients that are opposite: within 26° [-]."""
 
 _FACING = 0.4
@@ -50,7 +50,7 @@ def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float)
                     if dx > farthest + 1.0:
                         break
                     square, opposed = dx * dx + dy * dy, nx[i] * nx[j] + ny[i] * ny[j]
-                    if opposed > OPPOSITE or square < least or square > most:
+                    if opposed > _OPPOSITE or square < least or square > most:
                         continue
                     facing = -(dx * nx[i] + dy * ny[i]) * (dx * nx[j] + dy * ny[j]) / square
                     if facing > _FACING:

@@ -16,26 +16,26 @@ from fogsim.vision.strips.sky import Sky
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.uneven_fit import UnevenFit
 
-ASIDE = 0.3
+_ASIDE = 0.3
 """How far to either side rows are looked at [rad]."""
 
-ALIKE, NOISE = 0.07, 3.0
+_ALIKE, _NOISE = 0.07, 3.0
 """Difference to the sky's luminance up to which nothing else is seen, relative to it and in its pixels' deviations."""
 
-LEAST_SHARE, KEPT, STEP = 0.25, 0.7, 0.35
+_LEAST_SHARE, _KEPT, STEP = 0.25, 0.7, 0.35
 """Least share of a row that is airlight beyond the front, least of that which all rows above keep, and most of it that
 the ground two rows below has [-]: trees and vehicles that stand nearer hide the rest."""
 
-NEAREST = 40.0
+_NEAREST = 40.0
 """Up to where fog counts as near, and fronts are the joint fit's [m]."""
 
-MOST_DEPTH = 1.5
+_MOST_DEPTH = 1.5
 """Most optical depth of the fog before the front [-]: denser fog hides much of the ground itself."""
 
-LEAST_ROWS, UNSURE = 1.0, 0.15
+_LEAST_ROWS, _UNSURE = 1.0, 0.15
 """Least rows of a front below the horizon [px], and most of the horizon's standard deviation over them [-]."""
 
-DENSER = 2.5
+_DENSER = 2.5
 """Least extinction at the front over that of the near fog [-]."""
 
 
@@ -53,29 +53,29 @@ def airlight_edge(
     if sky.is_clipped:
         return None
     below = geometry.below - uneven.fit.shift
-    whole = (geometry.first == geometry.last) & (below > max(LEAST_ROWS, horizon_deviation / UNSURE))
+    whole = (geometry.first == geometry.last) & (below > max(_LEAST_ROWS, horizon_deviation / _UNSURE))
     # Behind a crest no row is farther than the one below it.
     farther = np.diff(below, prepend=math.inf) < 0.0
-    far = np.flatnonzero(whole & farther & (geometry.distance > NEAREST))
-    reach = ASIDE * camera.focal_length
+    far = np.flatnonzero(whole & farther & (geometry.distance > _NEAREST))
+    reach = _ASIDE * camera.focal_length
     columns = (
         max(round(camera.principal_point[0] - reach), 0),
         min(round(camera.principal_point[0] + reach), camera.width),
     )
-    alike = max(ALIKE, NOISE * sky.noise / sky.luminance)
+    alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
     shares = strip_kernels.airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
     front = _front(shares)
     if front is None:
         return None
     distance = camera.row_distance / below[far]
     before, behind = float(distance[front - 2]), float(distance[front])
-    depth, near = _depth(uneven, before), _depth(uneven, NEAREST)
-    if depth > MOST_DEPTH:
+    depth, near = _depth(uneven, before), _depth(uneven, _NEAREST)
+    if depth > _MOST_DEPTH:
         return None
     # What is left of the ground's contrast two rows below it is gone.
     contrast = max(1.0 - uneven.fit.road / uneven.fit.airlight, alike) * math.exp(-depth)
     extinction = math.log(max(contrast / alike, 1.0)) / (behind - before)
-    if extinction < DENSER * near / NEAREST:
+    if extinction < _DENSER * near / _NEAREST:
         return None
     edge = float(below[far[front]]) + 0.5
     place = camera.row_distance / edge
@@ -91,7 +91,7 @@ def _depth(uneven: UnevenFit, distance: float) -> float:
 def _front(shares: np.ndarray) -> int | None:
     """Nearest row, of those from near to far, from which on airlight is seen; None if there is no such step."""
     for row in range(2, shares.size):
-        if shares[row] >= LEAST_SHARE:
+        if shares[row] >= _LEAST_SHARE:
             step = shares[row - 2] <= STEP * shares[row]
-            return row if step and shares[row:].min() >= KEPT * shares[row] else None
+            return row if step and shares[row:].min() >= _KEPT * shares[row] else None
     return None

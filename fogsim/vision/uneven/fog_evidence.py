@@ -14,16 +14,16 @@ from fogsim.vision.uneven.fog_nodes import BROAD, MEAN
 
 Floats = NDArray[np.float64]
 
-NEAR, TOGETHER = 30.0, 3
+NEAR, _TOGETHER = 30.0, 3
 """Distance up to which bins are taken together [m], and how many."""
 
 UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
 """How likely each unevenness is beforehand; even fog is the rest [-]."""
 
-OBSTACLE_CHANCE = 0.01
+_OBSTACLE_CHANCE = 0.01
 """How likely it is that an obstacle that no sensor reports begins in a lane at one of its rows [-]."""
 
-STRANGE = 2.0
+_STRANGE = 2.0
 """What an outlier adds to a cost next to its luminance's chance, where even fog is weighed against uneven [-]."""
 
 
@@ -67,7 +67,7 @@ def hidden_cost(found: Solution, bins: Bins) -> float:
     any_luminance = math.log(float(found.theta[-3]) ** 2 / (2.0 * math.pi))
     cost = float((any_luminance - HIDDEN_COST - np.log(bins.noise[hidden])).sum())
     obstacles = int(hidden.any(axis=1).sum())
-    return cost - (LEFT_OUT_COST - STRANGE) * outliers - 2.0 * math.log(OBSTACLE_CHANCE) * obstacles
+    return cost - (LEFT_OUT_COST - _STRANGE) * outliers - 2.0 * math.log(_OBSTACLE_CHANCE) * obstacles
 
 
 def thinned_bins(bins: Bins) -> Bins:
@@ -77,13 +77,13 @@ def thinned_bins(bins: Bins) -> Bins:
         return bins
 
     def mean(values: Floats) -> Floats:
-        grouped = values[..., :near].reshape(*values.shape[:-1], -1, TOGETHER).mean(axis=-1)
+        grouped = values[..., :near].reshape(*values.shape[:-1], -1, _TOGETHER).mean(axis=-1)
         return np.ascontiguousarray(np.concatenate([grouped, values[..., near:]], axis=-1))
 
     seen = (bins.noise > 0).astype(np.float64)
     share = mean(seen)
     of_seen = np.maximum(share, 1e-9)
-    sizes = np.where(np.arange(bins.below.size) < near, TOGETHER, 1).astype(np.float64)
+    sizes = np.where(np.arange(bins.below.size) < near, _TOGETHER, 1).astype(np.float64)
     sizes = mean(sizes)
     return Bins(
         luminance=mean(bins.luminance * seen) / of_seen,
@@ -107,10 +107,10 @@ def of_each_bin(thinned: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool
     Takes `thinned` (strips, thinned) bool, `distance` (n,) [m].
     """
     near = _taken_together(distance)
-    groups = near // TOGETHER
-    return np.concatenate([np.repeat(thinned[:, :groups], TOGETHER, axis=1), thinned[:, groups:]], axis=1)
+    groups = near // _TOGETHER
+    return np.concatenate([np.repeat(thinned[:, :groups], _TOGETHER, axis=1), thinned[:, groups:]], axis=1)
 
 
 def _taken_together(distance: Floats) -> int:
     """How many of the nearest bins are taken together."""
-    return int((distance < NEAR).sum()) // TOGETHER * TOGETHER
+    return int((distance < NEAR).sum()) // _TOGETHER * _TOGETHER

@@ -15,7 +15,7 @@ NODES = (0.0, *(12.0 * 1.4**i for i in range(5)), *(60.0 * 1.2**i for i in range
 MEAN, BROAD = math.log(0.01), 1.6
 """Mean and standard deviation of ln k of fog before anything is seen [ln 1/m]."""
 
-ROUGHNESS = 0.03
+_ROUGHNESS = 0.03
 """Standard deviation of ln k from node to node next to that [-]."""
 
 UNEVENNESS = ((0.4, 300.0), (0.25, 100.0), (0.7, 30.0), (0.7, 100.0), (2.0, 80.0))
@@ -34,7 +34,7 @@ def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
     share = np.sqrt(2.0 * (size - 1.0 + np.exp(-size))) / size
     apart = math.sqrt(3.0) / length * np.abs(nodes[:, None] - nodes)
     covariance = deviation**2 * (1.0 + apart) * np.exp(-apart) * share[:, None] * share + BROAD**2
-    covariance += ROUGHNESS**2 * np.eye(count)
+    covariance += _ROUGHNESS**2 * np.eye(count)
     logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
     return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
 
@@ -44,6 +44,6 @@ def bank_nodes(first: int, count: int) -> FogNodes:
     """Nodes of fog that is even up to a bank, and even in it."""
     nodes = fog_nodes(*UNEVENNESS[0], count).nodes
     inside = (np.arange(count) >= first).astype(np.float64)
-    covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + ROUGHNESS**2 * np.eye(count)
+    covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + _ROUGHNESS**2 * np.eye(count)
     logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
     return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)

@@ -19,16 +19,16 @@ from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.fog_evidence import EvenFog, even_fog_over, thinned_bins
 
-TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
+_TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Curvatures that are tried first, over their standard deviation [-]."""
 
-MOST, STEPS = 3.0, 3
+_MOST, _STEPS = 3.0, 3
 """Most curvature, over its standard deviation [-], and how often a parabola through the best three is followed."""
 
-LEAST_VARIANCE = 1e-4
+_LEAST_VARIANCE = 1e-4
 """Least variance of the horizon's row where the road's curvature is given [px²]."""
 
-RIVAL = 20.0
+_RIVAL = 20.0
 """By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
 
 _AlongCourse = Callable[[int, float], EvenFog]
@@ -55,7 +55,7 @@ class HiddenCourse:
         found: list[EvenFog] = []
         begun: list[tuple[float, _AlongCourse, float, float]] = []
         for piece in range(1, PIECES):
-            tried = [value for value in TRIED if self._cost(piece, value) < gain + RIVAL]
+            tried = [value for value in _TRIED if self._cost(piece, value) < gain + _RIVAL]
             if len(tried) < 3:
                 continue
             along: _AlongCourse = functools.partial(self._even_fog, curves, prior, start, piece)
@@ -64,7 +64,7 @@ class HiddenCourse:
             begun.append((found[-1].cost, along, curvature, width))
         least = min((one.cost for one in found), default=math.inf)
         for cost, along, curvature, width in begun:
-            if cost < least + RIVAL:
+            if cost < least + _RIVAL:
                 others = (along(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
                 found += [replace(one, cost=one.cost + width) for one in others]
         return found
@@ -81,7 +81,7 @@ class HiddenCourse:
         ahead, sag = self.course.ahead, sag_from(piece, curvature * SAG_DEVIATION)
         row, variance = ahead.row(sag)
         moved = row - ahead.row(np.zeros(PIECES))[0]
-        deviation = min(prior.shift_deviation, math.sqrt(max(variance, LEAST_VARIANCE)))
+        deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
         around = prior._replace(shift=prior.shift + moved, shift_deviation=deviation)
         course = replace(self.course, row=self.camera.horizon_row + around.shift, sag=sag)
         geometry = course_geometry(self.straight, self.camera, course).only(list(range(len(curves.variance))))
@@ -94,7 +94,7 @@ def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple
     """Likeliest curvature over its standard deviation, its fog, and what its width adds to the cost (Laplace)."""
     tried = {value: fog(value) for value in first}
     curve = 1.0
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         at = sorted(tried)
         middle = min(max(at.index(min(at, key=lambda value: tried[value].cost)), 1), len(at) - 2)
         around = at[middle - 1 : middle + 2]
@@ -114,4 +114,4 @@ def _parabola(at: list[float], costs: list[float]) -> tuple[float, float]:
     if curve <= 0.0:
         return b, curve
     vertex = 0.5 * (a + b - left / curve)
-    return round(min(max(vertex, -MOST), MOST), 3), curve
+    return round(min(max(vertex, -_MOST), _MOST), 3), curve

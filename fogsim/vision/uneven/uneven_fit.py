@@ -29,59 +29,59 @@ from fogsim.vision.uneven.uneven_kernels import FogNodes
 
 Floats = NDArray[np.float64]
 
-BANK_CHANCE = 0.01
+_BANK_CHANCE = 0.01
 """How likely it is that a bank begins at a node [-]."""
 
-FIRST_BANK, LEAST_RISE = 5, 0.3
+_FIRST_BANK, _LEAST_RISE = 5, 0.3
 """Node from which on a bank may begin, and least rise of ln k in a first fit for one to be tried [-]."""
 
-GENTLE, FIRST_UNEVEN = 0, 4
+_GENTLE, _FIRST_UNEVEN = 0, 4
 """Which unevenness is tried first, and which then to see whether any other is to be."""
 
-SURELY_EVEN = 0.0
+_SURELY_EVEN = 0.0
 """By how much the cost of the first uneven fits must lie above that of the even one for no other to be tried [-]."""
 
-SAME_DEPTH, TOLD = 0.04, 2.0
+_SAME_DEPTH, _TOLD = 0.04, 2.0
 """Relative difference of optical depths up to which strips agree on the fog, and depth up to which they are compared
 [-]."""
 
-UNLIKELY = 30.0
+_UNLIKELY = 30.0
 """By how much the cost of even fog over an albedo must lie above the best for that albedo to be left out [-]."""
 
-BENT = 30.0
+_BENT = 30.0
 """How much more evidence uneven fog needs on a road that bends, which strips may leave far away [-]."""
 
-HIDDEN_COURSE, MOSTLY = 20.0, 0.5
+_HIDDEN_COURSE, _MOSTLY = 20.0, 0.5
 """How much more evidence uneven fog needs where a sag or crest that lines do not show explains most of what it does,
 and how much that is [-]: a course is tried in pieces, and so fits less well than it would."""
 
-NEAREST = 12.0
+_NEAREST = 12.0
 """Least reach of a curve of optical depths [m]."""
 
-FREE = 0.9
+_FREE = 0.9
 """Share of bins in use from which on even fog needs no obstacles [-]."""
 
-SURELY_EVEN_SHARE = 0.99
+_SURELY_EVEN_SHARE = 0.99
 """Chance of even fog beyond which only that counts [-]."""
 
-UNSURE = -2.0 * math.log(1.0 - SURELY_EVEN_SHARE)
+_UNSURE = -2.0 * math.log(1.0 - _SURELY_EVEN_SHARE)
 """By how much the cost of uneven fog may lie above that of even fog for the road's course to be doubted [-]."""
 
-STEPS, MORE_STEPS = 12, 8
+_STEPS, _MORE_STEPS = 12, 8
 """Most Gauss–Newton steps of a first fit, and from one answer to the next."""
 
-SWALLOWED = 1.0
+_SWALLOWED = 1.0
 """Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
 crests and in sags road seems to fade a little."""
 
-LEAST_ROAD = 0.3
+_LEAST_ROAD = 0.3
 """Share of bins that even fog must explain for there to be a road that other fog may lie on [-]."""
 
-EXPLAINS, FEW = 0.5, 3
+_EXPLAINS, _FEW = 0.5, 3
 """Share of the bins that even fog leaves out, and number of them, that uneven fog may leave out and be believed: else
 what is there is an obstacle to both [-]."""
 
-DENSER, SURELY_DENSER = math.log(2.5), 2.5
+_DENSER, _SURELY_DENSER = math.log(2.5), 2.5
 """Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
 
 
@@ -123,7 +123,7 @@ def fit_uneven(
 
     All strips count, unless even fog has left out much of them and the own lane disagrees with all together.
     """
-    if even.used.mean() < LEAST_ROAD:
+    if even.used.mean() < _LEAST_ROAD:
         return even_fog(even, geometry)
     found = _fitted(curves, geometry, prior, even, hidden)
     if found is not None and not _fits_all(even, curves):
@@ -138,15 +138,15 @@ def _fits_all(even: JointFit, curves: StripCurves) -> bool:
     if len(even.used) < len(curves.variance):
         return False
     seen = curves.variance > 0
-    return bool((even.used.sum(axis=1) >= FREE * seen.sum(axis=1)).all())
+    return bool((even.used.sum(axis=1) >= _FREE * seen.sum(axis=1)).all())
 
 
 def _agree(own: UnevenFit, more: UnevenFit) -> bool:
     """Whether more strips agree on the optical depth as far as the own lane does."""
-    last = max(int((own.depth < TOLD).sum()) - 1, 0)
+    last = max(int((own.depth < _TOLD).sum()) - 1, 0)
     depth, deviation = float(own.depth[last]), float(own.deviation[last])
     apart = abs(depth - float(np.interp(own.distance[last], more.distance, more.depth)))
-    return apart <= math.hypot(deviation, SAME_DEPTH * depth)
+    return apart <= math.hypot(deviation, _SAME_DEPTH * depth)
 
 
 def _fitted(
@@ -157,34 +157,34 @@ def _fitted(
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
     flat = [even_fog_over(bins, albedo, prior, even) for albedo in range(len(ALBEDOS))]
-    evens = [one.cost - BENT * hidden.is_bent for one in flat]
+    evens = [one.cost - _BENT * hidden.is_bent for one in flat]
     likely = int(np.argmin(evens))
     first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
     begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
-    tried = [_uneven(bins, likely, prior, GENTLE, begin, STEPS)]
-    tried.append(_uneven(bins, likely, prior, FIRST_UNEVEN, begin, STEPS))
+    tried = [_uneven(bins, likely, prior, _GENTLE, begin, _STEPS)]
+    tried.append(_uneven(bins, likely, prior, _FIRST_UNEVEN, begin, _STEPS))
     tried += _banks(bins, likely, prior, begin)
-    if min(t.cost for t in tried) > min(evens) + SURELY_EVEN and _is_free(even, curves):
+    if min(t.cost for t in tried) > min(evens) + _SURELY_EVEN and _is_free(even, curves):
         return None
     begin = tried[1].solution.theta
     for unevenness in range(len(UNEVENNESS)):
-        if unevenness not in (GENTLE, FIRST_UNEVEN):
-            tried.append(_uneven(bins, likely, prior, unevenness, begin, MORE_STEPS))
+        if unevenness not in (_GENTLE, _FIRST_UNEVEN):
+            tried.append(_uneven(bins, likely, prior, unevenness, begin, _MORE_STEPS))
     best = min(tried, key=lambda t: t.cost)
-    if left_out(best.solution, bins) > max(EXPLAINS * flat[likely].left_out, FEW):
+    if left_out(best.solution, bins) > max(_EXPLAINS * flat[likely].left_out, _FEW):
         return None
     for albedo, cost in enumerate(evens):
-        if albedo != likely and cost < evens[likely] + UNLIKELY:
-            tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, MORE_STEPS))
+        if albedo != likely and cost < evens[likely] + _UNLIKELY:
+            tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, _MORE_STEPS))
     fogs = [
         replace(one, cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
         for one, cost in zip(flat, evens, strict=True)
     ]
     gain = min(evens) - min(t.cost for t in tried)
-    if gain > -UNSURE:
+    if gain > -_UNSURE:
         courses = hidden.even_fogs(curves, prior, even, likely, gain)
         explained = min(evens) - min((one.cost for one in courses), default=math.inf)
-        doubt = HIDDEN_COURSE if explained > MOSTLY * gain else 0.0
+        doubt = _HIDDEN_COURSE if explained > _MOSTLY * gain else 0.0
         fogs += [replace(one, cost=one.cost - doubt) for one in courses]
     return _weighed(even, fogs, tried, bins, geometry)
 
@@ -192,7 +192,7 @@ def _fitted(
 def _is_free(even: JointFit, curves: StripCurves) -> bool:
     """Whether even fog explains nearly all bins of its strips, rather than taking them for obstacles."""
     strips = min(len(even.used), len(curves.variance))
-    return bool(even.used[:strips][curves.variance[:strips] > 0].mean() > FREE)
+    return bool(even.used[:strips][curves.variance[:strips] > 0].mean() > _FREE)
 
 
 def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
@@ -205,8 +205,8 @@ def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
 
 def _distances(reach: float) -> Floats:
     """Distances of a curve up to a reach [m]."""
-    count = max(math.ceil(math.log(max(reach, NEAREST) / 10.0) / math.log(1.15)), 1)
-    return np.geomspace(10.0, max(reach, NEAREST), count + 1)
+    count = max(math.ceil(math.log(max(reach, _NEAREST) / 10.0) / math.log(1.15)), 1)
+    return np.geomspace(10.0, max(reach, _NEAREST), count + 1)
 
 
 def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
@@ -224,14 +224,16 @@ def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: 
 def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_Candidate]:
     """Fits of banks that begin where a first fit has the fog become denser, or one node on."""
     count = start.size - uneven_kernels.OTHERS
-    if count <= FIRST_BANK + 1:
+    if count <= _FIRST_BANK + 1:
         return []
     rises = np.diff(start[:count])
-    first = int(np.argmax(rises[FIRST_BANK:])) + FIRST_BANK + 1
-    if rises[first - 1] < LEAST_RISE:
+    first = int(np.argmax(rises[_FIRST_BANK:])) + _FIRST_BANK + 1
+    if rises[first - 1] < _LEAST_RISE:
         return []
     nodes = range(first, min(first + 2, count))
-    return [_candidate(bins, albedo, prior, bank_nodes(node, count), BANK_CHANCE, start, MORE_STEPS) for node in nodes]
+    return [
+        _candidate(bins, albedo, prior, bank_nodes(node, count), _BANK_CHANCE, start, _MORE_STEPS) for node in nodes
+    ]
 
 
 def _candidate(
@@ -254,7 +256,7 @@ def _weighed(
     weights /= weights.sum()
     of_even, of_tried = weights[: len(evens)], weights[len(evens) :]
     share = float(of_even.sum())
-    if float(of_even[: len(ALBEDOS)].sum()) > SURELY_EVEN_SHARE:
+    if float(of_even[: len(ALBEDOS)].sum()) > _SURELY_EVEN_SHARE:
         return None
     best = tried[int(np.argmax(of_tried))]
     used = even.used if share > 0.5 else best.solution.used == USED
@@ -322,7 +324,7 @@ def _denser(candidate: _Candidate, reach: float) -> tuple[float, float, float] |
     """Where fog is surely much denser than near the camera, if anywhere."""
     nodes, solution = candidate.fog.nodes, candidate.solution
     seen = int((nodes <= reach).sum())
-    if _depth(candidate, reach)[0] < SWALLOWED:
+    if _depth(candidate, reach)[0] < _SWALLOWED:
         return None
     logs, covariance = solution.theta[:seen], solution.covariance[:seen, :seen]
     for node in range(2, seen):
@@ -331,7 +333,7 @@ def _denser(candidate: _Candidate, reach: float) -> tuple[float, float, float] |
         weight = np.zeros(seen)
         weight[:node], weight[node] = -lengths / lengths.sum(), 1.0
         rise = float((weight * logs).sum())
-        if rise > DENSER and rise > SURELY_DENSER * math.sqrt(_variance(weight, covariance)):
+        if rise > _DENSER and rise > _SURELY_DENSER * math.sqrt(_variance(weight, covariance)):
             return _half_density(nodes, logs, node, node + int(np.argmax(logs[node:])))
     return None
 

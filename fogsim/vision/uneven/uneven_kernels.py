@@ -31,22 +31,22 @@ from fogsim.vision.strips.joint_kernels import (
 OTHERS = 3
 """Parameters next to the cells: airlight, rows by which the horizon is lower, vignetting that is left."""
 
-LONGEST_STEP = 1.2
+_LONGEST_STEP = 1.2
 """Longest step of ln k of a cell [-]."""
 
-THINNEST, DENSEST = math.log(1e-5), math.log(0.5)
+_THINNEST, _DENSEST = math.log(1e-5), math.log(0.5)
 """Least and greatest ln k of a cell [ln 1/m]."""
 
-CONVERGED = 0.03
+_CONVERGED = 0.03
 """Longest step of ln k below which only one more is made [-]."""
 
-HALVINGS = 4
+_HALVINGS = 4
 """How often a step that leads uphill is halved."""
 
-DEEPEST = 3.5
+_DEEPEST = 3.5
 """Optical depth beyond which a bin's luminance is ignored in the first guess [-]."""
 
-TOLERANCE, TOLERANT = 0.06, 4
+_TOLERANCE, _TOLERANT = 0.06, 4
 """Deviation of the first guess's luminance, relative to the airlight [-], and steps over which it is halved each time
 before bins count as sharp as they are: else a guess that is a little off would take far fog for an obstacle."""
 
@@ -189,7 +189,7 @@ def _add_prior(
 @kernel
 def _blur(noise: NDArray[np.float64], airlight: float, iteration: int, out: NDArray[np.float64]) -> None:
     """Variances of the bins, in the first steps with what a first guess may be off."""
-    tolerance = (TOLERANCE * 0.4**iteration * airlight) ** 2 if iteration < TOLERANT else 0.0
+    tolerance = (_TOLERANCE * 0.4**iteration * airlight) ** 2 if iteration < _TOLERANT else 0.0
     for s in range(noise.shape[0]):
         for i in range(noise.shape[1]):
             out[s, i] = noise[s, i] + tolerance if noise[s, i] > 0.0 else 0.0
@@ -207,7 +207,7 @@ def _move(
     nodes, longest = theta.size - OTHERS, 0.0
     for c in range(nodes):
         longest = max(longest, abs(step[c]))
-    damped = min(1.0, LONGEST_STEP / max(longest, 1e-9))
+    damped = min(1.0, _LONGEST_STEP / max(longest, 1e-9))
     step *= min(damped, 1.5 * shift_deviation / max(abs(step[nodes + 1]), 1e-12))
     for strip in range(road.size):
         change = constants[strip, 0]
@@ -215,7 +215,7 @@ def _move(
             change -= step[a] * constants[strip, a + 1]
         road[strip] *= min(max(1.0 + change, 0.5), 1.5)
     for c in range(nodes):
-        step[c] = min(max(theta[c] + step[c], THINNEST), DENSEST) - theta[c]
+        step[c] = min(max(theta[c] + step[c], _THINNEST), _DENSEST) - theta[c]
     theta += step
     return longest
 
@@ -247,7 +247,7 @@ def fit_uneven(
         # What is an outlier is settled before the last steps, so that they converge.
         reject = iteration < max(iterations - 3, 1)
         cost = whiten(residuals, changes, albedo, prior.airlight, reject, whitened)
-        if reject and iteration >= TOLERANT and hide_behind_obstacles(bins.noise, whitened.used):
+        if reject and iteration >= _TOLERANT and hide_behind_obstacles(bins.noise, whitened.used):
             cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
         squares, number = add_bins(whitened, normal, gradient)
@@ -255,7 +255,7 @@ def fit_uneven(
         cost += invert(normal, covariance)
         if iteration >= iterations:
             break
-        if iteration > TOLERANT and cost > least + 1.0 and halvings < HALVINGS:
+        if iteration > _TOLERANT and cost > least + 1.0 and halvings < _HALVINGS:
             halvings += 1
             step *= 0.5
             theta[:] = last + step
@@ -264,7 +264,7 @@ def fit_uneven(
         last[:] = theta
         step = times(covariance, gradient)
         longest = _move(theta, step, road, whitened.constants, prior.shift_deviation)
-        if iteration > TOLERANT and longest < CONVERGED:
+        if iteration > _TOLERANT and longest < _CONVERGED:
             iterations = min(iterations, iteration + 1)
     return Solution(theta, covariance, cost, squares / max(number, 1), road[0], whitened.used)
 
@@ -286,20 +286,20 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
             for s in range(strips):
                 if bins.noise[s, i] > 0.0:
                     left = (prior.airlight - bins.luminance[s, i]) / (prior.airlight - road[s])
-                    depth[seen] = -math.log(min(max(left, math.exp(-DEEPEST)), 2.0))
+                    depth[seen] = -math.log(min(max(left, math.exp(-_DEEPEST)), 2.0))
                     seen += 1
             rows = bins.below[i] - prior.shift
             if seen == 0 or rows <= 0.5:
                 continue
             # Optical depth never falls with distance.
-            top = max(top, min(float(np.median(depth[:seen])), DEEPEST))
+            top = max(top, min(float(np.median(depth[:seen])), _DEEPEST))
             distance = bins.path[0, i] / rows
             cell = _before(nodes, distance)
             sums[cell, 0] += distance
             sums[cell, 1] += top
             counts[cell] += 1.0
         distance, before, known = 0.0, 0.0, False
-        logs = np.full(nodes.size, THINNEST)
+        logs = np.full(nodes.size, _THINNEST)
         for c in range(nodes.size):
             if counts[c] > 0.0:
                 middle, reached = sums[c, 0] / counts[c], sums[c, 1] / counts[c]

@@ -12,26 +12,26 @@ from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float32]
 
-BRIGHT_ROAD = 1.1
+_BRIGHT_ROAD = 1.1
 """Luminance of the road before the vehicle over that of the sky, from which on there is no daylight, or no road [-]."""
 
-GAP = 0.3
+_GAP = 0.3
 """How far above the vehicle's foot, as heights, the road that is looked at ends before it: its shadow [m]."""
 
-HALF_STRIP = 0.6
+_HALF_STRIP = 0.6
 """Half the width of that strip of road as a thing of this size has at the vehicle [m]."""
 
-NEAREST, FARTHEST, FARTHER, ROWS = 4.0, 18.0, 1.8, 9
+_NEAREST, FARTHEST, _FARTHER, _ROWS = 4.0, 18.0, 1.8, 9
 """Nearest and farthest road on which the light of own lamps is looked for [m], the least ratio of the two, and how many
 rows are read there."""
 
-SHADOW = 4.0
+_SHADOW = 4.0
 """Length of the road before the vehicle ahead that it may darken, or its lamps light [m]."""
 
-LEAST_CONTRAST = 0.03
+_LEAST_CONTRAST = 0.03
 """Contrast of a row of road to the sky that still shows how it falls [-]."""
 
-UNEVEN, SHARE = 0.1, 0.1
+_UNEVEN, SHARE = 0.1, 0.1
 """By how much the logarithm of that contrast may fall less than the fog says: where the road's reflectance changes [-],
 and relative to the fall itself, where the road is not flat [-]."""
 
@@ -42,8 +42,8 @@ def road_before(camera: Camera, depth: float) -> tuple[slice, slice]:
     Takes `depth` [m].
     """
     scale = camera.focal_length / depth
-    first = min(math.ceil(camera.horizon_row + camera.row_distance / depth + GAP * scale), camera.height - 3)
-    middle, half = camera.principal_point[0], max(HALF_STRIP * scale, 4.0)
+    first = min(math.ceil(camera.horizon_row + camera.row_distance / depth + _GAP * scale), camera.height - 3)
+    middle, half = camera.principal_point[0], max(_HALF_STRIP * scale, 4.0)
     cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
     return slice(max(first, 0), camera.height, 4), cols
 
@@ -56,7 +56,7 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
 
     Takes `road` (rows, cols).
     """
-    if road.size and float(np.median(road)) > BRIGHT_ROAD * sky:
+    if road.size and float(np.median(road)) > _BRIGHT_ROAD * sky:
         raise CannotTellError("the road is brighter than the sky: lamps or direct sun light it")
 
 
@@ -76,7 +76,7 @@ class RoadFall:
         Takes `extinction`, `deviation` [1/m].
         """
         rise = self.rise(extinction - 2.0 * deviation)
-        return bool(self.way.size) and rise > UNEVEN + SHARE * extinction * float(np.ptp(self.way))
+        return bool(self.way.size) and rise > _UNEVEN + SHARE * extinction * float(np.ptp(self.way))
 
     def rise(self, extinction: float) -> float:
         """By how much the logarithm of the contrast to the horizon, had there been no fog, rises from near to far [-].
@@ -86,7 +86,7 @@ class RoadFall:
         if not self.way.size:
             return 0.0
         bare = 1.0 - self.share + self.share * self.contrast * np.exp(extinction * self.way)
-        level = np.log(np.maximum(bare, LEAST_CONTRAST))
+        level = np.log(np.maximum(bare, _LEAST_CONTRAST))
         first, second = np.triu_indices(self.way.size, 1)
         # The median of all slopes leaves out marks, a bonnet, a shadow.
         slope = float(np.median((level[second] - level[first]) / (self.way[second] - self.way[first])))
@@ -110,14 +110,14 @@ def road_fall(
 
     Returns without rows where too little of the road is seen; then nothing is lit. Takes `depth` [m], `share` (rows,).
     """
-    nearest = max(camera.row_distance / max(camera.height - 1.0 - camera.horizon_row, 1.0), NEAREST)
-    farthest = min(FARTHEST, depth - SHADOW)
-    if farthest < FARTHER * nearest:
+    nearest = max(camera.row_distance / max(camera.height - 1.0 - camera.horizon_row, 1.0), _NEAREST)
+    farthest = min(FARTHEST, depth - _SHADOW)
+    if farthest < _FARTHER * nearest:
         return _NOWHERE
-    at = np.linspace(nearest, farthest, ROWS)
+    at = np.linspace(nearest, farthest, _ROWS)
     contrast = np.array([1.0 - _median(luminance_of(*_row(camera, d)), sky) / sky for d in at])
-    seen = contrast > LEAST_CONTRAST
-    if int(seen.sum()) < ROWS // 2:
+    seen = contrast > _LEAST_CONTRAST
+    if int(seen.sum()) < _ROWS // 2:
         return _NOWHERE
     rows = np.clip(np.rint(camera.horizon_row + camera.row_distance / at[seen]).astype(int), 0, camera.height - 1)
     return RoadFall(at[seen], contrast[seen], np.ones(rows.size) if share is None else share[rows])
@@ -125,7 +125,7 @@ def road_fall(
 
 def _row(camera: Camera, distance: float) -> tuple[slice, slice]:
     row = min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1)
-    middle, half = camera.principal_point[0], max(HALF_STRIP * camera.focal_length / distance, 4.0)
+    middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
     cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
     return slice(max(row, 0), max(row, 0) + 1), cols
 
@@ -134,16 +134,16 @@ def _median(pixels: Floats, otherwise: float) -> float:
     return float(np.median(pixels)) if pixels.size else otherwise
 
 
-BLOCKS, BRIGHT_BLOCKS = 12, 80.0
+_BLOCKS, _BRIGHT_BLOCKS = 12, 80.0
 """Blocks of columns of the sky, and the percentile of their brightness that is the airlight: trees hide the others."""
 
-HALF_TRUCK = 1.6
+_HALF_TRUCK = 1.6
 """How much of the sky next to the axis a high vehicle ahead can hide [m]."""
 
-ALIKE = 0.03
+_ALIKE = 0.03
 """How far from the light of all of the sky a pixel's may be, relative to it, next to noise [-]: trees are darker."""
 
-LEAST_SEEN = 0.05
+_LEAST_SEEN = 0.05
 """Share of a block's pixels that must be of that light for the block to count [-]."""
 
 
@@ -157,25 +157,25 @@ def neighbouring_airlight(light: NDArray[np.float32], about: float, noise: float
     """
     columns = _blocks(light.shape[1])
     free = [block for block in columns if abs(0.5 * (block.start + block.stop - 1) - axis) > hidden]
-    seen = free if len(free) >= BLOCKS // 3 else columns
+    seen = free if len(free) >= _BLOCKS // 3 else columns
     means = [_mean(light[:, block], about, noise) for block in seen]
     bright = [mean for mean in means if mean is not None]
-    return float(np.percentile(bright, BRIGHT_BLOCKS)) if bright else about
+    return float(np.percentile(bright, _BRIGHT_BLOCKS)) if bright else about
 
 
 def _blocks(width: int) -> list[slice]:
     """Blocks of columns that are the same from either side: they share a column where its middle is their border."""
-    blocks = [slice(width * i // BLOCKS, -(-width * (i + 1) // BLOCKS)) for i in range(BLOCKS)]
+    blocks = [slice(width * i // _BLOCKS, -(-width * (i + 1) // _BLOCKS)) for i in range(_BLOCKS)]
     return [block for block in blocks if block.stop > block.start]
 
 
 def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None:
     """Mean of the pixels of the sky in a part; None if too few are."""
-    reach, middle = ALIKE * about + 4.0 * noise, about
+    reach, middle = _ALIKE * about + 4.0 * noise, about
     # What is cut off about a first middle is lopsided, so that it is looked for again about the next.
     for narrow in (reach, max(4.0 * noise, 1.0), max(3.0 * noise, 1.0)):
         core = part[np.abs(part - np.float32(middle)) <= narrow]
-        if core.size < max(LEAST_SEEN * part.size, 1):
+        if core.size < max(_LEAST_SEEN * part.size, 1):
             return None
         middle = float(np.median(core)) if narrow is reach else float(core.mean(dtype=np.float64))
     return middle
@@ -183,4 +183,4 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None
 
 def hidden_at_side(focal_length: float, depth: float) -> float:
     """How far from the axis a vehicle ahead may hide the sky [px] (`focal_length` [px], `depth` [m])."""
-    return HALF_TRUCK * focal_length / depth if math.isfinite(depth) else 0.0
+    return _HALF_TRUCK * focal_length / depth if math.isfinite(depth) else 0.0

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 HALF_BODY = 0.42
 """Half the width of the part of the rear that is compared, in widths of the vehicle [-]."""
 
-HEIGHTS = (0.3, 1.2)
+_HEIGHTS = (0.3, 1.2)
 """Heights of that part above the road [m]: above the road's shadow, below the roof of the flattest car."""
 
 LARGE, HIGH = 2.25, (0.6, 1.6)
@@ -27,27 +27,27 @@ differently from afar, so the part begins above the bar that keeps cars from run
 TOP = 2.2
 """Height to which a rear may reach [m]: dark windows of vans are most useful, sky above a car is useless."""
 
-FINEST = 0.02
+_FINEST = 0.02
 """Smallest cell on which pictures are compared [m]."""
 
-DARKEST = 0.05
+_DARKEST = 0.05
 """Luminance, over the sky's, that the darkest parts of any vehicle have from nearby: glass, tyres, shadow [-]."""
 
-SHADING = 0.08
+_SHADING = 0.08
 """Standard deviation of a surface's own luminance between two pictures, relative [-]: gloss, shading, what is drawn or
 resolved of it. White paint is uncertain by that much of the sky's light, glass by next to nothing."""
 
-MISPLACED = 0.5
+_MISPLACED = 0.5
 """Misplacement of a cell that is reckoned with, in cells: what else is resolved in it [-]."""
 
-BIWEIGHT, ROUNDS = 4.7, 5
+_BIWEIGHT, _ROUNDS = 4.7, 5
 """Residual at which a cell no longer counts, in robust standard deviations [-] (Tukey's biweight): a lit lamp; and
 rounds of the regression."""
 
 LOST = 0.25
 """Deviation of what clipping takes from a vehicle, relative to it [-]."""
 
-LEAST_KEPT, LEAST_PIXELS = 0.5, 12
+_LEAST_KEPT, _LEAST_PIXELS = 0.5, 12
 """Share of the cells that must not have changed [-], and fewest pixels of a mean."""
 
 
@@ -69,7 +69,7 @@ class RearPicture:
     @property
     def heights(self) -> tuple[float, float]:
         """Lowest and highest part of the rear that is compared, above the road [m]."""
-        return HIGH if self.width >= LARGE else HEIGHTS
+        return HIGH if self.width >= LARGE else _HEIGHTS
 
     def displaced(self, right: float, up: float) -> "RearPicture":
         """The same picture of a vehicle that stands elsewhere in it (`right`, `up` [m])."""
@@ -113,7 +113,7 @@ def resample(picture: RearPicture, lateral: Floats, height: Floats, cell: float)
 
 def common_cell(one: RearPicture, other: RearPicture) -> float:
     """Size of a pixel of the coarser of two pictures [m]."""
-    return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
+    return max(1.0 / one.scale, 1.0 / other.scale, _FINEST)
 
 
 def cell_centres(low: float, high: float, cell: float, least: int) -> Floats:
@@ -143,7 +143,7 @@ def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRati
     first = _weighted_median(seen / np.where(np.abs(shown) > 1e-9, shown, 1e-9), sure)
     weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own**2)
     count = int((weight > 0).sum())
-    if count < max(LEAST_KEPT * shown.size, 6):
+    if count < max(_LEAST_KEPT * shown.size, 6):
         return None
     power, by_noise = float((weight * shown**2).sum()), float(weight.sum()) * shown_noise
     if power <= by_noise + 4.0 * math.sqrt(float((weight**2).sum())) * shown_noise:
@@ -175,7 +175,7 @@ def mean_luminances(
     `noise` [linear grey levels].
     """
     grid = pixel_grid(near, far, at)
-    if grid is None or grid.far.size < LEAST_PIXELS:
+    if grid is None or grid.far.size < _LEAST_PIXELS:
         return None
     shown = downsample_to(near, grid, at) / skies[0]
     weight, gain = _pixel_weights(1.0 - shown, 1.0 - grid.far / skies[1], noise / skies[1])
@@ -200,7 +200,7 @@ def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Flo
     change = np.abs(down) + np.abs(across)
     gain = np.maximum(near, 0.0)
     first = _weighted_median(far / np.maximum(gain, 1e-9), gain**2 / (noise**2 + shading**2))
-    own = shading**2 + (MISPLACED * change) ** 2
+    own = shading**2 + (_MISPLACED * change) ** 2
     return _line_through_airlight(gain, far, first, noise**2, own, rescaled=True)[0], gain
 
 
@@ -213,14 +213,14 @@ def _own_deviation(shown: Floats, noise: float) -> Floats | None:
             return None
     down, across = np.gradient(shown)
     shading = _shading_deviation(shown, most)
-    return np.asarray(np.sqrt(shading**2 + MISPLACED**2 * (down**2 + across**2)), np.float64)
+    return np.asarray(np.sqrt(shading**2 + _MISPLACED**2 * (down**2 + across**2)), np.float64)
 
 
 def _shading_deviation(contrast: Floats, most: float, brightest: float = math.inf) -> Floats:
     """Deviation of contrasts by shading: a share of the luminance, at most so bright, that the fog lets through."""
-    through = most / (1.0 - DARKEST)
-    luminance = np.clip(1.0 - contrast / through, DARKEST, brightest)
-    return np.asarray(SHADING * through * luminance, np.float64)
+    through = most / (1.0 - _DARKEST)
+    luminance = np.clip(1.0 - contrast / through, _DARKEST, brightest)
+    return np.asarray(_SHADING * through * luminance, np.float64)
 
 
 def _line_through_airlight(
@@ -231,12 +231,12 @@ def _line_through_airlight(
     Iterated with Tukey's biweight; `rescaled` weights are by the variance that is found and not by that expected.
     """
     weight = np.zeros_like(shown)
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         t = min(max(ratio, 0.0), 2.0)
         variance = noise + t**2 * own
         residual = np.abs(seen - ratio * shown) / np.sqrt(variance)
         scale = max(1.4826 * median(residual), 1.0)
-        kept = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0) ** 2
+        kept = np.maximum(1.0 - (residual / (_BIWEIGHT * scale)) ** 2, 0.0) ** 2
         weight = kept / (variance * scale**2 if rescaled else variance)
         power = float((weight * shown**2).sum())
         if power <= 0.0:

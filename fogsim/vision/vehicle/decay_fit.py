@@ -11,7 +11,7 @@ from fogsim.core.linear_algebra import straight_line
 
 Floats = NDArray[np.float64]
 
-STEPS, HUBER = 12, 2.5
+_STEPS, _HUBER = 12, 2.5
 """Gauss–Newton steps, and residual beyond which a range counts linearly, in standard deviations [-]."""
 
 
@@ -49,7 +49,7 @@ def _descended(
 ) -> tuple[float, float, float, float]:
     """Size, extinction, the variance of the latter, and the sum of squared standardised residuals."""
     o, variance, misfit = 0.0, 0.0, 0.0
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         # Normal equations in the order of size, offset and extinction; the diagonal keeps them regular.
         aa, ab, ac, bb, bc, cc = 1e-9, 0.0, 0.0, 1.0 / offset**2, 0.0, 1e-3
         ra, rb, rc, misfit = 0.0, -o / offset**2, 0.0, 0.0
@@ -58,7 +58,7 @@ def _descended(
             residual = contrast[i] - size * fall - o
             weight = 1.0 / (noise[i] ** 2 + (relative * size * fall) ** 2)
             # Ranges at which something else was seen count less (Huber).
-            weight *= min(1.0, HUBER / max(abs(residual) * math.sqrt(weight), 1e-9))
+            weight *= min(1.0, _HUBER / max(abs(residual) * math.sqrt(weight), 1e-9))
             slope = -size * distance[i] * fall
             aa, ab, ac = aa + weight * fall * fall, ab + weight * fall, ac + weight * fall * slope
             bb, bc, cc = bb + weight, bc + weight * slope, cc + weight * slope * slope

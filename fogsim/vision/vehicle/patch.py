@@ -11,7 +11,7 @@ from fogsim.core.linear_algebra import matrix_product
 
 Floats = NDArray[np.float64]
 
-LEAST_BOX = 0.5
+_LEAST_BOX = 0.5
 """Least width of the box over near pixels where both pictures are of one size [px]: no jumps from pixel to pixel."""
 
 
@@ -52,7 +52,7 @@ def box_weights(
     """
     # A near pixel is itself a mean over 1 and blurred: squares of widths add, as variances do, and a box of width w
     # has the variance w²/12.
-    half = 0.5 * math.sqrt(max((1.0 + 12.0 * blur**2) * (scale**-2 - 1.0), LEAST_BOX**2))
+    half = 0.5 * math.sqrt(max((1.0 + 12.0 * blur**2) * (scale**-2 - 1.0), _LEAST_BOX**2))
     return pixel_shares(near_size, centre + (far - far_centre) / scale, half)
 
 

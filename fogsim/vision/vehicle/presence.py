@@ -11,10 +11,10 @@ from fogsim.vision.vehicle.rear_localisation import BODY, WIDTHS, upright_steps
 
 Floats = NDArray[np.float64]
 
-PLACED = (-0.5, 0.0, 0.5)
+_PLACED = (-0.5, 0.0, 0.5)
 """How much higher than where the calibration has the road a vehicle is looked for [m]: pitch, sag and crest."""
 
-EDGE_GAIN = 0.41
+_EDGE_GAIN = 0.41
 """Step from pixel to pixel over that across the edge of something: by its blur and the smoothing [-]."""
 
 
@@ -52,14 +52,14 @@ def vehicle_presence(
     scale = camera.focal_length / depth
     foot = camera.horizon_row + camera.row_distance / depth - origin[1]
     found = []
-    for higher in PLACED:
+    for higher in _PLACED:
         top, bottom = (foot - (height + higher) * scale for height in (BODY[1], BODY[0]))
         rows = slice(max(math.floor(top), 0), max(math.ceil(bottom) + 1, 0))
         body = np.minimum(luminance[rows], np.float32(airlight))
         if body.shape[0] >= 2 and body.shape[1] >= 8:
             step, floor = upright_steps(body, noise)
             best, middle = _strongest_pair(step, scale, camera.principal_point[0] - origin[0], aside)
-            found.append(Presence(best / EDGE_GAIN / airlight, floor / EDGE_GAIN / airlight, middle / scale))
+            found.append(Presence(best / _EDGE_GAIN / airlight, floor / _EDGE_GAIN / airlight, middle / scale))
     return max(found, key=lambda one: one.step / one.threshold) if found else Presence(0.0, 1.0)
 
 

@@ -14,34 +14,34 @@ Floats = NDArray[np.float64]
 WIDTHS = (1.4, 2.7)
 """Narrowest and widest rear of a vehicle with two tracks [m]: small cars to lorries."""
 
-NARROW_WIDTHS = (0.4, 1.0)
+_NARROW_WIDTHS = (0.4, 1.0)
 """Narrowest and widest motorcycle with its rider's legs [m]."""
 
-ALONE = 1.25
+_ALONE = 1.25
 """How far from a motorcycle's middle nothing else has an edge as strong as its own [m]: of a car, something has."""
 
-NARROWER = 1.5
+_NARROWER = 1.5
 """Factor by which a motorcycle must stand out more than the wider vehicle that might be there instead [-]."""
 
 ASIDE = 3.5
 """Farthest that a vehicle's middle is looked for next to the own axis [m]."""
 
-USUAL_ASIDE = 1.2
+_USUAL_ASIDE = 1.2
 """Standard deviation of that offset [m]: place in the lane, heading of the own vehicle, bends."""
 
 BODY = (0.25, 0.95)
 """Heights between which sides of all vehicles are upright [m]."""
 
-SMALLEST = 4.0
+_SMALLEST = 4.0
 """Least width of the widest vehicle for anything to be looked for [px]."""
 
-LEAST_EDGE = 4.5
+_LEAST_EDGE = 4.5
 """Least step across either side of a vehicle, in standard deviations of the step's noise [-]."""
 
-CLUTTER = 6.0
+_CLUTTER = 6.0
 """Least step across either side of a vehicle, in medians of the steps between all columns [-]."""
 
-LEAST_STEP = 0.15
+_LEAST_STEP = 0.15
 """Least noise of a step, for instance by rounding [linear grey levels]."""
 
 SMOOTHING = (0.00962006, 0.2054237, 0.56991248, 0.2054237, 0.00962006)
@@ -51,7 +51,7 @@ REACH, STANDS_OUT = math.radians(0.3), 2.5
 """How far from where the calibration has it the foot is looked for [rad], and the least step there over the usual one;
 where none stands out so, the calibration says more [-]."""
 
-TYRES = 0.12
+_TYRES = 0.12
 """Share of a vehicle's width at either side in which the foot is searched [-]: between its wheels bright road shows."""
 
 
@@ -75,7 +75,7 @@ def search_window(camera: Camera, distance: float) -> tuple[slice, slice] | None
     middle, aside = camera.principal_point[0], (ASIDE + 1.6) * scale
     rows = max(math.floor(foot - 2.4 * scale - pitch), 0), min(math.ceil(foot + 0.2 * scale + pitch) + 1, camera.height)
     cols = max(math.floor(middle - aside), 0), min(math.ceil(middle + aside) + 1, camera.width)
-    if rows[1] - rows[0] < 8 or cols[1] - cols[0] < 16 or foot >= camera.height or WIDTHS[1] * scale < SMALLEST:
+    if rows[1] - rows[0] < 8 or cols[1] - cols[0] < 16 or foot >= camera.height or WIDTHS[1] * scale < _SMALLEST:
         return None
     return slice(*rows), slice(*cols)
 
@@ -103,7 +103,7 @@ def localise_rear(
         return None
     left, right = pair
     between = luminance[:, math.ceil(left) + 1 : math.floor(right)]
-    tyre = max(round(TYRES * (right - left)), 1)
+    tyre = max(round(_TYRES * (right - left)), 1)
     foot, evidence = _refined_foot(np.hstack([between[:, :tyre], between[:, -tyre:]]), foot, camera, noise)
     return RearBox(0.5 * (left + right) + origin[0], foot + origin[1], right - left, evidence)
 
@@ -124,17 +124,17 @@ def upright_steps(body: NDArray[np.float32], noise: float) -> tuple[Floats, floa
     # The median down the rows keeps what is upright; marks of the road, which run aslant, drop out.
     step = np.asarray(np.median(np.gradient(smooth, axis=1), axis=0), np.float64)
     # Blur, difference and median leave half of a pixel's noise in one row, and what the road's texture adds.
-    by_noise = LEAST_EDGE * max(0.5 * noise, LEAST_STEP) / math.sqrt(body.shape[0])
-    return step, max(by_noise, CLUTTER * float(np.median(np.abs(step))))
+    by_noise = _LEAST_EDGE * max(0.5 * noise, _LEAST_STEP) / math.sqrt(body.shape[0])
+    return step, max(by_noise, _CLUTTER * float(np.median(np.abs(step))))
 
 
 def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:
     step, floor = upright_steps(body, noise)
     wide = _pair(body, step, WIDTHS, scale, axis, floor)
-    narrow = _pair(body, step, NARROW_WIDTHS, scale, axis, floor)
+    narrow = _pair(body, step, _NARROW_WIDTHS, scale, axis, floor)
     if narrow is not None:
         narrow = _alone(narrow, step, scale, floor)
-    if narrow is not None and (wide is None or narrow[0] > NARROWER * wide[0]):
+    if narrow is not None and (wide is None or narrow[0] > _NARROWER * wide[0]):
         wide = narrow
     return (
         None if wide is None else (wide[1] + vertex(-np.abs(step), wide[1]), wide[2] + vertex(-np.abs(step), wide[2]))
@@ -152,7 +152,7 @@ def _pair(
         # A rear is darker than what is next to it on both sides, or brighter on both.
         strength = np.where(first * second < 0, np.minimum(np.abs(first), np.abs(second)), 0.0)
         middle = np.arange(strength.size) + 0.5 * width
-        usual = np.exp(-0.5 * ((middle - axis) / (USUAL_ASIDE * scale)) ** 2)
+        usual = np.exp(-0.5 * ((middle - axis) / (_USUAL_ASIDE * scale)) ** 2)
         score = np.where(np.abs(middle - axis) <= ASIDE * scale, strength * usual, 0.0)
         best = int(np.argmax(score))
         if strength[best] > floor:
@@ -166,7 +166,7 @@ def _pair(
 def _alone(pair: tuple[float, int, int], step: Floats, scale: float, floor: float) -> tuple[float, int, int] | None:
     """The pair, weaker by the strongest edge about it; None if that leaves nothing."""
     score, left, right = pair
-    reach = ALONE * scale - 0.5 * (right - left)
+    reach = _ALONE * scale - 0.5 * (right - left)
     gap = max(round(0.12 * scale), 2)
     before = np.abs(step[max(math.floor(left - reach), 0) : max(left - gap + 1, 0)])
     behind = np.abs(step[right + gap : max(math.ceil(right + reach), 0) + 1])
@@ -191,7 +191,7 @@ def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise
     rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
     step = np.gradient(rows)
     # What the assumed pitch says counts as much as a step does that stands out of the noise and of the other steps.
-    other = max(noise / math.sqrt(2.0 * strip.shape[1]), float(np.median(np.abs(step))), LEAST_STEP)
+    other = max(noise / math.sqrt(2.0 * strip.shape[1]), float(np.median(np.abs(step))), _LEAST_STEP)
     at = (np.arange(step.size) + first - 1 - foot) / (0.5 * reach)
     evidence = np.log1p((np.maximum(step, 0.0) / other) ** 2) - 0.5 * at**2
     best = int(np.argmax(evidence[1:-1])) + 1

@@ -22,35 +22,35 @@ from fogsim.vision.vehicle.template_matching import INDEPENDENT, match_cost, ver
 
 Floats = NDArray[np.float64]
 
-STEPS = 5
+_STEPS = 5
 """Gauss–Newton steps of a registration."""
 
-NUDGE, RESIZE = 0.05, 0.01
+_NUDGE, _RESIZE = 0.05, 0.01
 """Steps of the numerical derivatives by the position [px] and by the logarithm of the scale [-]."""
 
-OUTLIER = 4.0
+_OUTLIER = 4.0
 """Residual beyond which a pixel shows something that has changed (a lit lamp), in robust standard deviations [-]."""
 
-OWN_SHARE, EDGE_SHARE = 0.25, 0.5
+_OWN_SHARE, _EDGE_SHARE = 0.25, 0.5
 """What a pixel's residual may be next to that: shares of its own contrast and of the change to its neighbours (half a
 pixel of misplacement), so that small bright things that carry the contrast are not taken for changes [-]."""
 
-SATURATED = 250.0
+_SATURATED = 250.0
 """Luminance that is clipped, or so near that noise is [linear grey levels]."""
 
-SURE = 7.0
+_SURE = 7.0
 """Slope in its standard deviations from which a placement is believed [-]."""
 
 OTHER = 0.2
 """Share of a far picture's variance that the near one does not explain beyond which its detail is another's [-]."""
 
-NOISE_SHARE = 0.3
+_NOISE_SHARE = 0.3
 """Relative standard deviation of the assumed noise's power, which is taken out of slopes [-]."""
 
-LEAST_PIXELS = 24
+_LEAST_PIXELS = 24
 """Fewest pixels that a regression is made of."""
 
-ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
+_ASIDE, _ABOVE, _BELOW = 0.25, 0.15, 0.4
 """Margin of the placed region beyond that part, or beyond the vehicle's sides [m]: its outline fixes the place."""
 
 
@@ -119,13 +119,13 @@ def register(
     at = coarse_placement(whole, far, prior)
     placed = None if at is None else _placed(whole, far, at, prior, noise)
     seen = None if placed is None else _regressed(whole, far, placed, noise)
-    sure = seen is not None and SURE * seen.noise_deviation < seen.slope <= most
+    sure = seen is not None and _SURE * seen.noise_deviation < seen.slope <= most
     found = _regressed(near, far, seen.placement, noise) if seen is not None and sure else None
     return _regressed(near, far, prior.placement, noise) if found is None else found
 
 
 def _placed(near: Patch, far: Patch, at: Placement, prior: PlacementPrior, noise: float) -> Placement | None:
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         grid = pixel_grid(near, far, at)
         step = None if grid is None else _step(near, grid, at, prior, noise)
         if step is None:
@@ -144,12 +144,12 @@ def _regressed(near: Patch, far: Patch, at: Placement, noise: float) -> Regressi
 
 def _line(shown: Floats, far: Floats) -> tuple[NDArray[np.bool_], float, float, float, float] | None:
     """Pixels used, slope, means of near and far, and robust deviation of the residuals."""
-    used = (far < SATURATED) & (shown < SATURATED)
+    used = (far < _SATURATED) & (shown < _SATURATED)
     valid = used.copy()
     down, across = np.gradient(shown)
     change = np.abs(down) + np.abs(across)
     for _ in range(4):
-        if int(used.sum()) < max(LEAST_PIXELS, 0.4 * used.size):
+        if int(used.sum()) < max(_LEAST_PIXELS, 0.4 * used.size):
             return None
         shown_used, far_used = shown[used], far[used]
         near_mean, mean = float(shown_used.mean()), float(far_used.mean())
@@ -160,8 +160,8 @@ def _line(shown: Floats, far: Floats) -> tuple[NDArray[np.bool_], float, float, 
         slope = float((apart * far_used).sum()) / spread
         residual = far - mean - slope * (shown - near_mean)
         scale = max(1.4826 * median(np.abs(residual[valid])), 0.2)
-        own = abs(slope) * (OWN_SHARE * np.abs(shown - near_mean) + EDGE_SHARE * change)
-        kept = valid & (np.abs(residual) <= OUTLIER * scale + own)
+        own = abs(slope) * (_OWN_SHARE * np.abs(shown - near_mean) + _EDGE_SHARE * change)
+        kept = valid & (np.abs(residual) <= _OUTLIER * scale + own)
         if bool((kept == used).all()):
             break
         used = kept
@@ -178,11 +178,11 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
     residual = (grid.far - mean - slope * (shown - near_mean))[used]
     # From either side, so that a mirrored picture is placed alike; only what is moved is computed again.
     sides = (1.0, -1.0)
-    right, left = (matrix_product(rows, column_weights(near, grid, _moved(at, s * NUDGE, 0.0, 0.0)).T) for s in sides)
-    below, above = (matrix_product(shrunk_rows(near, grid, _moved(at, 0.0, s * NUDGE, 0.0)), cols.T) for s in sides)
-    larger, smaller = (downsample_to(near, grid, _moved(at, 0.0, 0.0, s * RESIZE)) for s in sides)
+    right, left = (matrix_product(rows, column_weights(near, grid, _moved(at, s * _NUDGE, 0.0, 0.0)).T) for s in sides)
+    below, above = (matrix_product(shrunk_rows(near, grid, _moved(at, 0.0, s * _NUDGE, 0.0)), cols.T) for s in sides)
+    larger, smaller = (downsample_to(near, grid, _moved(at, 0.0, 0.0, s * _RESIZE)) for s in sides)
     change = (right - left, below - above, larger - smaller)
-    jacobian = np.stack([slope * one[used] for one in change], axis=1) / (2.0 * np.array([NUDGE, NUDGE, RESIZE]))
+    jacobian = np.stack([slope * one[used] for one in change], axis=1) / (2.0 * np.array([_NUDGE, _NUDGE, _RESIZE]))
     # What slope and mean can take up is no displacement.
     jacobian -= jacobian.mean(axis=0)
     apart = shown[used] - shown[used].mean()
@@ -219,7 +219,7 @@ def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Re
         by_noise = max(scale, noise) / math.sqrt(spread - own)
         power = slope**2 * (spread - own) / count
         changed = max(variance - power - noise**2, 0.0) / max(power, 1e-9) + 1.0 - count / used.size
-        changed += NOISE_SHARE * own / (spread - own)
+        changed += _NOISE_SHARE * own / (spread - own)
     return Regression(
         placement=at,
         slope=slope,
@@ -261,9 +261,9 @@ def register_rear(
     Takes `aside`, `pitch` [m].
     """
     cell = common_cell(reference, picture)
-    side = 0.5 * reference.width + ASIDE
+    side = 0.5 * reference.width + _ASIDE
     low, high = reference.heights
-    lateral, height = cell_centres(-side, side, cell, 5), cell_centres(low - BELOW, high + ABOVE, cell, 4)
+    lateral, height = cell_centres(-side, side, cell, 5), cell_centres(low - _BELOW, high + _ABOVE, cell, 4)
     across, up = (max(math.ceil(2.5 * deviation / cell), 1) for deviation in (aside, pitch))
     template, _ = resample(reference, lateral, height, cell)
     beside = (np.abs(lateral) > 0.5 * reference.width) | (height[:, None] < 0.0)
@@ -285,6 +285,6 @@ def register_rear(
 
 def _less_road_beside(contrast: Floats, lateral: Floats, reference: RearPicture) -> Floats:
     """Contrast less that of the road next to the vehicle at the same height: near road fades into far road upwards."""
-    beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * ASIDE
+    beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * _ASIDE
     outer = contrast[:, beside] if beside.any() else contrast[:, [0, -1]]
     return np.asarray(contrast - np.median(outer, axis=1)[:, None], np.float64)

@@ -10,7 +10,7 @@ from fogsim.core.jit import kernel
 
 Floats = NDArray[np.float64]
 
-FLAT = 1e-12
+_FLAT = 1e-12
 """Share of a template's power that a place must have to look like anything [-]."""
 
 INDEPENDENT = 8.0
@@ -74,6 +74,6 @@ def correlations(image: Floats, template: Floats) -> Floats:
                     square[col] += value * value
         for col in range(cols):
             both = (square[col] - total[col] * total[col] / template.size) * power
-            if both > FLAT * power * power:
+            if both > _FLAT * power * power:
                 found[row, col] = cross[col] / math.sqrt(both)
     return found

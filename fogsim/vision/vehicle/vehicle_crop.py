@@ -28,20 +28,20 @@ from fogsim.vision.vehicle.airlight import (
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
 
-MIN_AIRLIGHT = 6.0
+_MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
 MOST_NOISE = 0.1
 """Noise of a sky relative to its luminance beyond which it is none [-]."""
 
-SKY_CORE, SKY_SHARE = 0.08, 0.25
+_SKY_CORE, _SKY_SHARE = 0.08, 0.25
 """Relative half-width of the luminances that count as sky, and how much of the middle of the image above the horizon
 must have them [-]."""
 
-SKY_HEIGHT = 0.06
+_SKY_HEIGHT = 0.06
 """How far above the horizon the airlight is read [rad]; less where the image ends."""
 
-LEAST_WIDTH = 3.0
+_LEAST_WIDTH = 3.0
 """Narrowest vehicle that is looked at [px]."""
 
 
@@ -104,7 +104,7 @@ class VehicleCrop:
     def localise(self) -> RearPicture:
         """Find a vehicle that has not been seen before."""
         window = localise_rear(self.luminance, self.origin, self.camera, self.depth, self.noise)
-        if window is None or window.width < LEAST_WIDTH:
+        if window is None or window.width < _LEAST_WIDTH:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
         return self.picture(RearBox(window.column, self._road_row, window.width), self.scale)
 
@@ -237,21 +237,21 @@ class _DaytimeFrame(NamedTuple):
 def _rows_above(camera: Camera, margin: float) -> slice:
     """Rows in which the airlight is read."""
     bottom = min(max(math.floor(camera.horizon_row - margin), 1), camera.height)
-    return slice(max(bottom - max(math.ceil(SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
+    return slice(max(bottom - max(math.ceil(_SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
 
 
 def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     """Sky by day, or the reason why this is none."""
     pixels, camera, margin, sky = day.pixels, day.camera, day.margin, day.sky
-    if sky is None or sky.luminance < MIN_AIRLIGHT:
+    if sky is None or sky.luminance < _MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
     if sky.saturated > 0.9:
         raise CannotTellError("the sky is saturated")
     rows = _rows_above(camera, margin)
     light = day.luminance_of(rows, slice(camera.width // 6, camera.width - camera.width // 6))
     level = sky.luminance if day.airlight is None else day.airlight.level
-    core = np.abs(light - level) <= SKY_CORE * level + 4.0 * sky.noise
-    if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < SKY_SHARE:
+    core = np.abs(light - level) <= _SKY_CORE * level + 4.0 * sky.noise
+    if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < _SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
     hidden = hidden_at_side(camera.focal_length, depth)
     axis = camera.principal_point[0] - camera.width // 6

@@ -23,22 +23,22 @@ from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
-FARTHEST_FOE = 250.0
+_FARTHEST_FOE = 250.0
 """Foes whose ways to the junction and the driver's add up to more than this do not matter [m]."""
 
-STANDING_REACH = 12.0
+_STANDING_REACH = 12.0
 """A driver who stands looks out for foes up to this distance from where the ways cross [m]."""
 
-ON_JUNCTION = 15.0
+_ON_JUNCTION = 15.0
 """A foe with so much way to where the ways cross, or less, may be on the junction [m]."""
 
-BRAKING = 4.5
+_BRAKING = 4.5
 """SUMO's drivers begin to brake for a foe on the junction where this deceleration is enough [m/s²]."""
 
 MAX_PAUSE = 0.5
 """A driver near a junction looks for foes at least this often [s]."""
 
-PAUSE_IN_DOUBT = 0.2
+_PAUSE_IN_DOUBT = 0.2
 """And for a foe on the way there who may come into sight or get out of it at least this often [s].
 
 For one who may be on the junction, in each step.
@@ -47,10 +47,10 @@ For one who may be on the junction, in each step.
 ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
 
-LONG_LANE = 150.0
+_LONG_LANE = 150.0
 """On shorter lanes a junction is always near [m]."""
 
-FASTEST_GAIN = 10.0
+_FASTEST_GAIN = 10.0
 """No one is faster by more than this after `ALONG_A_LANE` [m/s]."""
 
 # Of the lamps that others light, on any side of a vehicle.
@@ -92,7 +92,7 @@ class JunctionSight:
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore foes at junctions that they do not see."""
-        if self._certainly_seen >= FARTHEST_FOE:
+        if self._certainly_seen >= _FARTHEST_FOE:
             return
         due = self._due.take()
         if due.gone:
@@ -117,19 +117,19 @@ class JunctionSight:
         With each, when to look for it again [s].
         """
         speed = self._speed(driver)
-        yielding = STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
+        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
         unseen = self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
             return ALONG_A_LANE, {}
         doubtful: dict[str, float] = {}
-        near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * BRAKING))
+        near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * _BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
-            is_there = foe_way <= ON_JUNCTION
+            is_there = foe_way <= _ON_JUNCTION
             # No straight line is longer than a way between the same places.
             if (is_there or (must_yield and way <= yielding)) and (
                 foe in unseen or abs(way) + abs(foe_way) > self._certainly_seen
             ):
-                doubtful[foe] = 0.0 if is_there else PAUSE_IN_DOUBT
+                doubtful[foe] = 0.0 if is_there else _PAUSE_IN_DOUBT
         if unseen and not doubtful:
             self._unseen.decide(driver, {}, self._roster.time)
         return MAX_PAUSE, doubtful
@@ -142,11 +142,11 @@ class JunctionSight:
         length = self._lane_lengths.get(lane)
         if length is None:
             length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
-        if length < LONG_LANE:
+        if length < _LONG_LANE:
             return False
-        fastest = speed + FASTEST_GAIN
-        reach = STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
-        return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * BRAKING))
+        fastest = speed + _FASTEST_GAIN
+        reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
+        return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * _BRAKING))
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)

@@ -22,17 +22,17 @@ from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 LOOK_PERIOD = 0.2
 """Time between two looks at pedestrians [s]."""
 
-FARTHEST_PERSON = 100.0
+_FARTHEST_PERSON = 100.0
 """No one yields to a pedestrian farther away than this [m]."""
 
-CONTRAST = 0.6
+_CONTRAST = 0.6
 """Contrast of a person in everyday clothes to the airlight [-]; FogSim's choice."""
 
-HEAD_LAMP_SHARE = 0.3
+_HEAD_LAMP_SHARE = 0.3
 """Light that clothes send back over that of an unlit vehicle with its reflectors [-]: at night a person is seen at 30 m
 where such a vehicle is at 55 m; FogSim's choice."""
 
-BODY_MIDDLE = 1.0
+_BODY_MIDDLE = 1.0
 """Height of eyes and persons above the road [m]."""
 
 HEAD = 1.65
@@ -64,7 +64,7 @@ class PedestrianSight:
         self._person_position = getter(api, "person", "getPosition3D")
         self._person_count = getter(api, "person", "getIDCount")
         self._unseen = UnseenFoes(api, f"{session} {_OWN_PART}", sight.reaction_time)
-        self._seen_through_fog = sight.seen_distance(fog.maximum_extinction, CONTRAST, head_lamps=0.0)
+        self._seen_through_fog = sight.seen_distance(fog.maximum_extinction, _CONTRAST, head_lamps=0.0)
         self._certainly_seen = 0.0 if obstructions else self._seen_through_fog
         self._mark = 0
         self._roads: dict[str, tuple[str, ...]] = {}
@@ -74,7 +74,7 @@ class PedestrianSight:
         """Make SUMO's drivers ignore pedestrians that they do not see."""
         self._roster.update()
         now = self._roster.time
-        if self._certainly_seen >= FARTHEST_PERSON or now < self._next:
+        if self._certainly_seen >= _FARTHEST_PERSON or now < self._next:
             return
         self._next = now + LOOK_PERIOD
         new, self._mark = self._roster.entered_since(self._mark)
@@ -126,11 +126,11 @@ class PedestrianSight:
         """Those who are near enough to be yielded to, and far enough to be out of sight, or have been."""
         here, unseen = self._position(driver), self._unseen.of(driver)
         distances = {person: math.dist(here, self._person_position(person)) for person in persons}
-        return [p for p, d in distances.items() if p in unseen or self._certainly_seen < d <= FARTHEST_PERSON]
+        return [p for p, d in distances.items() if p in unseen or self._certainly_seen < d <= _FARTHEST_PERSON]
 
     def _sees(self, driver: str, person: str, own_lamps: OwnLamps) -> bool:
         (x, y, z), (end_x, end_y, end_z) = self._position(driver), self._person_position(person)
-        eyes, end = (x, y, z + BODY_MIDDLE), (end_x, end_y, end_z + BODY_MIDDLE)
+        eyes, end = (x, y, z + _BODY_MIDDLE), (end_x, end_y, end_z + _BODY_MIDDLE)
         distance = math.dist(eyes, end)
         if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + HEAD)]])[0]:
             return False
@@ -138,8 +138,8 @@ class PedestrianSight:
             return True
         lamps = head_lamp_light(own_lamps.get(driver, int(OTHERS_LAMPS)))
         bearing = math.atan2(end_y - y, end_x - x) - math.radians(90.0 - self._api.vehicle.getAngle(driver))
-        share = lamps * HEAD_LAMP_SHARE * head_lamp_share(math.remainder(bearing, math.tau))
-        limit = self._sight.depth_limit(distance, CONTRAST, 0.0, share)
+        share = lamps * _HEAD_LAMP_SHARE * head_lamp_share(math.remainder(bearing, math.tau))
+        limit = self._sight.depth_limit(distance, _CONTRAST, 0.0, share)
         return float(self._fog.optical_depth(eyes, end)) <= limit
 
     def release(self) -> None:

@@ -23,10 +23,10 @@ from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
-SIGNAL_HEIGHT = 2.0
+_SIGNAL_HEIGHT = 2.0
 """Height above the road of the line of sight: between eyes and signal heads [m]."""
 
-EYE_HEIGHT, HEAD_HEIGHT = 1.2, 3.0
+_EYE_HEIGHT, _HEAD_HEIGHT = 1.2, 3.0
 """Heights above the road from which and at which a light is looked for past what stands next to the road [m]."""
 
 REACH = 250.0
@@ -35,13 +35,13 @@ REACH = 250.0
 MAX_PAUSE = 0.5
 """A driver within reach of a light looks at least this often [s]."""
 
-PAUSE_IN_DOUBT = 0.2
+_PAUSE_IN_DOUBT = 0.2
 """And one to whom uneven fog may show it at any time, at least this often [s]."""
 
 FAR_PAUSE = 2.0
 """And one who is not, at least this often [s]."""
 
-FASTEST_GAIN = 10.0
+_FASTEST_GAIN = 10.0
 """No one is faster by more than this after `FAR_PAUSE` [m/s]."""
 
 _OBEY_LIGHTS = 16
@@ -128,11 +128,11 @@ class SignalSight:
             self._unseen[driver] = _NOT_SEEN
             self._pass_lights(driver)
         certain = way - self._certainly_hidden
-        return self._time_for(driver, certain) if certain > 0.0 else PAUSE_IN_DOUBT
+        return self._time_for(driver, certain) if certain > 0.0 else _PAUSE_IN_DOUBT
 
     def _time_for(self, driver: str, way: float) -> float:
         """What a driver needs for a way at least, if it is less than `FAR_PAUSE` [s]."""
-        return min(way / (float(self._speed(driver)) + FASTEST_GAIN), FAR_PAUSE)
+        return min(way / (float(self._speed(driver)) + _FASTEST_GAIN), FAR_PAUSE)
 
     def _notice(self, driver: str, light: Light) -> float:
         if driver not in self._unseen:
@@ -157,12 +157,12 @@ class SignalSight:
             return False
         x, y, z = self._api.vehicle.getPosition3D(driver)
         end_x, end_y = self._stop_line(light[0], light[1])
-        if self._obstructions.hide([(x, y, z + EYE_HEIGHT)], [[(end_x, end_y, z + HEAD_HEIGHT)]])[0]:
+        if self._obstructions.hide([(x, y, z + _EYE_HEIGHT)], [[(end_x, end_y, z + _HEAD_HEIGHT)]])[0]:
             return False
         straight = max(math.hypot(end_x - x, end_y - y), 0.1)
         # The light is as far as the way to it is long, as leaders are.
         along = np.array([end_x - x, end_y - y, 0.0]) * (way / straight)
-        eyes = np.array([x, y, z + SIGNAL_HEIGHT])
+        eyes = np.array([x, y, z + _SIGNAL_HEIGHT])
         depth = float(self._fog.optical_depth(eyes, eyes + along))
         return depth <= self._sight.depth_limit(way, 0.0, SIGNAL_INTENSITY, head_lamps=0.0)
 

@@ -52,6 +52,8 @@ _LOOKS_AGAIN = 0.05
 _NEWS_PERIOD = 10.0
 """Time between two lines on what has been compiled [s]."""
 
+_FOGSIM = __package__.partition(".")[0]
+
 
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
     """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
@@ -81,7 +83,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
     def on_end(self, compiling: Any) -> None:
         """Count a compiled kernel, and report the count now and then."""
         self._depth -= 1
-        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{_FOGSIM}."):
             now = self._clock()
             self._compiled += 1
             self._spent += now - self._started
@@ -104,7 +106,7 @@ class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
 
     def on_start(self, compiling: Any) -> None:
         """Begin at the outermost kernel."""
-        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{_FOGSIM}."):
             self._collects = gc.isenabled()
             gc.disable()
             self._end = begin_economy()
@@ -120,7 +122,7 @@ class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
                 gc.enable()
 
 
-event.register("numba:compile", Announcement(logging.getLogger(__package__).warning))
+event.register("numba:compile", Announcement(logging.getLogger(_FOGSIM).warning))
 event.register("numba:compile", CompileSpeedup())
 
 
@@ -235,7 +237,7 @@ def _compiled_in(function: FunctionType, seen: set[FunctionType]) -> Iterator[st
         if called is not None and called not in seen:
             yield _digest(called.__code__.co_filename)
             yield from _compiled_in(called, seen)
-        elif isinstance(value, ModuleType) and value.__name__.startswith(f"{__package__}."):
+        elif isinstance(value, ModuleType) and value.__name__.startswith(f"{_FOGSIM}."):
             yield _digest(str(value.__file__))
         elif isinstance(value, np.ndarray):
             yield f"{name} {value.dtype} {value.tobytes().hex()}"

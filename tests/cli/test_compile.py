@@ -8,8 +8,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from fogsim import Camera, Frame, Observation, jit
+from fogsim import Camera, Frame, Observation
 from fogsim.cli.compile import _foggy_road
+from fogsim.core import jit
 from fogsim.estimators import ESTIMATORS
 
 COMPILE = """

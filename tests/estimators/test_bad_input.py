@@ -200,13 +200,13 @@ WRONG_IMAGES = {
     "int64": (GREY.astype(np.int64), "an array of uint8 .*, got an array of int64"),
     "16 bits": (GREY.astype(np.uint16), "8 bits must have dtype uint8.*got uint16"),
     "objects": (GREY.astype(object), "an array of uint8 .*, got an array of object"),
-    "empty": (np.zeros((0, 0), np.uint8), "0×0 pixels.*told as 320×240"),
+    "empty": (np.zeros((0, 0), np.uint8), "0×0 pixels.*its camera has 320×240"),
     "one row": (GREY[0], r"shape \(rows, cols\) or \(rows, cols, 3\), got \(320,\)"),
     "two channels": (np.dstack([GREY] * 2), r"got \(240, 320, 2\)"),
     "opacity": (np.dstack([GREY] * 4), r"got \(240, 320, 4\)"),
     "four axes": (GREY[None, :, :, None], r"got \(1, 240, 320, 1\)"),
-    "turned": (GREY.T, "240×320 pixels.*told as 320×240"),
-    "half": (GREY[::2, ::2], "160×120 pixels.*told as 320×240"),
+    "turned": (GREY.T, "240×320 pixels.*its camera has 320×240"),
+    "half": (GREY[::2, ::2], "160×120 pixels.*its camera has 320×240"),
 }
 
 

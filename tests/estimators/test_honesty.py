@@ -37,7 +37,7 @@ from fogsim.values import (
 HONEST = ("fogsim.estimators", "fogsim.vision")
 """What estimators are made of."""
 
-TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "ego", "loop")
+TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "simulation")
 """Modules of fogsim that know the truth."""
 
 UNSEEN = {"Truth", "Step", "View", "FogField", "FogBank", "FogChange", "FogPatches", "CameraPose", "TrafficState"} | {

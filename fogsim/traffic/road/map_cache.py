@@ -27,7 +27,7 @@ from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign,
 
 _WORTHWHILE = 1_000_000  # bytes of a network's file, above which reading takes a fifth of a second
 _MOST_FILES = 16  # of the cache; the oldest are removed
-_MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py", "signal_heads.py")
+_MADE_BY = ("limit_signs.py", "map_cache.py", "network.py", "road_map.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 

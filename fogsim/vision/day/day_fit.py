@@ -145,6 +145,10 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | 
         return _weighed(_ended(rows, 1 + int(np.argmax(of_light[_ALL.size :]))), camera, horizon, earlier)
     kept = np.flatnonzero(of_light[: _ALL.size] > of_light.max() - _SUITS)
     some, chosen = np.logaddexp.reduce(whole, axis=1), np.zeros(grid.cells.shape[:2], np.bool_)
+    others = _OTHERS[grid.responses[_OTHERS[:, 0]] & grid.surfaces[_OTHERS[:, 1]]]
+    if len(others):
+        first = np.logaddexp.reduce(grid.evidence(grid.cells[1, ::2], others, kept) + grid.lights[kept], axis=2)
+        some = np.maximum(some, first.max(axis=1) + grid.likely[::2])
     chosen[:, ::2] = some > some.max() - _FIRST_WORTHWHILE
     return _posterior(grid, _wider(chosen, 2), kept, none)
 
@@ -245,6 +249,9 @@ _LOG_SURFACES = np.log(SURFACES.chance)
 
 _USUAL = np.zeros((1, 2), np.int64)
 """The stated response and the usual surface."""
+
+_OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
+"""Responses and surfaces of a first look: what the usual ones do not explain may need another visibility."""
 
 _HARDLY, _LIKELY = 0.03, 2
 """Probability below which a surface is not tried in later images of a drive [-], and how many responses are, in

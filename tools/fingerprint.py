@@ -196,7 +196,7 @@ def estimates() -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         for step in fogsim.run(scenario, seed=2):
             Image.fromarray(step.observation.frame.image).save(Path(folder, f"{step.index:03}.png"))
-        return _command("estimate", folder, "--method", "all", "--json").splitlines()
+        return _command("estimate", folder, "--method", "all", "--json").replace(folder, "").splitlines()
 
 
 def reproduced() -> list[str]:

@@ -130,7 +130,7 @@ import numpy as np
 import fogsim.core.jit
 from fogsim.core.compiling.code_libraries import LinkedLibrary
 
-fogsim.core.jit.__package__ = "scratch"
+fogsim.core.jit._FOGSIM = "scratch"
 
 @fogsim.core.jit.kernel
 def root(x):

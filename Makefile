@@ -128,7 +128,8 @@ $(VENV)/.installed-ci: pyproject.toml | check
 ci: $(VENV)/.installed-ci ## Everything that .ci/run checks
 	@$(MAKE) --jobs=2 --output-sync=target types lint contracts $(VENV)/.compiled
 	@$(MAKE) test
-	@$(MAKE) --jobs=2 --output-sync=target notebooks browse cluster
+	@$(MAKE) notebooks
+	@$(MAKE) --jobs=2 --output-sync=target browse cluster
 
 tables: $(VENV)/.installed-test ## Measure the docs' tables whose code has changed (resumable); STUDIES=1: policy studies; TABLES="belief …"
 	@$(BIN)/python docs/rerun_tables.py $(TABLES) $(if $(STUDIES),--studies)

@@ -42,9 +42,6 @@ _FIRST_WORTHWHILE, _WORTHWHILE = 14.0, 10.0
 """Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
 under other responses [-]."""
 
-_MANY = 20
-"""Visibilities of a horizon from which on other responses are tried at every second one: no fog shows."""
-
 _FINE = 0.01
 """Step of the posterior [ln m]."""
 
@@ -168,12 +165,7 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
     of_surface = np.logaddexp.reduce(each, axis=(0, 2))
     suit = tried[of_surface > of_surface.max() - _SUITS, 1]
     more = np.array([(r, int(s)) for s in suit for r in np.flatnonzero(grid.responses) if r])
-    # What another response changes, changes little from one visibility to the next.
-    half = _thinned(still)
-    changed = grid.hypotheses(half, more, kept, prior) - each[half[still]][:, np.searchsorted(tried[:, 1], more[:, 1])]
-    each = np.concatenate(
-        [each, each[:, np.searchsorted(tried[:, 1], more[:, 1])] + _between(half, still, changed)], axis=1
-    )
+    each = np.concatenate([each, grid.hypotheses(still, more, kept, prior)], axis=1)
     pairs, rows = np.concatenate([tried, more]), grid.rows
     chance = np.logaddexp.reduce(each, axis=2)
     fine, posterior, evidence = _interpolated(grid.logs, still, chance)
@@ -192,28 +184,6 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
         obstacle=grid.obstacle,
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
-
-
-def _thinned(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(h, v) bool: cells without every second visibility whose neighbours are among them, where they are many."""
-    some = cells.copy()
-    inner = cells[:, :-2:2] & cells[:, 2::2] & (cells.sum(axis=1, keepdims=True) > _MANY)
-    some[:, 1 : 2 * inner.shape[1] : 2] &= ~inner
-    return some
-
-
-def _between(known: NDArray[np.bool_], cells: NDArray[np.bool_], values: Floats) -> Floats:
-    """Values of all cells, linear between the visibilities at which they are known (`values` (known, …))."""
-    out, start = [], 0
-    for here, wanted in zip(known, cells, strict=True):
-        at = np.flatnonzero(here)
-        if at.size:
-            own, start = values[start : start + at.size], start + at.size
-            place = np.interp(np.flatnonzero(wanted), at, np.arange(at.size))
-            low = np.minimum(place.astype(np.int64), max(at.size - 2, 0))
-            part = (place - low).reshape(-1, *(1,) * (values.ndim - 1))
-            out.append((1.0 - part) * own[low] + part * own[np.minimum(low + 1, at.size - 1)])
-    return np.concatenate(out)
 
 
 def _left(earlier: DayFit | None, count: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -114,14 +114,22 @@ def without_road() -> dict[str, np.ndarray]:
     lit = 120.0 * np.clip((below - 2) / 124.0, 0.0, 1.0) ** 2 + 2.0
     cells = np.indices((ROWS, COLS))
     return {
+        "black": bytes_of(np.zeros(1)),
+        "grey": bytes_of(np.full(1, 128)),
         "white": bytes_of(np.full(1, 255)),
+        "noise": rng.integers(0, 256, (ROWS, COLS), dtype=np.uint8),
         "colour noise": rng.integers(0, 256, (ROWS, COLS, 3), dtype=np.uint8),
-        **{f"checkerboard of {size} px": bytes_of((cells // size).sum(axis=0) % 2 * 255) for size in (12, 60)},
+        **{
+            f"checkerboard of {size} px": bytes_of((cells // size).sum(axis=0) % 2 * 255) for size in (1, 7, 12, 24, 60)
+        },
         "upright stripes": bytes_of(cells[1] // 40 % 2 * 255),
+        "ramp": bytes_of(200.0 - 140.0 * row / ROWS),
         "faint ramp with noise": bytes_of(150.0 - 50.0 * row / ROWS + noise),
         "ramp below a bright sky": bytes_of(240.0 - np.clip(below, 0, None)),
         "slanting ramp": bytes_of(180.0 - 160.0 * (cells[0] / ROWS + cells[1] / COLS) / 2.0),
         "night": bytes_of(lit + noise),
+        "forest": bytes_of(forest),
+        "sky alone": bytes_of(150.0 + 60.0 * row / ROWS + noise),
         "forest before the sky": bytes_of(np.where(below > -50, forest, 200.0)),
         "snow, brighter than the sky": bytes_of(np.where(below > 0, 230.0, 150.0) + noise),
         "wall": bytes_of(np.where(below > -50, 70.0, 200.0) + noise),

@@ -5,9 +5,17 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from fogsim.conditions import Comparison, Condition, History, Moment, Watch
-from fogsim.conditions.logic import compared
-from fogsim.expectations.clauses import Always, Clause, Eventually, Happened, MetricCheck, Whenever
-from fogsim.expectations.finding import Finding, FindingVerdict
+from fogsim.conditions.terms import compared
+from fogsim.expectations.clauses import (
+    Always,
+    Clause,
+    Eventually,
+    Finding,
+    FindingVerdict,
+    Happened,
+    MetricCheck,
+    Whenever,
+)
 from fogsim.values import TrafficStep
 
 _TICK = 1e-6

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.offline.fog_video import FogLayer, elevation_sines
 from fogsim.offline.image_files import (
     DepthMap,
     Pixels,
@@ -14,8 +15,7 @@ from fogsim.offline.image_files import (
     refuse_unwritable_image,
     write_image,
 )
-from fogsim.offline.layered_fog import FogLayer, elevation_sines
-from fogsim.offline.road_plane import RoadPlane
+from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond

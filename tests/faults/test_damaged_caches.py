@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogsim.core.files.cache_entries import keep_newest, read_entry, replace_file, write_entry
 from fogsim.core.files.generated_files import kept_text, write_generated
+from fogsim.core.files.user_cache import keep_newest, read_entry, replace_file, write_entry
 from fogsim.traffic.road import map_cache, network
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.road_map import RoadMap

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from fogsim.offline.layered_fog import FogLayer
-    from fogsim.offline.road_plane import RoadPlane
+    from fogsim.offline.fog_video import FogLayer
+    from fogsim.offline.rectification import RoadPlane
 
 
 def fog_command(
@@ -89,7 +89,7 @@ def fog_command(
 
 
 def _layer(albedo: float | None, height: float | None) -> "FogLayer | None":
-    from fogsim.offline.layered_fog import FogLayer
+    from fogsim.offline.fog_video import FogLayer
 
     if albedo is None:
         if height is not None:
@@ -132,7 +132,7 @@ def _fog_depth(
 
 def _road(image: Path, camera: Path | None, geometry: dict[str, float | None]) -> "RoadPlane":
     from fogsim.offline.camera_file import load_calibration
-    from fogsim.offline.road_plane import RoadPlane, calibration_from_options
+    from fogsim.offline.rectification import RoadPlane, calibration_from_options
 
     given = {option: value for option, value in geometry.items() if value is not None}
     if camera is not None:

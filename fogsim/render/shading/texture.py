@@ -1,5 +1,6 @@
 """Texture of the ground along a row of pixels, by where on the ground they look."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -7,10 +8,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.render.lens import Lens
+from fogsim.render.projection import Lens
 from fogsim.render.shading.layout import Array, Numbers
-from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
 from fogsim.render.vectors import Vector
+
+GRAIN = 256
+"""Side of the tile of independent numbers."""
+
+SMOOTH = 128
+"""Side of the tile of smooth noise."""
+
+PER_CELL = 8
+"""Numbers of the smooth tile from one random value to the next."""
+
+
+class Noise(NamedTuple):
+    """Tiles; the squares of a tile lie row after row."""
+
+    grain: NDArray[np.float32]  # Independent numbers
+    smooth: NDArray[np.float32]  # Value noise
+
+
+@functools.cache
+def tiles() -> Noise:
+    """Make the tiles, the same ones always."""
+    rng = np.random.default_rng(20260)
+    grain = rng.uniform(-1.0, 1.0, (GRAIN, GRAIN))
+    cells = rng.uniform(-1.0, 1.0, (SMOOTH // PER_CELL, SMOOTH // PER_CELL))
+    share = np.arange(SMOOTH) % PER_CELL / PER_CELL
+    weight, low = share * share * (3.0 - 2.0 * share), np.arange(SMOOTH) // PER_CELL
+    high = (low + 1) % len(cells)
+    rows = cells[low] * (1.0 - weight[:, None]) + cells[high] * weight[:, None]
+    smooth = rows[:, low] * (1.0 - weight) + rows[:, high] * weight
+    return Noise(_normalised(grain), _normalised(smooth))
+
+
+def _normalised(tile: NDArray[np.float64]) -> NDArray[np.float32]:
+    centred = tile - tile.mean()
+    flat: NDArray[np.float32] = (centred / centred.std()).astype(np.float32).ravel()
+    flat.flags.writeable = False
+    return flat
+
 
 ASPHALT = ((0.01, 0.25, 3.0, 12.0), (0.12, 0.025, 0.012, 0.02))
 """Sides of the squares of noise [m] and deviations of reflectance: grain, mottling, patches and large patches."""

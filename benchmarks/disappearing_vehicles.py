@@ -30,7 +30,7 @@ from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
 from fogsim.estimators.protocol import Estimator
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015 import FASTER, OWN_SPEED, drawn, fogged
+from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, drawn, fogged
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation
 
 VISIBILITIES = (60.0, 100.0, 150.0, 250.0)

@@ -26,7 +26,7 @@ from harness import Row, columns, mean, median, parse_options, publish, quantile
 from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015 import FASTER, OWN_SPEED, drawn, fogged
+from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, drawn, fogged
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 from fogsim.values.estimate import NORMAL_90_PERCENT

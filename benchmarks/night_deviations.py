@@ -24,7 +24,7 @@ from fogsim.atmosphere.lamps.phase_function import Droplets, henyey_greenstein, 
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
-from fogsim.reproduce.night.gallen2014 import limits
+from fogsim.reproduce.night.limits import limits
 from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam

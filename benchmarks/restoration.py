@@ -38,7 +38,7 @@ from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import Estimator, make
 from fogsim.recorders.style import font
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015 import Scene, drawn, fogged
+from fogsim.reproduce.huang2015_chase import Scene, drawn, fogged
 from fogsim.restoration import restore_contrast
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, Observation, Response

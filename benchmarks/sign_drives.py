@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.calibration.sign_calibration import PoseNoise, SignDrive, observed
+from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed
 from fogsim.values import Camera, Observation, Response, Sign
 
 CAMERA = Camera(560, 260, 1400.0, (90.0, 190.0), 1.38, math.radians(0.5), response=Response.SRGB)

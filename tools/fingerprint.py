@@ -37,7 +37,7 @@ from fogsim.estimators import ESTIMATORS, make
 from fogsim.metrics import RunMetrics
 from fogsim.recorders import write_json
 from fogsim.render import make_renderer
-from fogsim.reproduce.huang2015 import Chase
+from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.scenario import build
 from fogsim.scene import SIGN_KINDS, build_scene
 from fogsim.traffic.road.network import read_net, road_network

@@ -135,7 +135,7 @@ def entries() -> dict[str, Entry]:
     from fogsim.offline.input_paths import find_source  # noqa: PLC0415
     from fogsim.scenario.loading import load_cases, load_scenario  # noqa: PLC0415
     from fogsim.study import load_study  # noqa: PLC0415
-    from fogsim.study.directory import STUDY_RUN, read_run  # noqa: PLC0415
+    from fogsim.study.run_file import STUDY_RUN, read_run  # noqa: PLC0415
     from fogsim.testing import collect  # noqa: PLC0415
     from fogsim.traffic.road.configuration import configured_files, ignored_options  # noqa: PLC0415
     from fogsim.traffic.road.netconvert import opendrive_net  # noqa: PLC0415

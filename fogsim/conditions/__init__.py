@@ -12,9 +12,9 @@ from fogsim.conditions.possibility import (
     vehicles_in,
     vehicles_of,
 )
+from fogsim.conditions.signal import Kind, Need, Place, Signal
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Quantity, Reference, signals_of
-from fogsim.conditions.terms import Kind, Need, Place, Signal
 from fogsim.conditions.watching import Watch, shown_value
 
 __all__ = [

@@ -5,6 +5,7 @@ import re
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+from fogsim.conditions.signal import Kind, Place, Signal
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
     AllOf,
@@ -21,7 +22,6 @@ from fogsim.conditions.syntax import (
     Reference,
     Word,
 )
-from fogsim.conditions.terms import Kind, Place, Signal
 from fogsim.errors import shown, suggest
 from fogsim.units.quantities import example_of, parse_quantity
 

@@ -5,7 +5,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from fogsim.conditions.logic import combined, compared
 from fogsim.conditions.moment import EGO
+from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Value
 from fogsim.conditions.signals import NO_LEADER, SIGNALS
 from fogsim.conditions.syntax import (
     Comparison,
@@ -22,7 +24,6 @@ from fogsim.conditions.syntax import (
     parts_of,
     signals_of,
 )
-from fogsim.conditions.terms import Kind, LanePlace, Need, Place, Value, combined, compared
 from fogsim.conditions.watching import shown_value
 from fogsim.errors import shown, suggest
 

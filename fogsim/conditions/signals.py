@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from fogsim.conditions.moment import Body, Moment, body_of, clearance
 from fogsim.conditions.route_places import Extent, gap_between, headway_between, time_to_meet
-from fogsim.conditions.terms import Kind, LanePlace, Need, Place, Signal
+from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.core.registry import Registry
 from fogsim.units import KMH_PER_MPS

@@ -4,7 +4,9 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
+from fogsim.conditions.logic import combined, compared, passed
 from fogsim.conditions.moment import History, Moment
+from fogsim.conditions.signal import LanePlace, Value
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
     Comparison,
@@ -20,7 +22,6 @@ from fogsim.conditions.syntax import (
     parts_of,
     signals_of,
 )
-from fogsim.conditions.terms import LanePlace, Value, combined, compared, passed
 from fogsim.units.quantities import parse_quantity
 from fogsim.values import TrafficStep
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from fogsim.conditions import Comparison, Condition, History, Moment, Watch
-from fogsim.conditions.terms import compared
+from fogsim.conditions.logic import compared
 from fogsim.expectations.clauses import (
     Always,
     Clause,

@@ -9,7 +9,8 @@ import numpy as np
 from fogsim.core.parameters import accepted_parameters
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
-from fogsim.offline.camera_file import EXACT, Calibration, CalibrationDeviations
+from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
+from fogsim.offline.camera_file import Calibration
 from fogsim.offline.drive.road_scale import NightDrive
 from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
 from fogsim.offline.image_files import Pixels

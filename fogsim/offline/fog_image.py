@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.offline.fog_video import FogLayer, elevation_sines
 from fogsim.offline.image_files import (
     DepthMap,
     Pixels,
@@ -15,6 +14,7 @@ from fogsim.offline.image_files import (
     refuse_unwritable_image,
     write_image,
 )
+from fogsim.offline.layered_fog import FogLayer, elevation_sines
 from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera

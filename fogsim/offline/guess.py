@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError
-from fogsim.offline.camera_file import CalibrationDeviations
+from fogsim.offline.calibration_deviations import CalibrationDeviations
 from fogsim.offline.drive.road_scale import RoadMotion
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source

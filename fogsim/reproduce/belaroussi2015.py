@@ -5,14 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogsim.calibration.sign_calibration import (
-    PoseNoise,
-    SignDrive,
-    cropped,
-    measure_operating_range,
-    observed,
-    sign_beside,
-)
+from fogsim.calibration.sign_calibration import cropped, measure_operating_range
+from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed, sign_beside
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation

@@ -15,7 +15,7 @@ from fogsim.estimators import make
 from fogsim.estimators.huang2015_comparison import BODY_HALF_WIDTH, BODY_HEIGHTS
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015 import Chase
+from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 

@@ -17,7 +17,7 @@ from fogsim.scene.polyline import SHORTEST, parallel, true_spans
 from fogsim.scene.road import FAST, free_edges
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, sign_batches, sign_shapes
-from fogsim.scene.solids import building_places, structure_batches, structure_shapes
+from fogsim.scene.structures import building_places, structure_batches, structure_shapes
 from fogsim.scene.terrain import Terrain
 from fogsim.scene.town import person_shapes, signal_posts, signal_shapes
 from fogsim.scene.trees import house_places, house_shapes, houses, shapes_in_use, tree_shapes

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
-from fogsim.study.report import metric_words, signed
 from fogsim.study.table import Row
 
 RESAMPLES = 9_999

@@ -26,7 +26,7 @@ from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.scenario.variation import grid_mistake
-from fogsim.study.report import unknown_metrics
+from fogsim.study.main_metrics import unknown_metrics
 from fogsim.study.table import column_mistake
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
+from fogsim.study.main_metrics import MetricWords, metric_words, signed
 from fogsim.study.plan import Study
-from fogsim.study.report import MetricWords, metric_words, signed
 from fogsim.study.table import Row, rows_of_cells
 
 _EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")

@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 from fogsim.core.files.atomic import write_bytes, write_text
 from fogsim.errors import InputError
 from fogsim.metrics import metric_definitions
-from fogsim.study.directory import Value
-from fogsim.study.report import METHODS_KEY
+from fogsim.study.main_metrics import METHODS_KEY
+from fogsim.study.run_file import Value
 
 Row = Mapping[str, Value]
 """Factors, seed, status, message, and every metric of one run."""

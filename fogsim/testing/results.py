@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from fogsim.expectations import Finding, FindingVerdict
-from fogsim.study.directory import FailedRun, Finite, Metrics, RunRecord, Word, read_run
 from fogsim.study.execution import result_file
 from fogsim.study.plan import StudyRun
+from fogsim.study.run_file import FailedRun, Finite, Metrics, RunRecord, Word, read_run
 
 
 def finding_to_json(finding: Finding) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Running tests: cases in parallel, results in files, and resuming an earlier call."""
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
 from fogsim.testing.judgement import Judgement, Outcome, judge
-from fogsim.testing.page import broken_text, command_text, judgement_text
 from fogsim.testing.results import CaseResult, read_result
 
 Watch = Callable[[int, int], None]
@@ -200,30 +199,3 @@ def last_failed(out: Path) -> dict[Path, list[str]]:
         The directory.
     """
     return {Path(file): cases for file, cases in _read_session(out).not_passed.items()}
-
-
-def annotations(outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> Iterator[str]:
-    """A CI annotation for each clause that did not pass and each file with failed runs, with ``--set`` settings."""
-    for one in outcomes:
-        for judgement in one.judgements:
-            if judgement.outcome is not Outcome.PASSED:
-                told = f"{judgement_text(judgement)}\n{command_text(one.test, judgement.run, settings)}"
-                title = f"{judgement.title}: {judgement.outcome}"
-                yield _command(one.test.lines[judgement.name], title, told)
-        if one.broken:
-            told = f"{broken_text(one.broken)}\n{command_text(one.test, one.broken[0].run, settings)}"
-            yield _command(str(one.test.path), f"{one.test.name}: error", told)
-
-
-def _command(where: str, title: str, message: str) -> str:
-    file, _, line = where.rpartition(":")
-    placed = f"file={_property(file)},line={line}" if line.isdecimal() else f"file={_property(where)}"
-    return f"::error {placed},title={_property(title)}::{_data(message)}"
-
-
-def _data(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-
-
-def _property(text: str) -> str:
-    return _data(text).replace(":", "%3A").replace(",", "%2C")

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fogsim.conditions import SIGNALS, Comparison, Condition, Edge, History, Quantity, Reference, signals_of
+from fogsim.conditions.signal import LanePlace, Value
 from fogsim.conditions.syntax import comparisons_of
-from fogsim.conditions.terms import LanePlace, Value
 from fogsim.study.drawing import INK, MUTED, WIDTH, dress, svg_of
 from fogsim.units.quantities import parse_quantity
 from fogsim.values import TrafficStep

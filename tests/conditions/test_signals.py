@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogsim.conditions import SIGNALS, Watch, parse_condition
-from fogsim.conditions.terms import Kind, LanePlace
+from fogsim.conditions.signal import Kind, LanePlace
 from fogsim.values import (
     Begun,
     Collision,

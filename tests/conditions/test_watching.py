@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogsim.conditions import Condition, Need, RunContent, Watch, condition_mistakes, outcomes, parse_condition
+from fogsim.conditions.logic import combined
+from fogsim.conditions.signal import Kind
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Flag, Held, Not, Quantity, Reference, Word
-from fogsim.conditions.terms import Kind, combined
 from tests.recorders.synthetic import make_step
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.metrics import METRICS, TrafficRunMetrics, metric_definitions
 from fogsim.metrics.safety import DEFAULT_STANDARD
-from fogsim.study.report import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS, metric_words
+from fogsim.study.main_metrics import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS, metric_words
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Cohort
 from tests.metrics.roads import lanes

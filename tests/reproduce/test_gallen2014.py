@@ -7,7 +7,8 @@ import pytest
 from fogsim.atmosphere.visibility.night_visibility import FogKind
 from fogsim.errors import InputError
 from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
-from fogsim.reproduce.night.gallen2014 import Size, limits, reproduce
+from fogsim.reproduce.night.gallen2014 import Size, reproduce
+from fogsim.reproduce.night.limits import limits
 from fogsim.values import Camera, Response
 
 CAMERA = Camera(240, 160, 220.0, (119.5, 79.5), 1.38, pitch=0.035, response=Response.SRGB)

@@ -10,7 +10,8 @@ from fogsim.errors import UnknownNameError
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import Reproduction
 from fogsim.reproduce import huang2015_published as published
-from fogsim.reproduce.huang2015 import CAMERA, SAMPLES, VEHICLE, Chase, reproduce
+from fogsim.reproduce.huang2015 import CAMERA, SAMPLES, VEHICLE, reproduce
+from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.reproduce.huang2015_figures import LAST, TABLES, Case, figures, wanted_cases
 
 

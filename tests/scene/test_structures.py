@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fogsim.scene.solids import structure_batches, structure_shapes
+from fogsim.scene.structures import structure_batches, structure_shapes
 from fogsim.values import Structure, StructureKind
 
 LINE = np.array([[0.0, 100.0, 1.0], [0.0, 150.0, 3.0], [-50.0, 200.0, 3.0]])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from fogsim.offline.fog_video import FogLayer
+    from fogsim.offline.layered_fog import FogLayer
     from fogsim.offline.rectification import RoadPlane
 
 
@@ -89,7 +89,7 @@ def fog_command(
 
 
 def _layer(albedo: float | None, height: float | None) -> "FogLayer | None":
-    from fogsim.offline.fog_video import FogLayer
+    from fogsim.offline.layered_fog import FogLayer
 
     if albedo is None:
         if height is not None:

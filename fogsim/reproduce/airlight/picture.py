@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from fogsim.reproduce.airlight.evaluation import Condition, airlight
+from fogsim.reproduce.airlight.conditions import Condition, airlight
 from fogsim.reproduce.result import Cell
 from fogsim.units import extinction_from_visibility
 from fogsim.values.fog import AIRLIGHT_SHARE

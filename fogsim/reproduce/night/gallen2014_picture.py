@@ -13,7 +13,7 @@ from PIL import Image
 
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import high_beam
-from fogsim.reproduce.night.gallen2014 import veil_luminance
+from fogsim.reproduce.night.limits import veil_luminance
 
 Records = Sequence[Mapping[str, Any]]
 

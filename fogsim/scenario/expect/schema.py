@@ -8,8 +8,8 @@ from typing import Annotated, Self
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
 from fogsim.conditions import EGO, Condition, Limits, mended, outcomes, pointless_parts
+from fogsim.conditions.logic import compared
 from fogsim.conditions.parsing import OPERATORS
-from fogsim.conditions.terms import compared
 from fogsim.errors import shown
 from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse

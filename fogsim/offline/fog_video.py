@@ -17,8 +17,7 @@ from fogsim.offline.fog_image import (
 )
 from fogsim.offline.layered_fog import FogLayer
 from fogsim.offline.rectification import RoadPlane
-from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
-from fogsim.offline.video_source import VideoFile
+from fogsim.offline.video_source import VideoFile, VideoWriter, refuse_unfit_video
 from fogsim.values import Camera
 
 

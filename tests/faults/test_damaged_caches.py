@@ -201,7 +201,7 @@ def test_a_kernel_that_cannot_be_kept_is_compiled(tmp_path: Path, monkeypatch: p
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fogsim.core.compiling.kept_code.write_entry", full)
+    monkeypatch.setattr("fogsim.core.compiling.code_libraries.write_entry", full)
     monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     used = _kernel(tmp_path / "package", "*")
     assert used.use() == (42.0, 1)

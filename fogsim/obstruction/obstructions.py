@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.road import Structure, StructureKind
 
-NUMBERS = 10
+_NUMBERS = 10
 """Numbers of a box."""
 
 _Array = NDArray[np.float64]
@@ -147,17 +147,17 @@ def _bounds(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
 
 
-CLEAR_SIGHT = Obstructions(np.zeros((0, NUMBERS)))
+CLEAR_SIGHT = Obstructions(np.zeros((0, _NUMBERS)))
 """Nothing stands anywhere."""
 
 
 def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
     """Obstructions that structures are."""
-    boxes = [box for one in structures for box in box_rows(one.line, 0.5 * one.width, (one.bottom, one.top))]
+    boxes = [box for one in structures for box in _box_rows(one.line, 0.5 * one.width, (one.bottom, one.top))]
     return Obstructions(np.array(boxes)) if boxes else CLEAR_SIGHT
 
 
-def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
+def _box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
     """A box for each piece of a line that is straight to a centimetre; where two pieces meet, no one looks between.
 
     Takes `line` (n, 3) [m], `half_width` [m], `heights` [m].
@@ -210,7 +210,7 @@ class Tunnel:
 
     def boxes(self) -> NDArray[np.float64]:
         """Its space as boxes (m, 10), in order along its line; see `fogsim.obstruction.obstructions`."""
-        rows = np.array(box_rows(self.line, self.half_width - _SKIN, (-1.0, self.height + _SKIN)))
+        rows = np.array(_box_rows(self.line, self.half_width - _SKIN, (-1.0, self.height + _SKIN)))
         # The first begins, and the last ends, behind the portal.
         rows[0, :3] += _SKIN * np.append(rows[0, 3:5], rows[0, 5])
         rows[0, 6] -= _SKIN

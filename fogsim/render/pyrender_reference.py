@@ -121,7 +121,7 @@ class PyrenderReference:
     def _drawer_of(self, camera: Camera) -> Any:
         """Pyrender's renderer, made again if the camera's size is another than the last one's."""
         if self._drawer is None:
-            self._drawer = offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
+            self._drawer = _offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
         self._drawer.viewport_width, self._drawer.viewport_height = camera.width, camera.height
         return self._drawer
 
@@ -132,7 +132,7 @@ class PyrenderReference:
             drawer.delete()
 
 
-def offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
+def _offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
     """Make pyrender's renderer in this process's context: the end of one of its own would end all others.
 
     Takes `width`, `height` [px].
@@ -216,7 +216,7 @@ def first_picture(scene: "pyrender.Scene", size: tuple[int, int]) -> NDArray[np.
     Returns colours, encoded with 1/2.2 (rows, cols, 3) uint8. Takes `size` [px].
     """
     shared = context()
-    drawer = offscreen_renderer(load_pyrender(), shared, *size)
+    drawer = _offscreen_renderer(load_pyrender(), shared, *size)
     try:
         colour, _ = drawer.render(scene)
     finally:

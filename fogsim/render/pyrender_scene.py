@@ -31,7 +31,7 @@ Corners = NDArray[np.float64]
 _REFLECTANCE, _ALONG, _ACROSS, _HALF_WIDTH, _LINES = slice(6, 9), 9, 10, 11, 12  # columns of a corner
 
 
-def painted_road(road: Mesh) -> Mesh:
+def _painted_road(road: Mesh) -> Mesh:
     """Cut painted lines out of a road, so that they are triangles with a reflectance of their own.
 
     Returns the same surface; no triangles share vertices.
@@ -211,7 +211,7 @@ def still_parts(library: Any, scene: Scene, white: float) -> Iterator[Part]:
     for instance, surface in np.unique(kinds, axis=0).tolist():
         mesh = replace(ground, faces=ground.faces[np.all(kinds == (instance, surface), axis=1)])
         if surface == Surface.ROAD:
-            mesh = painted_road(mesh)
+            mesh = _painted_road(mesh)
             paint = np.all(mesh.reflectance[mesh.faces[:, 0]] == np.float32(LINE_REFLECTANCE), axis=1)
             lines = _mesh(library, replace(mesh, faces=mesh.faces[paint]), np.eye(4)[None], mesh.reflectance)
             yield Part(library.Node("ground paint", mesh=lines), instance, None)

@@ -98,7 +98,7 @@ def shapes_of(
     )
 
 
-def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
+def _copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
     """Measure copies."""
     count = len(shape)
     copies = Copies(shape, place, record, np.empty((count, 3)), np.empty(count), np.empty(count))
@@ -106,7 +106,7 @@ def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copie
     return copies
 
 
-def with_room(copies: Copies, count: int) -> Copies:
+def _with_room(copies: Copies, count: int) -> Copies:
     """Add room for so many more copies."""
 
     def longer(column: NDArray[Any]) -> NDArray[Any]:
@@ -317,7 +317,7 @@ class SceneRenderer:
         faces = np.diff(self._table.first_face)
         self._shapes = shapes_of(self._table.numbers, *self._table.extremes(), faces, plain, LEVELS_OF_DETAIL)
         shape, record, place = self._standing(scene.scenery, ground)
-        self._copies, self._cells = cells_of(copies_of(shape, record, place, self._shapes), _CELL)
+        self._copies, self._cells = cells_of(_copies_of(shape, record, place, self._shapes), _CELL)
         self._still = len(shape)
         self._chosen = _room(0)
 
@@ -374,7 +374,7 @@ class SceneRenderer:
         counts = [len(batch.transforms) for batch in vehicles]
         end = self._still + sum(counts)
         if end > len(self._chosen.mesh):
-            self._copies = with_room(self._copies, end + 64 - len(self._copies.shape))
+            self._copies = _with_room(self._copies, end + 64 - len(self._copies.shape))
             self._chosen = _room(len(self._copies.shape))
         if vehicles:
             record = self._copies.record[self._still : end]

@@ -25,7 +25,7 @@ SPEED, _PERIOD = 20.0, 0.2
 SETBACK = 1.5
 """Distance of the camera behind the front bumper [m]."""
 
-SENSOR = Sensor(saturation_luminance=AIRLIGHT * 255.0 / 200.0)
+_SENSOR = Sensor(saturation_luminance=AIRLIGHT * 255.0 / 200.0)
 """A sensor with noise, exposed such that the airlight has 200 of 255 linear levels."""
 
 _PITCH_ERROR, _PITCH_SWAY = math.radians(0.1), math.radians(0.05)
@@ -122,7 +122,7 @@ def _wear_integral(places: Floats, knots: Floats) -> Floats:
 
 
 def observed(
-    moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator, sensor: Sensor = SENSOR
+    moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator, sensor: Sensor = _SENSOR
 ) -> Observation:
     """What the vehicle observes at an instant in homogeneous fog of a visibility [m]; ``inf`` for clear air."""
     radiance = foggy_radiance(moment.view, moment.pose, camera, extinction_from_visibility(visibility))
@@ -156,10 +156,10 @@ class Setting:
     name: str
     camera: Camera = CAMERA
     wear: float = 0.03
-    sensor: Sensor = SENSOR
+    sensor: Sensor = _SENSOR
 
 
-_NOISY = replace(SENSOR, full_well=SENSOR.full_well / 16.0, read_noise=4.0 * SENSOR.read_noise)
+_NOISY = replace(_SENSOR, full_well=_SENSOR.full_well / 16.0, read_noise=4.0 * _SENSOR.read_noise)
 """Four times the noise."""
 
 SETTINGS = (

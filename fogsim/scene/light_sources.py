@@ -33,8 +33,8 @@ from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVA
 from fogsim.values.scene import FAR, TINY, Batch, Mesh, Scene, Surface
 from fogsim.values.traffic import TrafficState, with_pieces
 
-FORWARD, LEFT, UP, INTENSITY, AREA, FULL_INTENSITY, AXIS = range(3, 10)
-FOUND = 13
+_FORWARD, LEFT, UP, _INTENSITY, _AREA, _FULL_INTENSITY, _AXIS = range(3, 10)
+_FOUND = 13
 """Columns of what is found of a lamp, and their count.
 
 First its place [m]; then the way from it to the eye in the vehicle's axes [m], its intensity toward the eye [cd], its
@@ -138,12 +138,12 @@ def find_lamps(
             one[0] = position[row, 0] + over * cosine - y * sine
             one[1] = position[row, 1] + over * sine + y * cosine
             one[2] = position[row, 2] + x * rise + z * level
-            one[FORWARD], one[LEFT], one[UP] = forward, left, up
+            one[_FORWARD], one[LEFT], one[UP] = forward, left, up
             full = lamps.intensity[lamp] if bits & lamps.signals else 0.0
-            one[FULL_INTENSITY] = full
-            one[INTENSITY] = full * _share_toward(lamps, lamp, forward, left, up) if full > 0.0 else 0.0
-            one[AXIS], one[AXIS + 1], one[AXIS + 2] = sign * level * cosine, sign * level * sine, sign * rise
-            one[AREA] = lamps.area[lamp] * width * height * facing
+            one[_FULL_INTENSITY] = full
+            one[_INTENSITY] = full * _share_toward(lamps, lamp, forward, left, up) if full > 0.0 else 0.0
+            one[_AXIS], one[_AXIS + 1], one[_AXIS + 2] = sign * level * cosine, sign * level * sine, sign * rise
+            one[_AREA] = lamps.area[lamp] * width * height * facing
             which[0, count], which[1, count] = lamp, bits
             count += 1
     return count
@@ -152,10 +152,10 @@ def find_lamps(
 _STREET_LAMP = "street_lamp"
 """Name of the shape of a lamp with its pole."""
 
-HEIGHT = 8.0
+_HEIGHT = 8.0
 """Height of the luminous surface above the pole's foot [m]."""
 
-SIZE = (0.5, 0.22, 0.05)
+_SIZE = (0.5, 0.22, 0.05)
 """Length, width and height of the luminous surface, which bulges below the head [m]."""
 
 _ARM = 1.4  # how far the head's middle lies over the road [m]
@@ -168,12 +168,12 @@ _GLOW = Material((0.55, 0.55, 0.53), Surface.LAMP_STREET)
 
 def street_lamp_shapes() -> dict[str, Mesh]:
     """Shape of a lamp whose arm reaches along y, with its levels of detail."""
-    head = box((-0.16, _ARM - 0.38, HEIGHT), (0.16, _ARM + 0.38, HEIGHT + 0.1), _POLE)
-    (length, width, depth), glow = SIZE, _GLOW
-    lamp = box((-width / 2, _ARM - length / 2, HEIGHT - depth), (width / 2, _ARM + length / 2, HEIGHT), glow)
-    arm = box((-0.04, 0.0, HEIGHT + 0.02), (0.04, _ARM - 0.3, HEIGHT + 0.1), _POLE)
-    near = merge((tube(-0.3, 1.2, 0.09, 0.09, _POLE), tube(1.2, HEIGHT + 0.1, 0.06, 0.06, _POLE), arm, head, lamp))
-    far = merge((tube(-0.3, HEIGHT, 0.06, 0.06, _POLE), head, lamp))
+    head = box((-0.16, _ARM - 0.38, _HEIGHT), (0.16, _ARM + 0.38, _HEIGHT + 0.1), _POLE)
+    (length, width, depth), glow = _SIZE, _GLOW
+    lamp = box((-width / 2, _ARM - length / 2, _HEIGHT - depth), (width / 2, _ARM + length / 2, _HEIGHT), glow)
+    arm = box((-0.04, 0.0, _HEIGHT + 0.02), (0.04, _ARM - 0.3, _HEIGHT + 0.1), _POLE)
+    near = merge((tube(-0.3, 1.2, 0.09, 0.09, _POLE), tube(1.2, _HEIGHT + 0.1, 0.06, 0.06, _POLE), arm, head, lamp))
+    far = merge((tube(-0.3, _HEIGHT, 0.06, 0.06, _POLE), head, lamp))
     return {_STREET_LAMP: near, _STREET_LAMP + FAR: far, _STREET_LAMP + TINY: far}
 
 
@@ -206,7 +206,7 @@ def street_lamp_heads(scene: Scene) -> Points:
     batches = [batch.transforms for batch in scene.scenery if batch.shape == _STREET_LAMP]
     if not batches:
         return np.zeros((0, 3))
-    head = np.array([0.0, _ARM, HEIGHT - SIZE[2] / 2, 1.0])
+    head = np.array([0.0, _ARM, _HEIGHT - _SIZE[2] / 2, 1.0])
     return matrix_product(np.concatenate(batches).astype(np.float64)[:, :3], head)
 
 
@@ -280,7 +280,7 @@ def _of_vehicles(
     table = _lamps()
     numbers = _numbers(body_names(state))
     most = len(numbers) * table.lamps.of_body.shape[1]
-    found, lit = np.empty((most, FOUND)), np.empty((2, most), np.int64)
+    found, lit = np.empty((most, _FOUND)), np.empty((2, most), np.int64)
     turned = np.stack((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
     size = np.stack((state.length, state.width, state.height))
     lamps = state.lamps.astype(np.int64)
@@ -290,14 +290,14 @@ def _of_vehicles(
     vehicles = LampCarriers(position, turned, size, lamps, numbers)
     count = find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
-    _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
-    seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
+    _add_beams(found[:, _INTENSITY], lit[1], (found[:, _FORWARD], found[:, LEFT], found[:, UP]), beams)
+    seen = np.flatnonzero(found[:, _INTENSITY] > 1e-3)
     found, lit = found[seen], lit[:, seen]
     return LightSources(
         np.ascontiguousarray(found[:, :3]),
-        np.ascontiguousarray(found[:, INTENSITY]),
+        np.ascontiguousarray(found[:, _INTENSITY]),
         table.colour[lit[0]],
-        np.ascontiguousarray(found[:, AREA]),
+        np.ascontiguousarray(found[:, _AREA]),
         _lobes(table, found, lit, beams),
     )
 
@@ -305,7 +305,7 @@ def _of_vehicles(
 def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], beams: Mapping[Lamp, Beam]) -> LampLobes:
     """How the lamps found shine: signals by their lobes, head lamps and front fog lamps by what burns of them."""
     kinds, kind = list(SIGNAL_LOBES), table.lamps.lobe[lit[0]]
-    scale = found[:, FULL_INTENSITY] / FULL
+    scale = found[:, _FULL_INTENSITY] / FULL
     burning = lit[1] & sum(map(int, beams))
     for bits in np.unique(burning).tolist():
         if bits:
@@ -313,7 +313,7 @@ def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], be
             kind = np.where(chosen, len(kinds), kind)
             scale = np.where(chosen, 1.0, scale)
             kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & lamp)))
-    return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, AXIS : AXIS + 3]))
+    return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, _AXIS : _AXIS + 3]))
 
 
 @lru_cache(maxsize=16)
@@ -343,7 +343,7 @@ def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSo
     near = np.flatnonzero((distance < _FARTHEST_STREET_LAMP) & (offset[:, 2] < 0))
     down = -offset[near, 2] / distance[near]
     intensity = np.interp(np.arccos(down), STREET_ANGLES, STREET_INTENSITIES)
-    length, width, depth = SIZE
+    length, width, depth = _SIZE
     # The surface bulges below the head, so that it does not vanish when seen from the side.
     area = length * width * down + 0.5 * (length + width) * depth * np.sqrt(1.0 - down**2)
     count = len(near)
@@ -355,7 +355,7 @@ def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> Stree
     """Street lamps as what lights the road (`heads` (n, 3) [m], `sky_illuminance` [lx])."""
     tint = _luminance_one(_WARM)
     colour = (float(tint[0]), float(tint[1]), float(tint[2]))
-    return StreetLighting(heads, HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)
+    return StreetLighting(heads, _HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)
 
 
 def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:

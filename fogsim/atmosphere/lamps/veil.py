@@ -25,7 +25,7 @@ from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
 
-PIECES = 4
+_PIECES = 4
 """Pieces of a ray between two of its nodes."""
 
 _LAMP_SIZE = 0.08
@@ -165,14 +165,14 @@ def integrate_veil(
         ray = 0 if uniform_rays else m
         for i in range(intervals):
             k = loss * mean[ray, 0 if uniform_way else i]
-            for n in range(PIECES):
-                depth[PIECES * i + n] = k * path[m, PIECES * i + n]
+            for n in range(_PIECES):
+                depth[_PIECES * i + n] = k * path[m, _PIECES * i + n]
         transmittances(depth, power, kept)
         for n in range(pieces):
             straight_kept = kept[n] * kept[n]
             kept[n] = straight[m, n] * straight_kept + turned[m, n] * (kept[n] - straight_kept)
         for i in range(intervals):
-            n = PIECES * i
+            n = _PIECES * i
             light[i] = ((kept[n] + kept[n + 1]) + kept[n + 2]) + kept[n + 3]
         total = np.float32(0.0)
         veil[m, 0] = total
@@ -221,7 +221,7 @@ def veil_rays(camera: Camera) -> VeilRays:
 
 def ray_pieces() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Middles and lengths of the pieces into which a ray is cut [m]."""
-    count = INTERVALS * PIECES
+    count = INTERVALS * _PIECES
     folded = (np.arange(count) + 0.5) / count
     return FOLD_DISTANCE * folded / (1.0 - folded), FOLD_DISTANCE / count / (1.0 - folded) ** 2
 

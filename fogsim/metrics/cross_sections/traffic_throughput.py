@@ -16,7 +16,7 @@ from fogsim.metrics.traffic_span import HOUR, TrafficMetric, TrafficSpan
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
-NOT_YET = -2.0
+_NOT_YET = -2.0
 """Step at which a vehicle was last seen that has not been seen."""
 
 _LEAST_COSINE = math.cos(math.radians(45.0))
@@ -99,7 +99,7 @@ class TrafficThroughput(TrafficMetric):
         read, time = _when_read(span, self._sections)
         self._time += time
         missing = int(span.vehicle.max(initial=-1)) + 1 - len(self._last)
-        self._last = np.concatenate((self._last, np.full((max(missing, 0), 4), NOT_YET)))
+        self._last = np.concatenate((self._last, np.full((max(missing, 0), 4), _NOT_YET)))
         others = np.ones(len(span.vehicle), np.bool_)
         if span.ego is not None:
             others[span.ego] = False

@@ -12,7 +12,7 @@ from OpenGL import GL
 from fogsim.core.jit import kernel
 from fogsim.render.drawing import Drawing, MeshTable
 
-CORNER = np.dtype([("position", "<f4", (3,)), ("triangle", "<i4")])
+_CORNER = np.dtype([("position", "<f4", (3,)), ("triangle", "<i4")])
 """A corner of a triangle, and the triangle's number in its mesh."""
 
 COPY = np.dtype([("clip", "<f4", (3, 4)), ("first", "<i4")])
@@ -30,7 +30,7 @@ def corners(table: MeshTable) -> NDArray[np.void]:
 
     Returns the corners.
     """
-    result = np.empty(table.faces.size, CORNER)
+    result = np.empty(table.faces.size, _CORNER)
     result["position"] = table.positions[table.faces.ravel()]
     number = np.arange(len(table.faces)) - np.repeat(table.first_face[:-1], np.diff(table.first_face))
     result["triangle"] = np.repeat(number, 3)
@@ -111,7 +111,7 @@ class MeshStore:
         fixed, self._copies, self._commands = self._buffers
         GL.glBindVertexArray(self._array)
         _upload(GL.GL_ARRAY_BUFFER, fixed, corners, GL.GL_STATIC_DRAW)
-        _attributes(_CORNER_LAYOUT, CORNER.itemsize)
+        _attributes(_CORNER_LAYOUT, _CORNER.itemsize)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._copies)
         _attributes(_COPY_LAYOUT, COPY.itemsize)
         for location, *_ in _COPY_LAYOUT:

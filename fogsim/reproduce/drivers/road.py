@@ -21,7 +21,7 @@ from fogsim.traffic import AfterCollision, BrakeEvent, Event, TrafficSetup, Trig
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, Display, FogField, Stretch, StretchAdvice
 
-EDGE, EGO = "road", "first"
+_EDGE, EGO = "road", "first"
 """Ids of the road's edge, and of the ego, which drives ahead of all others and meets no one."""
 
 _WIDTH = 3.75
@@ -38,7 +38,7 @@ STEP = 0.2
 
 _FIRST_VEHICLE = (
     '<vType id="fast" vClass="passenger" speedFactor="1.3"/>'
-    f'<route id="r" edges="{EDGE}"/><vehicle id="{EGO}" type="fast" route="r" depart="0" departSpeed="max"/>'
+    f'<route id="r" edges="{_EDGE}"/><vehicle id="{EGO}" type="fast" route="r" depart="0" departSpeed="max"/>'
 )
 """The ego and the route of all, as the beginning of a demand."""
 
@@ -77,7 +77,7 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
     net.write_text(_net(lanes), encoding="utf-8")
     routes.write_text(f"<routes>{_FIRST_VEHICLE}{demand}</routes>", encoding="utf-8")
     rows = (
-        f'<instantInductionLoop id="{i}" lane="{EDGE}_{i}" pos="{_LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
+        f'<instantInductionLoop id="{i}" lane="{_EDGE}_{i}" pos="{_LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
     )
     loops.write_text(f"<additional>{''.join(rows)}</additional>", encoding="utf-8")
     return replace(
@@ -96,12 +96,12 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
 def _net(lanes: int) -> str:
     y = [-(lanes - 0.5 - lane) * _WIDTH for lane in range(lanes)]
     rows = "".join(
-        f'<lane id="{EDGE}_{i}" index="{i}" speed="{LIMIT}" length="{LENGTH}" shape="0,{y[i]} {LENGTH},{y[i]}"/>'
+        f'<lane id="{_EDGE}_{i}" index="{i}" speed="{LIMIT}" length="{LENGTH}" shape="0,{y[i]} {LENGTH},{y[i]}"/>'
         for i in range(lanes)
     )
-    incoming = " ".join(f"{EDGE}_{i}" for i in range(lanes))
+    incoming = " ".join(f"{_EDGE}_{i}" for i in range(lanes))
     return (
-        f'<net version="1.20"><edge id="{EDGE}" from="a" to="b" priority="1">{rows}</edge>'
+        f'<net version="1.20"><edge id="{_EDGE}" from="a" to="b" priority="1">{rows}</edge>'
         '<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape="0,0 0,-8"/>'
         f'<junction id="b" type="dead_end" x="{LENGTH}" y="0" incLanes="{incoming}" intLanes="" '
         f'shape="{LENGTH},-8 {LENGTH},0"/></net>'
@@ -167,7 +167,7 @@ def drive(
     overrides: tuple[str, ...], demand: float, visibility: float, seed: int, seconds: float, advised: float = math.inf
 ) -> Passages:
     """Vehicles that pass the loops, by demand on both lanes [1/h], visibility [m], seconds and advised speed [m/s]."""
-    signs = StretchAdvice(advised, Stretch(edges=(EDGE,)), Display.MESSAGE_SIGN)
+    signs = StretchAdvice(advised, Stretch(edges=(_EDGE,)), Display.MESSAGE_SIGN)
     command = Command(stretches=(signs,)) if math.isfinite(advised) else Command()
     seen = passed(overrides, 2, _demand(demand), visibility, seed, _WARM_UP + seconds, command)
     return passages(seen, since=_WARM_UP)

@@ -44,16 +44,16 @@ def _cap(ring: NDArray[np.float64], normal: NDArray[np.float64], material: Mater
     return mesh(ring, faces, np.broadcast_to(normal, ring.shape), material)
 
 
-HEAD, TRUNK, LEGS = "person_head", "person_trunk", "person_legs"
+HEAD, _TRUNK, _LEGS = "person_head", "person_trunk", "person_legs"
 """Names of the shapes; those of trunks and legs are followed by ``_`` and the number of their pose."""
 
-POSES = 8
+_POSES = 8
 """Poses of a stride."""
 
-STANDING = POSES
+STANDING = _POSES
 """Number of the pose of who stands."""
 
-STRIDE = 0.82
+_STRIDE = 0.82
 """Length of a stride of two steps over the height [-]."""
 
 _HIP, _SHOULDER, _LEG, _ARM = 0.525, 0.81, 0.245, 0.165  # heights; lengths of half a leg and half an arm
@@ -64,15 +64,15 @@ _LEVELS = (("", 10), (MIDDLE, 6), (FAR, 4), (TINY, 3))
 
 
 @cache
-def figure_shapes() -> Mapping[str, Mesh]:
+def _figure_shapes() -> Mapping[str, Mesh]:
     """All shapes with their levels of detail; PAINT is trousers, jacket or skin."""
     shapes = {HEAD + ending: _head(sides) for ending, sides in _LEVELS}
-    for pose in range(POSES + 1):
-        swing = 0.0 if pose == STANDING else math.sin(2.0 * math.pi * pose / POSES)
-        lift = 0.0 if pose == STANDING else math.cos(2.0 * math.pi * pose / POSES)
+    for pose in range(_POSES + 1):
+        swing = 0.0 if pose == STANDING else math.sin(2.0 * math.pi * pose / _POSES)
+        lift = 0.0 if pose == STANDING else math.cos(2.0 * math.pi * pose / _POSES)
         for ending, sides in _LEVELS:
-            shapes[f"{LEGS}_{pose}{ending}"] = _legs(swing, lift, sides)
-            shapes[f"{TRUNK}_{pose}{ending}"] = _trunk(swing, sides)
+            shapes[f"{_LEGS}_{pose}{ending}"] = _legs(swing, lift, sides)
+            shapes[f"{_TRUNK}_{pose}{ending}"] = _trunk(swing, sides)
     return shapes
 
 
@@ -160,7 +160,7 @@ _SKIN_TONES = np.array([(0.42, 0.27, 0.20), (0.36, 0.22, 0.15), (0.22, 0.12, 0.0
 
 def person_shapes() -> dict[str, Mesh]:
     """Shapes of persons of 1 m height that look to +x, with their levels of detail."""
-    return dict(figure_shapes())
+    return dict(_figure_shapes())
 
 
 def person_batches(persons: PersonState) -> tuple[Batch, ...]:
@@ -178,7 +178,7 @@ def person_batches(persons: PersonState) -> tuple[Batch, ...]:
     ends = [0, *(np.flatnonzero(np.diff(pose)) + 1).tolist(), len(pose)]
     parts = [replace(everybody, paint=skin)]
     for own in map(slice, ends[:-1], ends[1:]):
-        for shape, paint in ((TRUNK, jacket), (LEGS, trousers)):
+        for shape, paint in ((_TRUNK, jacket), (_LEGS, trousers)):
             standing = everybody.transforms[own], paint[own], everybody.lamps[own], everybody.instance[own]
             parts.append(Batch(f"{shape}_{pose[own.start]}", *standing))
     return tuple(parts)
@@ -187,7 +187,7 @@ def person_batches(persons: PersonState) -> tuple[Batch, ...]:
 def _poses(persons: PersonState, height: NDArray[np.float64], chance: NDArray[np.float64]) -> NDArray[np.int64]:
     """Number of the pose of each: by the way gone along their heading, in which feet keep to the ground."""
     gone = persons.position[:, 0] * np.cos(persons.heading) + persons.position[:, 1] * np.sin(persons.heading)
-    phase = np.floor((gone / (STRIDE * height) + chance) * POSES).astype(np.int64) % POSES
+    phase = np.floor((gone / (_STRIDE * height) + chance) * _POSES).astype(np.int64) % _POSES
     return np.where(persons.speed > _SLOWEST_STRIDE, phase, STANDING)
 
 

@@ -77,12 +77,3 @@ def clip_from_offset(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     turn = np.eye(4)
     turn[:3, :3] = camera_axes(camera, pose)
     return matrix_product(clip_from_camera(camera), turn)
-
-
-def highest_terrain_row(camera: Camera, pose: CameraPose) -> int:
-    """First row of the picture [px] in which any ray points below the horizon; the picture's height if none does."""
-    up = ray_from_pixel(camera, pose)[2]
-    ends = np.array([-0.5, camera.width - 0.5])
-    rows = np.arange(camera.height)[:, None]
-    below = np.any(up[0] * ends + up[1] * rows + up[2] < 0.0, axis=1)
-    return int(np.argmax(below)) if below.any() else camera.height

@@ -19,8 +19,8 @@ from numba.core import caching, config
 from fogsim.core.compiling.code_libraries import KeptCode
 from fogsim.core.files.user_cache import read_entry
 
-_PACKAGE = Path(__file__).parents[2]
-FOLDER = _PACKAGE / "_kernels"
+PACKAGE = Path(__file__).parents[2]
+FOLDER = PACKAGE / "_kernels"
 """Where a wheel has them, in folders named as those of the modules; a checkout has none."""
 
 
@@ -76,7 +76,7 @@ class _Locator(caching.InTreeCacheLocator):  # type: ignore[misc] # numba is unt
         """Nothing is written."""
 
     def get_cache_path(self) -> str:
-        return str(FOLDER / Path(self._py_file).parent.relative_to(_PACKAGE))
+        return str(FOLDER / Path(self._py_file).parent.relative_to(PACKAGE))
 
 
 class _Files(caching.CompileResultCacheImpl):  # type: ignore[misc] # numba is untyped
@@ -106,7 +106,7 @@ class ShippedCache(caching.Cache):  # type: ignore[misc] # numba is untyped
 
 def shipped_cache(function: FunctionType) -> ShippedCache | None:
     """What came of a function with the installation; None where nothing did, or it is not for this processor."""
-    if not FOLDER.is_dir() or not Path(function.__code__.co_filename).is_relative_to(_PACKAGE) or usable_kind() is None:
+    if not FOLDER.is_dir() or not Path(function.__code__.co_filename).is_relative_to(PACKAGE) or usable_kind() is None:
         return None
     return ShippedCache(function)
 

@@ -36,7 +36,7 @@ from PIL import Image
 from fogsim.estimators import make
 from fogsim.offline import load_calibration
 from fogsim.offline.camera_file import Calibration
-from fogsim.offline.road_plane import RoadPlane
+from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Observation
 

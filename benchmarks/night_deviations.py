@@ -21,8 +21,7 @@ from fogsim.atmosphere.lamps.glow import glow, narasimhan_nayar, scattered_once
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.lobes import lobe_glow
 from fogsim.atmosphere.lamps.phase_function import Droplets, henyey_greenstein, phase_function
-from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
-from fogsim.atmosphere.lamps.veil_kernels import VeilRays
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
 from fogsim.reproduce.night.limits import limits

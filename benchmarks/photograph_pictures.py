@@ -21,7 +21,7 @@ from windscreen import hash_noise, rays
 
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.fog_image import BRIGHTEST_ABOVE_ROAD, airlight_of, fog_image
-from fogsim.offline.road_plane import RoadPlane
+from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Response
 

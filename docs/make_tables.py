@@ -27,10 +27,10 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
 from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
-from fogsim.openscenario.elements import HARMLESS, REFUSED
-from fogsim.openscenario.entities import CLASSES
+from fogsim.openscenario.environment import CLASSES
 from fogsim.openscenario.positions import POSITIONS
 from fogsim.openscenario.triggers import CONDITIONS
+from fogsim.openscenario.xml_tree import HARMLESS, REFUSED
 from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS

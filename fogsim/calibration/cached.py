@@ -21,8 +21,7 @@ from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
 from fogsim.calibration.lit_fog import lit_fog
 from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.calibration.veil_references import usual_references
-from fogsim.core.files.cache_entries import keep_newest, read_entry, write_entry
-from fogsim.core.files.user_cache import cache_directory
+from fogsim.core.files.user_cache import cache_directory, keep_newest, read_entry, write_entry
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.night.own_light import KNOWN_HEAD_LAMPS, OwnLight
 from fogsim.estimators.night.references import VeilReferences

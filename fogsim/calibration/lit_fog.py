@@ -13,8 +13,18 @@ from fogsim.atmosphere.lamps.glow import glow
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table, phase_table
 from fogsim.atmosphere.lamps.phase_function import Droplets, PhaseFunction, blurred, phase_function
 from fogsim.atmosphere.lamps.road_glow import RoadGlow
-from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, PHASE_SPREAD, SPREAD, ray_pieces
-from fogsim.atmosphere.lamps.veil_kernels import LitAir, ScatteringPhase, VeilRays, add_scattered_light, integrate_veil
+from fogsim.atmosphere.lamps.veil import (
+    FOLD_DISTANCE,
+    INTERVALS,
+    PHASE_SPREAD,
+    SPREAD,
+    LitAir,
+    ScatteringPhase,
+    VeilRays,
+    add_scattered_light,
+    integrate_veil,
+    ray_pieces,
+)
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.night.own_light import SUB_ROWS, VISIBILITIES, Cells, OwnLight, cells_of
 from fogsim.lighting import LampMount, own_head_lamps

@@ -5,8 +5,7 @@ from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expos
 from fogsim.camera.faulty_lens import FaultyLens
 from fogsim.camera.glare import LensGlare
 from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, knocked, mounted_pose
-from fogsim.camera.sampling import averaged, middle_samples, supersampled
-from fogsim.camera.sensor import CameraSensor
+from fogsim.camera.sensor import CameraSensor, averaged, middle_samples, supersampled
 
 __all__ = [
     "USUAL_MOUNTS",

@@ -70,7 +70,7 @@ class FogItem(pytest.Item):
 
     def runtest(self) -> None:
         """Raise NotPassedError unless every clause of it passed."""
-        from fogsim.testing.wording import expectation_lines
+        from fogsim.testing.page import expectation_lines
 
         assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items
         lines = expectation_lines(self.parent.outcome, self.name)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import print_remarks
-from fogsim.core.files.maps import MAPS
+from fogsim.core.files.readers import MAPS
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:

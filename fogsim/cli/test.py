@@ -47,8 +47,7 @@ def check_command(
     """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
     from fogsim.testing import find_files
     from fogsim.testing.junit import write_junit
-    from fogsim.testing.page import PageContent, write_page
-    from fogsim.testing.wording import totals_text
+    from fogsim.testing.page import PageContent, totals_text, write_page
 
     begun, chosen = time.monotonic(), with_timeout(settings, method_timeout)
     found = find_files(files or ["."])
@@ -139,7 +138,7 @@ def _evidence(outcomes: "Sequence[FileOutcome]", out: Path, processes: int) -> "
 
 
 def _print_outcome(outcome: "FileOutcome", settings: Sequence[str]) -> None:
-    from fogsim.testing.wording import broken_text, command_text, judgement_text
+    from fogsim.testing.page import broken_text, command_text, judgement_text
 
     number, test = len(outcome.results), outcome.test
     cases = "1 case" if number == 1 else f"{number} cases"

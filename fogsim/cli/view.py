@@ -36,7 +36,7 @@ def view_command(
     """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
     from fogsim.offline.image_files import refuse_unwritable_image, write_image
     from fogsim.render import to_pyrender
-    from fogsim.render.viewer import first_picture, open_viewer, require_display
+    from fogsim.render.pyrender_reference import first_picture, open_viewer, require_display
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
     # Before the run, not after it.

@@ -1,9 +1,17 @@
 """Conditions on a run: a small language over finished steps, for triggers and expectations."""
 
-from fogsim.conditions.fitness import RunContent, condition_mistakes, lights_of, vehicles_in, vehicles_of
 from fogsim.conditions.moment import EGO, History, Moment
 from fogsim.conditions.parsing import mended, parse_condition
-from fogsim.conditions.possibility import Limits, outcomes, pointless_parts
+from fogsim.conditions.possibility import (
+    Limits,
+    RunContent,
+    condition_mistakes,
+    lights_of,
+    outcomes,
+    pointless_parts,
+    vehicles_in,
+    vehicles_of,
+)
 from fogsim.conditions.signal import Kind, Need, Place, Signal
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Quantity, Reference, signals_of

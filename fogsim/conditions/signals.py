@@ -5,8 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from fogsim.conditions.bodies import Body, body_of, clearance
-from fogsim.conditions.moment import Moment
+from fogsim.conditions.moment import Body, Moment, body_of, clearance
 from fogsim.conditions.route_places import Extent, gap_between, headway_between, time_to_meet
 from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance

@@ -26,7 +26,7 @@ import numba
 from numba.core.types.misc import unliteral
 
 from fogsim.core.compiling import begin_economy, prepare_economy
-from fogsim.core.compiling.kept_code import KeptCode
+from fogsim.core.compiling.code_libraries import KeptCode
 from fogsim.core.compiling.shipped_code import ShippedCache, shipped_cache, why_not_taken
 
 prepare_economy()

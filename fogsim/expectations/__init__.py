@@ -1,7 +1,15 @@
 """Expectations of a run: what must hold in it, and what came."""
 
-from fogsim.expectations.clauses import Always, Clause, Eventually, Happened, MetricCheck, Whenever
-from fogsim.expectations.finding import Finding, FindingVerdict
+from fogsim.expectations.clauses import (
+    Always,
+    Clause,
+    Eventually,
+    Finding,
+    FindingVerdict,
+    Happened,
+    MetricCheck,
+    Whenever,
+)
 from fogsim.expectations.watching import ExpectationWatch
 
 __all__ = [

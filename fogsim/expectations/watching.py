@@ -6,8 +6,16 @@ from typing import Protocol
 
 from fogsim.conditions import Comparison, Condition, History, Moment, Watch
 from fogsim.conditions.logic import compared
-from fogsim.expectations.clauses import Always, Clause, Eventually, Happened, MetricCheck, Whenever
-from fogsim.expectations.finding import Finding, FindingVerdict
+from fogsim.expectations.clauses import (
+    Always,
+    Clause,
+    Eventually,
+    Finding,
+    FindingVerdict,
+    Happened,
+    MetricCheck,
+    Whenever,
+)
 from fogsim.values import TrafficStep
 
 _TICK = 1e-6

@@ -8,8 +8,7 @@ from fogsim.core.registry import Registry
 from fogsim.fusion.field_filter import FieldFilter
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.mixture_filter import MixtureFilter
-from fogsim.fusion.no_fusion import NoFusion
-from fogsim.fusion.protocol import DatedFusion, Fusion, LocatedFusion
+from fogsim.fusion.protocol import DatedFusion, Fusion, LocatedFusion, NoFusion
 
 FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
     "fusion",

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.mixture import majority, reduced
+from fogsim.core.linear_algebra import majority, reduced
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.fusion.grid_filter import CELLS, LOG_HIGH, LOG_LOW

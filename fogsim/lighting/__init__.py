@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from fogsim.core.registry import Registry
-from fogsim.lighting.head_lamps import LampMount, own_head_lamps
+from fogsim.lighting.beams import LampMount, own_head_lamps
 from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014
 from fogsim.lighting.legal import LegalRules
 from fogsim.lighting.optimiser import SightOptimiser

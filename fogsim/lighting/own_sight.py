@@ -1,7 +1,7 @@
 """How far a driver sees by the own lamps in fog: a small object on the road, behind the veil of these lamps.
 
 The scenario is that of gallen2014, § II (a square of 0.18 m and reflectance 0.08 on the road straight ahead, R_L = 12.5
-mcd m⁻² lx⁻¹, visibility level 7 by Adrian 1989), but the lamps are those of `fogsim.lighting.head_lamps`, and the veil
+mcd m⁻² lx⁻¹, visibility level 7 by Adrian 1989), but the lamps are those of `fogsim.lighting.beams`, and the veil
 is that of the pictures, up to the object, in place of the paper's eq. 9, which knows high beams only.
 """
 
@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Droplets, Pavement, visibility_level
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
-from fogsim.atmosphere.lamps.veil import lit_air, node_distances, ray_pieces, veil_along
-from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays
+from fogsim.atmosphere.lamps.veil import LitAir, VeilRays, lit_air, node_distances, ray_pieces, veil_along
 from fogsim.atmosphere.visibility.visibility_level import angular_size
-from fogsim.lighting.head_lamps import own_head_lamps
+from fogsim.lighting.beams import own_head_lamps
 from fogsim.units import extinction_from_visibility
 from fogsim.values import HeadLamp, Lamp
 from fogsim.values.luminous_intensity import luminous_intensity

@@ -16,16 +16,10 @@ from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definit
 from fogsim.metrics.motion import Comfort, Compliance, Motion
 from fogsim.metrics.safety import DEFAULT_STANDARD, Collisions, Conflict, Sight, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
-from fogsim.metrics.traffic_cohort import TrafficCohort
-from fogsim.metrics.traffic_collisions import TrafficCollisions
-from fogsim.metrics.traffic_comfort import TrafficComfort
-from fogsim.metrics.traffic_compliance import TrafficCompliance
-from fogsim.metrics.traffic_conflicts import TrafficConflicts
-from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_flow import TrafficFlow
-from fogsim.metrics.traffic_headways import TrafficHeadways
-from fogsim.metrics.traffic_sight import TrafficSight
-from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficMetric
+from fogsim.metrics.traffic_comfort import TrafficComfort, TrafficCompliance, TrafficSight
+from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts, TrafficHeadways
+from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
+from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficCohort, TrafficMetric
 from fogsim.units import clock_time
 from fogsim.values import Step, TrafficStep
 from fogsim.values.result_checks import checked_values

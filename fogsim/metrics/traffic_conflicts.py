@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
+from fogsim.metrics.metric import Definition, Histogram, JsonValue, definitions_of, share
 from fogsim.metrics.surrogate import (
     AVAILABLE_DECELERATION,
     CRITICAL_DECELERATION,
@@ -17,10 +17,72 @@ from fogsim.metrics.surrogate import (
     modified_deceleration_rate_to_avoid_crash,
     potential_collision_speed,
     stopping_distance_difference,
+    time_headway,
     time_to_collision,
 )
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 from fogsim.units import finite_or_none
+
+
+@dataclass(slots=True)
+class TrafficCollisions(TrafficMetric):
+    """Collisions near the ego, each pair of vehicles once.
+
+    One of the two was near at the step, or at the one before: the simulation may remove both. Only the distance of
+    vehicles near the ego is known, so collisions far away, which ``collisions`` includes, have no rate.
+    """
+
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_collisions")
+    _exposure: Exposure = field(default_factory=Exposure)
+    _impacts: list[float] = field(default_factory=list)
+    _of_cohort: int = 0
+
+    def add(self, span: TrafficSpan) -> None:
+        """Add some steps."""
+        self._exposure.add(span)
+        self._impacts += [hit.impact_speed for hit in span.collisions]
+        members = frozenset() if span.cohort is None else span.cohort.vehicles
+        self._of_cohort += sum(not members.isdisjoint((hit.collider, hit.victim)) for hit in span.collisions)
+
+    def result(self) -> dict[str, JsonValue]:
+        """Number, rates and severity."""
+        impacts, rate = self._impacts, self._exposure.per_kilometre(len(self._impacts))
+        return {
+            "traffic_collisions": len(impacts),
+            "traffic_collisions_per_cohort_vehicle": self._exposure.per_cohort_vehicle(self._of_cohort),
+            "traffic_collisions_per_million_vehicle_km": None if rate is None else 1e6 * rate,
+            "traffic_mean_impact_speed_mps": share(sum(impacts), len(impacts)),
+            "traffic_max_impact_speed_mps": max(impacts, default=None),
+        }
+
+
+@dataclass(slots=True)
+class TrafficHeadways(TrafficMetric):
+    """Time headways of all followers near the ego that drive at 5 m/s or more.
+
+    The headway is between bumpers, gap / v_F. It is also the post-encroachment time (PET, Allen, Shin & Cooper 1978) of
+    vehicles in one lane: the time from when the leader's rear bumper leaves a place to when the follower's front bumper
+    comes there, at the speed that it has.
+    """
+
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_headways")
+    _headways: Histogram = field(default_factory=lambda: Histogram(0.0, 10.0, 0.05))
+
+    def add(self, span: TrafficSpan) -> None:
+        """Add some steps."""
+        found = span.following
+        moving = found.speed >= QUEUE_SPEED
+        headways = time_headway(found.gap[moving], found.speed[moving])
+        self._headways.add(headways, span.elapsed[found.follower[moving]])
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how the headways are distributed."""
+        return {
+            **{f"traffic_headway_below_{s}_s_share": self._headways.share_below(s) for s in (1, 2, 3)},
+            "traffic_headway_p05_s": self._headways.quantile(0.05),
+            "traffic_median_headway_s": self._headways.quantile(0.5),
+        }
+
 
 _MOMENTS = 1 << 32
 """More than a run has moments."""

@@ -1,6 +1,5 @@
 """Lines of sight, and what stands in them."""
 
-from fogsim.obstruction.obstructions import CLEAR_SIGHT, Obstructions, obstructions_of
-from fogsim.obstruction.tunnels import Tunnel, tunnels_of
+from fogsim.obstruction.obstructions import CLEAR_SIGHT, Obstructions, Tunnel, obstructions_of, tunnels_of
 
 __all__ = ["CLEAR_SIGHT", "Obstructions", "Tunnel", "obstructions_of", "tunnels_of"]

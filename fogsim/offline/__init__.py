@@ -2,7 +2,7 @@
 
 from fogsim.offline.calibration_deviations import CalibrationDeviations
 from fogsim.offline.camera_file import Calibration, camera_text, load_calibration, write_camera
-from fogsim.offline.drive.night_drive import NIGHT_METHODS, NightDrive
+from fogsim.offline.drive.road_scale import NIGHT_METHODS, NightDrive
 from fogsim.offline.drive.sign_watch import SignSummary, SignWatch, watch_signs
 from fogsim.offline.estimation import FrameEstimates, chosen_methods, estimate_images, estimates_of
 from fogsim.offline.guess import CameraGuess, guess_camera

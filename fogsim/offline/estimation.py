@@ -11,7 +11,7 @@ from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
 from fogsim.offline.camera_file import Calibration
-from fogsim.offline.drive.night_drive import NightDrive
+from fogsim.offline.drive.road_scale import NightDrive
 from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source

@@ -15,7 +15,7 @@ from fogsim.offline.image_files import (
     write_image,
 )
 from fogsim.offline.layered_fog import FogLayer, elevation_sines
-from fogsim.offline.road_plane import RoadPlane
+from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond

@@ -16,9 +16,8 @@ from fogsim.offline.fog_image import (
     refuse_other_size,
 )
 from fogsim.offline.layered_fog import FogLayer
-from fogsim.offline.road_plane import RoadPlane
-from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
-from fogsim.offline.video_source import VideoFile
+from fogsim.offline.rectification import RoadPlane
+from fogsim.offline.video_source import VideoFile, VideoWriter, refuse_unfit_video
 from fogsim.values import Camera
 
 

@@ -18,7 +18,7 @@ from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import denser_text, interval_text, metres
 from fogsim.offline.source import Source
-from fogsim.offline.video_file import VideoWriter
+from fogsim.offline.video_source import VideoWriter
 from fogsim.recorders.panel.camera_picture import found_row, scale_image
 from fogsim.recorders.sign_marks import draw_signs
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours

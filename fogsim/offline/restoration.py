@@ -12,7 +12,7 @@ from fogsim.errors import InputError
 from fogsim.offline.estimation import estimates_of
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source
-from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
+from fogsim.offline.video_source import VideoWriter, refuse_unfit_video
 from fogsim.restoration import METHODS, MOST_GAIN, restore_contrast
 from fogsim.restoration.picture import largest_value
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility

@@ -3,11 +3,10 @@
 import math
 from typing import Any
 
-from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
 from fogsim.openscenario.triggers import NEAR
-from fogsim.openscenario.xml_tree import Node, NodeError, handlers
+from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
 
 LAMPS = {  # Of each type of light

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.actions import DISPLACEMENTS, Actions
-from fogsim.openscenario.entities import Vehicle
-from fogsim.openscenario.environment import Environment, environment_of
+from fogsim.openscenario.environment import Environment, Vehicle, environment_of
 from fogsim.openscenario.lateral import Effect
 from fogsim.openscenario.positions import ALONG, POSITIONS
 from fogsim.openscenario.xml_tree import Node

@@ -5,10 +5,9 @@ import itertools
 import math
 from dataclasses import dataclass, field, replace
 
-from fogsim.openscenario.elements import REFUSED
-from fogsim.openscenario.entities import Vehicle, Vehicles
+from fogsim.openscenario.environment import Vehicle, Vehicles
 from fogsim.openscenario.parameters import Catalogs
-from fogsim.openscenario.xml_tree import Node, NodeError, handlers
+from fogsim.openscenario.xml_tree import REFUSED, Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from fogsim.core.files.generated_files import write_generated
-from fogsim.core.files.maps import find_map
+from fogsim.core.files.readers import find_map
 from fogsim.errors import InputError
 from fogsim.openscenario.actions import Actions
-from fogsim.openscenario.entities import CLASSES, Vehicle, read_vehicles
-from fogsim.openscenario.environment import fog_block
+from fogsim.openscenario.environment import CLASSES, Vehicle, fog_block, read_vehicles
 from fogsim.openscenario.initial import Beginning
 from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions

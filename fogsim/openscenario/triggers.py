@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.environment import Vehicle
 from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node, NodeError, handlers

@@ -5,11 +5,10 @@ from collections.abc import Callable
 from fogsim.core.files.atomic import write_json
 from fogsim.core.registry import Registry
 from fogsim.recorders.events import EventRecorder
-from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
 from fogsim.recorders.exchange.osi import OsiRecorder
 from fogsim.recorders.manifest import Manifest, Status, versions
+from fogsim.recorders.panel.camera_picture import draw_restored_picture
 from fogsim.recorders.panel.frame_panel import PICTURE_SIZE, FramePanel
-from fogsim.recorders.panel.restored_picture import draw_restored_picture
 from fogsim.recorders.panel.view_from_above import draw_view_from_above
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
@@ -23,11 +22,11 @@ from fogsim.recorders.protocol import (
 from fogsim.recorders.recovery import recover_run
 from fogsim.recorders.report import ReportRecorder
 from fogsim.recorders.run_directory import RunDirectory
-from fogsim.recorders.sign_map import write_sign_map
+from fogsim.recorders.sign_marks import write_sign_map
 from fogsim.recorders.table import StepTable, TableRecorder
 from fogsim.recorders.table_columns import traffic_table_columns
 from fogsim.recorders.traffic_report import TrafficReportRecorder
-from fogsim.recorders.trajectories import TrajectoryRecorder, with_trajectories
+from fogsim.recorders.trajectories import OpenScenarioRecorder, TrajectoryRecorder, with_trajectories
 from fogsim.recorders.video import VideoRecorder, encoder_report
 
 RecorderFactory = Callable[[RunInformation], Recorder]

@@ -9,8 +9,15 @@ from fogsim.core.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.panel.camera_picture import scale_image
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
-from fogsim.recorders.report_data import Album, Curves, DecisiveFrames, ReportPicture, SignBook, SignRow
-from fogsim.recorders.report_figures import draw_figures
+from fogsim.recorders.report_figures import (
+    Album,
+    Curves,
+    DecisiveFrames,
+    ReportPicture,
+    SignBook,
+    SignRow,
+    draw_figures,
+)
 from fogsim.recorders.templating import render
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Step

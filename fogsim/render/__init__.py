@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 from fogsim.core.registry import Registry
 from fogsim.errors import InputError
-from fogsim.render.best import best_renderer
-from fogsim.render.protocol import FARTHEST, Renderer, RenderError
+from fogsim.render.protocol import FARTHEST, Renderer, RenderError, best_renderer
 from fogsim.render.pyrender_scene import to_pyrender
 from fogsim.values.scene import Scene
 

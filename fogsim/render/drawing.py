@@ -1,8 +1,8 @@
 """What the two ways to draw share: all triangles in one table, what a picture may show of them, and what they answer.
 
-A picture is made in three steps: choose the copies that may show (`fogsim.render.culling`), find the triangle that each
-pixel sees (a `Rasteriser`), and shade what is seen (`fogsim.render.shading`). Only the second is done twice, by numba
-and by OpenGL, so where both see the same triangle they give the same picture to the bit.
+A picture is made in three steps: choose the copies that may show (`fogsim.render.renderer`), find the triangle that
+each pixel sees (a `Rasteriser`), and shade what is seen (`fogsim.render.shading`). Only the second is done twice, by
+numba and by OpenGL, so where both see the same triangle they give the same picture to the bit.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,11 @@
 """What every renderer does, whatever it draws with."""
 
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Protocol
 
-from fogsim.errors import FogSimError
+from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
@@ -34,3 +36,35 @@ class Renderer(Protocol):
     def close(self) -> None:
         """Give back what the renderer holds; a second call does nothing."""
         ...
+
+
+def best_renderer() -> tuple[str, str]:
+    """Choose the renderer that "auto" stands for.
+
+    Returns Its name in `RENDERERS`, and why.
+    """
+    if not _may_have_card():
+        return "cpu", "OpenGL would be drawn by software: there is no graphics card (/dev/dri/render*, /dev/nvidia*)"
+    from fogsim.render.opengl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is asked for
+
+    try:
+        found = context()
+    except MissingDependencyError as error:
+        return "cpu", f"OpenGL does not work here: {error}"
+    except RenderError as error:
+        return "cpu", f"OpenGL cannot be used in this process: {error}"
+    if found.software:
+        return (
+            "cpu",
+            f"OpenGL is not drawn by a graphics card here ({found.description}), and then the cpu renderer is faster",
+        )
+    return "opengl", f"there is a graphics card for OpenGL ({found.description})"
+
+
+def _may_have_card() -> bool:
+    """Whether looking for a graphics card by OpenGL, which takes a second, could find one."""
+    if not sys.platform.startswith("linux"):
+        return True
+    devices = Path("/dev")
+    # Under WSL the card is behind dxg.
+    return any(next(devices.glob(pattern), None) is not None for pattern in ("dri/render*", "nvidia[0-9]*", "dxg"))

@@ -1,23 +1,32 @@
 """The independent reference: pyrender's own off-screen renderer draws, all shapes in full detail and none left out."""
 
-from collections.abc import Sequence
-from typing import Any
+import os
+import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
-from fogsim.render.opengl.context import Context, context
-from fogsim.render.photometry import SKY_TINT, zenith_luminance
+from fogsim.render.opengl.context import context
 from fogsim.render.protocol import RenderError
+from fogsim.render.pyrender_scene import load_pyrender
+
+if TYPE_CHECKING:
+    import pyrender
+
+from collections.abc import Sequence
+from typing import Any
+
+from fogsim.core.linear_algebra import matrix_product
+from fogsim.render.opengl.context import Context
+from fogsim.render.photometry import SKY_TINT, zenith_luminance
 from fogsim.render.pyrender_scene import (
     GAMMA,
     Part,
     camera_matrix,
     copied_parts,
     empty_scene,
-    load_pyrender,
     pinhole,
     still_parts,
 )
@@ -112,7 +121,7 @@ class PyrenderReference:
     def _drawer_of(self, camera: Camera) -> Any:
         """Pyrender's renderer, made again if the camera's size is another than the last one's."""
         if self._drawer is None:
-            self._drawer = offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
+            self._drawer = _offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
         self._drawer.viewport_width, self._drawer.viewport_height = camera.width, camera.height
         return self._drawer
 
@@ -123,7 +132,7 @@ class PyrenderReference:
             drawer.delete()
 
 
-def offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
+def _offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
     """Make pyrender's renderer in this process's context: the end of one of its own would end all others.
 
     Takes `width`, `height` [px].
@@ -166,3 +175,51 @@ def _rays(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     v, u = np.mgrid[: camera.height, : camera.width]
     pixels = np.stack((u, v, np.ones_like(u)), axis=-1).astype(np.float64)
     return matrix_product(pixels, ray_from_pixel(camera, pose).T)
+
+
+_AHEAD = 20.0  # how far before the camera lies what the viewer turns about [m]
+
+
+def require_display() -> None:
+    """Make sure that there is a display to open a window on."""
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise InputError(
+            "there is no display here to open a window on (DISPLAY is not set): --out FILE.png writes what the window "
+            "would show, and `ssh -X` or `xvfb-run` give a display"
+        )
+
+
+def open_viewer(scene: "pyrender.Scene", size: tuple[int, int], title: str) -> None:
+    """Open a scene in pyrender's viewer; comes back when the window is closed (`size` [px])."""
+    require_display()
+    eye = scene.get_pose(scene.main_camera_node)
+    try:
+        load_pyrender().Viewer(
+            scene,
+            viewport_size=size,
+            view_center=eye[:3, 3] - _AHEAD * eye[:3, 2],
+            window_title=title,
+            cull_faces=False,
+        )
+    except Exception as error:  # pyglet and PyOpenGL raise their own
+        display = os.environ.get("DISPLAY", "this one")
+        text = " ".join(str(error).split())[:200]
+        raise RenderError(
+            f"pyrender's viewer does not open on the display {display} ({type(error).__name__}: {text}); --out "
+            "FILE.png writes what it would show"
+        ) from error
+
+
+def first_picture(scene: "pyrender.Scene", size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Draw what the viewer shows first, without a display.
+
+    Returns colours, encoded with 1/2.2 (rows, cols, 3) uint8. Takes `size` [px].
+    """
+    shared = context()
+    drawer = _offscreen_renderer(load_pyrender(), shared, *size)
+    try:
+        colour, _ = drawer.render(scene)
+    finally:
+        drawer.delete()
+        shared.restore()
+    return np.ascontiguousarray(colour, np.uint8)

@@ -13,8 +13,7 @@ from fogsim.estimators.zhu2015 import FRAMES, GROWTH
 from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
-from fogsim.reproduce.road_sweeps import CAMERA, DRIVES, over_growths, steps_of, swept
-from fogsim.reproduce.zhu2015_drive import Moment, drive, observed
+from fogsim.reproduce.road_sweeps import CAMERA, DRIVES, Moment, drive, observed, over_growths, steps_of, swept
 from fogsim.reproduce.zhu2015_picture import picture
 from fogsim.values import Estimate, FogCategory, Observation
 

@@ -8,7 +8,7 @@ from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import GROWTH, GROWTH_SHARE
 from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, seen_road
 from fogsim.recorders.style import font
-from fogsim.reproduce.zhu2015_drive import Moment, observed
+from fogsim.reproduce.road_sweeps import Moment, observed
 from fogsim.values import Camera, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION
 from fogsim.vision.region.road_region import region_medians

@@ -8,21 +8,20 @@ from numpy.typing import NDArray
 
 from fogsim.core.garbage import no_garbage_collection
 from fogsim.errors import InputError
-from fogsim.scene.bodies import body_shapes, box_shapes
 from fogsim.scene.edges import Edge, lane_edge
 from fogsim.scene.ground import Border, GroundPlan, Rail
-from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
 from fogsim.scene.junctions import Areas
 from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.light_sources import lamp_posts, street_lamp_shapes
 from fogsim.scene.polyline import SHORTEST, parallel, true_spans
 from fogsim.scene.road import FAST, free_edges
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, sign_batches, sign_shapes
-from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
 from fogsim.scene.structures import building_places, structure_batches, structure_shapes
 from fogsim.scene.terrain import Terrain
 from fogsim.scene.town import person_shapes, signal_posts, signal_shapes
-from fogsim.scene.trees import tree_shapes
+from fogsim.scene.trees import house_places, house_shapes, houses, shapes_in_use, tree_shapes
+from fogsim.scene.vehicles import body_shapes, box_shapes
 from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
 from fogsim.values.scene import USUAL_PAVEMENT, Batch, Mesh, Pavement, Scene
 

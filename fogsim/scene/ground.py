@@ -9,11 +9,10 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.chainage import Chainage
 from fogsim.scene.edges import Edge, edge_meshes, guard_rail
 from fogsim.scene.junctions import Areas, area_mesh, free_borders, walkable
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, cleaned, parallel, refined, true_spans
+from fogsim.scene.polyline import Chainage, Points, cleaned, parallel, refined, true_spans
 from fogsim.scene.road import LONGEST, footway_mesh, lane_mesh, transverse_markings
 from fogsim.scene.signs import Gantry, gantry_mesh
 from fogsim.scene.solids import merge

@@ -4,24 +4,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies import LAMPLESS, LIT_AREAS, BodyLamp, bodies
-from fogsim.scene.lamp_kernels import (
-    AREA,
-    AXIS,
-    FORWARD,
-    FOUND,
-    FULL_INTENSITY,
-    INTENSITY,
-    LEFT,
-    UP,
-    LampCarriers,
-    LampTable,
-    find_lamps,
-)
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import matrix_product
+from fogsim.scene.edges import Edge
 from fogsim.scene.lamps import (
     FULL,
     SIGNAL_LOBES,
@@ -31,14 +21,194 @@ from fogsim.scene.lamps import (
     signal_shares,
     sum_of_beams,
 )
-from fogsim.scene.street_lamps import HEIGHT, SIZE
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points, arc_length
+from fogsim.scene.roadside import Spacing, placed, stations, tube
+from fogsim.scene.solids import Material, box, merge
 from fogsim.scene.town import signal_light_sources
-from fogsim.scene.vehicles import body_names
+from fogsim.scene.vehicles import LAMPLESS, LIT_AREAS, BodyLamp, bodies, body_names
 from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift, joined_sources
 from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVATIONS, SignalLobe, luminous_intensity
-from fogsim.values.scene import Surface
+from fogsim.values.scene import FAR, TINY, Batch, Mesh, Scene, Surface
 from fogsim.values.traffic import TrafficState, with_pieces
+
+_FORWARD, LEFT, UP, _INTENSITY, _AREA, _FULL_INTENSITY, _AXIS = range(3, 10)
+_FOUND = 13
+"""Columns of what is found of a lamp, and their count.
+
+First its place [m]; then the way from it to the eye in the vehicle's axes [m], its intensity toward the eye [cd], its
+luminous area as the eye sees it [m²], its intensity along its axis [cd], and its axis (3).
+"""
+
+
+class LampTable(NamedTuple):
+    """Lamps of all bodies in their unit boxes."""
+
+    place: NDArray[np.float64]  # (n, 3): Middles
+    area: NDArray[np.float64]  # (n,): Luminous areas over width times height of the body
+    mask: NDArray[np.int64]  # (n,) int64: Bits of `Lamp` that light each
+    intensity: NDArray[np.float64]  # (n,): Along its axis [cd]
+    # (n,) int64: By how many bits the lit ones are shifted to tell where a lamp is dark; see
+    # `fogsim.values.light.DARK_SHIFT`
+    dark_shift: NDArray[np.int64]
+    forwards: NDArray[np.float64]  # (n,): 1 for a lamp that shines ahead, −1 for one that shines back
+    of_body: NDArray[np.int64]  # (bodies, most) int64: Lamps of each body, then −1
+    signals: int  # Bits of lamps whose intensity is that of the table; that of others is left at 0
+    lobe: NDArray[np.int64]  # (n,) int64: Number of the way each shines
+    # azimuths, elevations (e,): ascending angles next to and above a lamp's axis from 0 on [rad]
+    azimuths: NDArray[np.float64]
+    elevations: NDArray[np.float64]
+    # (lobes, e, a): ln of the share of its axial intensity that a lamp shines there, alike on both sides
+    log_share: NDArray[np.float64]
+    fall_off: float  # How fast that falls beyond the axes' ends [1/rad]
+
+
+class LampCarriers(NamedTuple):
+    """Vehicles with lamps."""
+
+    position: NDArray[np.float64]  # (v, 3): Middles of the front bumpers [m]
+    turned: NDArray[np.float64]  # (4, v): Cosine and sine of their headings, and of their grades
+    size: NDArray[np.float64]  # (3, v): Length, width and height [m]
+    # lit, body (v,) int64: bits of lit lamps, and number of the body
+    lit: NDArray[np.int64]
+    body: NDArray[np.int64]
+
+
+@kernel
+def _before(axis: NDArray[np.float64], value: float) -> tuple[int, float]:
+    """Entry of an axis before a value, and the share of the next one; values beyond its ends are as those."""
+    entry = 0
+    while entry < axis.shape[0] - 2 and value > axis[entry + 1]:
+        entry += 1
+    return entry, min(max((value - axis[entry]) / (axis[entry + 1] - axis[entry]), 0.0), 1.0)
+
+
+@kernel
+def _share_toward(lamps: LampTable, lamp: int, forward: float, left: float, up: float) -> float:
+    """Share of its axial intensity that a lamp shines in a direction in the vehicle's axes."""
+    ahead = forward * lamps.forwards[lamp]
+    azimuth, elevation = math.atan2(abs(left), ahead), math.atan2(abs(up), math.hypot(ahead, left))
+    column, aside = _before(lamps.azimuths, azimuth)
+    row, above = _before(lamps.elevations, elevation)
+    table = lamps.log_share[lamps.lobe[lamp]]
+    low = table[row, column] + (table[row, column + 1] - table[row, column]) * aside
+    high = table[row + 1, column] + (table[row + 1, column + 1] - table[row + 1, column]) * aside
+    beyond_sides = max(azimuth - lamps.azimuths[lamps.azimuths.shape[0] - 1], 0.0)
+    beyond_ends = max(elevation - lamps.elevations[lamps.elevations.shape[0] - 1], 0.0)
+    return math.exp(low + (high - low) * above - lamps.fall_off * math.hypot(beyond_sides, beyond_ends))
+
+
+@kernel
+def find_lamps(
+    vehicles: LampCarriers,
+    lamps: LampTable,
+    eye: NDArray[np.float64],
+    farthest: float,
+    found: NDArray[np.float64],
+    which: NDArray[np.int64],
+) -> int:
+    """Find the lit lamps on the side of their vehicle that the eye is on; their count.
+
+    Takes `eye` (3,) [m], `farthest` [m], `which` (2, n) int64.
+    """
+    position, turned, size = vehicles.position, vehicles.turned, vehicles.size
+    count = 0
+    for row in range(len(vehicles.body)):
+        dx, dy, dz = eye[0] - position[row, 0], eye[1] - position[row, 1], eye[2] - position[row, 2]
+        if abs(dx) + abs(dy) > farthest:
+            continue
+        cosine, sine, level, rise = turned[0, row], turned[1, row], turned[2, row], turned[3, row]
+        length, width, height = size[0, row], size[1, row], size[2, row]
+        onward, aside = dx * cosine + dy * sine, dy * cosine - dx * sine
+        ahead, above = onward * level + dz * rise, dz * level - onward * rise
+        for column in range(lamps.of_body.shape[1]):
+            lamp = lamps.of_body[vehicles.body[row], column]
+            bits = vehicles.lit[row] & lamps.mask[lamp] & ~(vehicles.lit[row] >> lamps.dark_shift[lamp])
+            # The eye sees lamps at the front from before it, those at the rear from behind it.
+            before = ahead > 0.0 if lamps.forwards[lamp] > 0.0 else ahead + length < 0.0
+            if lamp < 0 or bits == 0 or not before:
+                continue
+            x, y, z = lamps.place[lamp, 0] * length, lamps.place[lamp, 1] * width, lamps.place[lamp, 2] * height
+            forward, left, up = ahead - x, aside - y, above - z
+            far = math.sqrt(forward * forward + left * left + up * up + 1e-12)
+            facing = max(forward * lamps.forwards[lamp] / far, 0.0)
+            one, sign = found[count], lamps.forwards[lamp]
+            over = x * level - z * rise
+            one[0] = position[row, 0] + over * cosine - y * sine
+            one[1] = position[row, 1] + over * sine + y * cosine
+            one[2] = position[row, 2] + x * rise + z * level
+            one[_FORWARD], one[LEFT], one[UP] = forward, left, up
+            full = lamps.intensity[lamp] if bits & lamps.signals else 0.0
+            one[_FULL_INTENSITY] = full
+            one[_INTENSITY] = full * _share_toward(lamps, lamp, forward, left, up) if full > 0.0 else 0.0
+            one[_AXIS], one[_AXIS + 1], one[_AXIS + 2] = sign * level * cosine, sign * level * sine, sign * rise
+            one[_AREA] = lamps.area[lamp] * width * height * facing
+            which[0, count], which[1, count] = lamp, bits
+            count += 1
+    return count
+
+
+_STREET_LAMP = "street_lamp"
+"""Name of the shape of a lamp with its pole."""
+
+_HEIGHT = 8.0
+"""Height of the luminous surface above the pole's foot [m]."""
+
+_SIZE = (0.5, 0.22, 0.05)
+"""Length, width and height of the luminous surface, which bulges below the head [m]."""
+
+_ARM = 1.4  # how far the head's middle lies over the road [m]
+_SPACING = 35.0
+_BESIDE = 0.5  # of poles beyond shoulder or footway [m]
+_APART = 26.0  # lamps stand on one side of a street: none is nearer to another than this [m]
+_POLE = Material((0.20, 0.205, 0.21))
+_GLOW = Material((0.55, 0.55, 0.53), Surface.LAMP_STREET)
+
+
+def street_lamp_shapes() -> dict[str, Mesh]:
+    """Shape of a lamp whose arm reaches along y, with its levels of detail."""
+    head = box((-0.16, _ARM - 0.38, _HEIGHT), (0.16, _ARM + 0.38, _HEIGHT + 0.1), _POLE)
+    (length, width, depth), glow = _SIZE, _GLOW
+    lamp = box((-width / 2, _ARM - length / 2, _HEIGHT - depth), (width / 2, _ARM + length / 2, _HEIGHT), glow)
+    arm = box((-0.04, 0.0, _HEIGHT + 0.02), (0.04, _ARM - 0.3, _HEIGHT + 0.1), _POLE)
+    near = merge((tube(-0.3, 1.2, 0.09, 0.09, _POLE), tube(1.2, _HEIGHT + 0.1, 0.06, 0.06, _POLE), arm, head, lamp))
+    far = merge((tube(-0.3, _HEIGHT, 0.06, 0.06, _POLE), head, lamp))
+    return {_STREET_LAMP: near, _STREET_LAMP + FAR: far, _STREET_LAMP + TINY: far}
+
+
+def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
+    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes."""
+    side = _outer_side(edges)
+    places, turns, spacing = [], [], Spacing(_APART)
+    for edge in edges:
+        if edge.side != side:
+            continue
+        along, heading = stations(edge.line, _SPACING, side * (edge.inner + edge.shoulder + _BESIDE))
+        free = index.clearance(along, same_level=2.5, within=1.0) > 0.3
+        # Their arms reach to the left of where they look.
+        facing = heading if side < 0 else heading + np.pi
+        for place, turn in zip(along[free], facing[free].tolist(), strict=True):
+            if spacing.takes(place):
+                places.append(place)
+                turns.append(turn)
+    return [placed(_STREET_LAMP, np.array(places), np.array(turns))] if places else []
+
+
+def _outer_side(edges: Sequence[Edge]) -> int:
+    """Side of roads, 1 left or −1 right, that most of the free sides are on: that to which vehicles keep."""
+    lengths = {side: sum(float(arc_length(edge.line)[-1]) for edge in edges if edge.side == side) for side in (1, -1)}
+    return 1 if lengths[1] > 1.001 * lengths[-1] else -1
+
+
+def street_lamp_heads(scene: Scene) -> Points:
+    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m]."""
+    batches = [batch.transforms for batch in scene.scenery if batch.shape == _STREET_LAMP]
+    if not batches:
+        return np.zeros((0, 3))
+    head = np.array([0.0, _ARM, _HEIGHT - _SIZE[2] / 2, 1.0])
+    return matrix_product(np.concatenate(batches).astype(np.float64)[:, :3], head)
+
 
 _FARTHEST_VEHICLE = 1500.0
 """Distance beyond which lamps of vehicles are left out [m]."""
@@ -110,7 +280,7 @@ def _of_vehicles(
     table = _lamps()
     numbers = _numbers(body_names(state))
     most = len(numbers) * table.lamps.of_body.shape[1]
-    found, lit = np.empty((most, FOUND)), np.empty((2, most), np.int64)
+    found, lit = np.empty((most, _FOUND)), np.empty((2, most), np.int64)
     turned = np.stack((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
     size = np.stack((state.length, state.width, state.height))
     lamps = state.lamps.astype(np.int64)
@@ -120,14 +290,14 @@ def _of_vehicles(
     vehicles = LampCarriers(position, turned, size, lamps, numbers)
     count = find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
-    _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
-    seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
+    _add_beams(found[:, _INTENSITY], lit[1], (found[:, _FORWARD], found[:, LEFT], found[:, UP]), beams)
+    seen = np.flatnonzero(found[:, _INTENSITY] > 1e-3)
     found, lit = found[seen], lit[:, seen]
     return LightSources(
         np.ascontiguousarray(found[:, :3]),
-        np.ascontiguousarray(found[:, INTENSITY]),
+        np.ascontiguousarray(found[:, _INTENSITY]),
         table.colour[lit[0]],
-        np.ascontiguousarray(found[:, AREA]),
+        np.ascontiguousarray(found[:, _AREA]),
         _lobes(table, found, lit, beams),
     )
 
@@ -135,7 +305,7 @@ def _of_vehicles(
 def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], beams: Mapping[Lamp, Beam]) -> LampLobes:
     """How the lamps found shine: signals by their lobes, head lamps and front fog lamps by what burns of them."""
     kinds, kind = list(SIGNAL_LOBES), table.lamps.lobe[lit[0]]
-    scale = found[:, FULL_INTENSITY] / FULL
+    scale = found[:, _FULL_INTENSITY] / FULL
     burning = lit[1] & sum(map(int, beams))
     for bits in np.unique(burning).tolist():
         if bits:
@@ -143,7 +313,7 @@ def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], be
             kind = np.where(chosen, len(kinds), kind)
             scale = np.where(chosen, 1.0, scale)
             kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & lamp)))
-    return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, AXIS : AXIS + 3]))
+    return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, _AXIS : _AXIS + 3]))
 
 
 @lru_cache(maxsize=16)
@@ -173,7 +343,7 @@ def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSo
     near = np.flatnonzero((distance < _FARTHEST_STREET_LAMP) & (offset[:, 2] < 0))
     down = -offset[near, 2] / distance[near]
     intensity = np.interp(np.arccos(down), STREET_ANGLES, STREET_INTENSITIES)
-    length, width, depth = SIZE
+    length, width, depth = _SIZE
     # The surface bulges below the head, so that it does not vanish when seen from the side.
     area = length * width * down + 0.5 * (length + width) * depth * np.sqrt(1.0 - down**2)
     count = len(near)
@@ -185,7 +355,7 @@ def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> Stree
     """Street lamps as what lights the road (`heads` (n, 3) [m], `sky_illuminance` [lx])."""
     tint = _luminance_one(_WARM)
     colour = (float(tint[0]), float(tint[1]), float(tint[2]))
-    return StreetLighting(heads, HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)
+    return StreetLighting(heads, _HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)
 
 
 def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -6,9 +6,18 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.chainage import Chainage
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, arc_length, at_distance, cleaned, left_normals, parallel, refined, true_spans
+from fogsim.scene.polyline import (
+    Chainage,
+    Points,
+    arc_length,
+    at_distance,
+    cleaned,
+    left_normals,
+    parallel,
+    refined,
+    true_spans,
+)
 from fogsim.scene.solids import Material, folds, grid, grid_faces, grid_normals, mesh
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking
 from fogsim.values.scene import Instance, Mesh, Surface

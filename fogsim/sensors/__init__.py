@@ -9,8 +9,7 @@ from fogsim.sensors.faults import (
     faulty_signs,
 )
 from fogsim.sensors.gps import Fix, Gps, measure_fix
-from fogsim.sensors.lead import LeadSensor, measure_lead
-from fogsim.sensors.radar_shadow import RadarShadow
+from fogsim.sensors.lead import LeadSensor, RadarShadow, measure_lead
 from fogsim.sensors.scatterometer import Scatterometer
 from fogsim.sensors.signs import signs_ahead
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fogsim.advice.harmonisation import harmonised_speeds
+from fogsim.advice.presentation import harmonised_speeds
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.units import KMH_PER_MPS

@@ -10,10 +10,10 @@ from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
-from fogsim.study.engine import Engine
+from fogsim.study.execution import Engine
 from fogsim.study.plan import Study, StudyRun, load_study, shipped_studies
 from fogsim.study.pool import ProcessPool
-from fogsim.study.pooled_profiles import pool_profiles
+from fogsim.study.profiles import pool_profiles
 from fogsim.study.ray_cluster import RayCluster
 from fogsim.study.report import write_report
 from fogsim.study.table import Row, check_factors, write_table

@@ -11,7 +11,7 @@ from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.readers import read_json
 from fogsim.errors import InputError, shown
 from fogsim.recorders.manifest import versions
-from fogsim.study.engine import result_file
+from fogsim.study.execution import result_file
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.profiles import Profiles
 from fogsim.study.run_file import STUDY_RUN, CompleteRun, FailedRun, Value, read_run

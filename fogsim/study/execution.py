@@ -2,9 +2,9 @@
 
 import traceback
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import FogSimError, UnplayedWarning
@@ -14,9 +14,41 @@ from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.loop import run
 from fogsim.simulation.traffic_run import TrafficRun, run_traffic
+from fogsim.study.plan import StudyRun
 from fogsim.study.profiles import RunProfiles
 from fogsim.traffic import libsumo_traffic
 from fogsim.values import TrafficStep
+
+RunWatch = Callable[[StudyRun, str | None], None]
+"""Called with each completed run, and its error."""
+
+PROCESS_DIED = "the process that ran it died"
+"""Message for a run whose process died twice."""
+
+
+class Engine(Protocol):
+    """Processes of this machine (`fogsim.study.pool.ProcessPool`), a cluster (`fogsim.study.ray_cluster.RayCluster`).
+
+    With any engine the files are the same, byte for byte; and completed runs are kept however it ends.
+    """
+
+    def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+        """Execute runs, each outcome into its `result_file`.
+
+        Parameters
+        ----------
+        runs : sequence of StudyRun
+            The runs to execute.
+        folder : Path
+            Folder of the results, one ``KEY.json`` each.
+        watch : RunWatch
+            Called with each completed run, in this process.
+        """
+
+
+def result_file(folder: Path, run: StudyRun) -> Path:
+    """Path of a run's result in the folder of results."""
+    return folder / f"{run.key}.json"
 
 
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:

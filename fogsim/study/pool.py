@@ -14,8 +14,7 @@ from pathlib import Path
 from fogsim.core.files.atomic import write_json
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.scenario import Scenario
-from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
-from fogsim.study.execution import failure, run_to_file
+from fogsim.study.execution import PROCESS_DIED, RunWatch, failure, result_file, run_to_file
 from fogsim.study.plan import StudyRun
 
 Work = Callable[[Scenario, int, Path], str | None]

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from fogsim.metrics.road_speeds import CELL_LENGTH
 from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, padded, svg_of
 from fogsim.study.plan import Study
-from fogsim.study.pooled_profiles import Cell, PooledProfiles
-from fogsim.study.profiles import CLASS_WIDTH, CLASSES
+from fogsim.study.profiles import CLASS_WIDTH, CLASSES, Cell, PooledProfiles
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
 
 _EVEN = 1.15

@@ -20,8 +20,7 @@ from fogsim.core.files.atomic import write_bytes, write_json
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError, shown
 from fogsim.recorders.manifest import versions
 from fogsim.scenario import Scenario, build
-from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
-from fogsim.study.execution import failure, run_outcome
+from fogsim.study.execution import PROCESS_DIED, RunWatch, failure, result_file, run_outcome
 from fogsim.study.plan import StudyRun, file_digests
 
 _MOST_PROCESSES, _MOST_NODES = 2, 10

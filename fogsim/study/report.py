@@ -27,10 +27,9 @@ from fogsim.study.comparison import (
 from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, svg_of
 from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics, metric_words
 from fogsim.study.plan import Study, file_digests
-from fogsim.study.pooled_profiles import Cell, PooledProfiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
-from fogsim.study.report_tables import Table, comparison_table, events_of_both, main_tables
-from fogsim.study.report_words import summary
+from fogsim.study.profiles import Cell, PooledProfiles
+from fogsim.study.report_words import Table, comparison_table, events_of_both, main_tables, summary
 from fogsim.study.table import Row, rows_of_cells, write_csv
 
 _MOST_VARIANTS = 10

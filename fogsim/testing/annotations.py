@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from fogsim.testing.judgement import Outcome
+from fogsim.testing.page import broken_text, command_text, judgement_text
 from fogsim.testing.session import FileOutcome
-from fogsim.testing.wording import broken_text, command_text, judgement_text
 
 
 def annotations(outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> Iterator[str]:

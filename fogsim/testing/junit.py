@@ -14,9 +14,9 @@ from xml.etree import ElementTree as ET
 from fogsim.core.files.atomic import write_text
 from fogsim.testing.collection import label_of
 from fogsim.testing.judgement import Judgement, Outcome
+from fogsim.testing.page import broken_text, case_lines, command_text, judgement_text
 from fogsim.testing.results import CaseResult
 from fogsim.testing.session import FileOutcome
-from fogsim.testing.wording import broken_text, case_lines, command_text, judgement_text
 
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold."""

@@ -14,7 +14,7 @@ from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
 from fogsim.recorders.manifest import versions
-from fogsim.study.engine import Engine
+from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
 from fogsim.testing.judgement import Judgement, Outcome, judge

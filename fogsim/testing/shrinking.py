@@ -9,12 +9,12 @@ from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
 from fogsim.scenario.loading import load_cases
 from fogsim.scenario.variation import Variation, number_with_unit, value_text
-from fogsim.study.engine import Engine
+from fogsim.study.execution import Engine
 from fogsim.testing.collection import FogTest, collect
 from fogsim.testing.judgement import Judgement
+from fogsim.testing.page import command_text
 from fogsim.testing.results import CaseResult, read_result
 from fogsim.testing.session import FileOutcome
-from fogsim.testing.wording import command_text
 from fogsim.units.quantities import split_quantity
 
 _HALVINGS = 5

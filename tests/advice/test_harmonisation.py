@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from fogsim.advice.harmonisation import harmonised_speeds
+from fogsim.advice.presentation import harmonised_speeds
 
 KMH = 3.6
 

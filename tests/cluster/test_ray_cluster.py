@@ -16,7 +16,7 @@ from ray.cluster_utils import Cluster
 from fogsim.errors import InputError
 from fogsim.study import RayCluster, Row, Study, StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
-from fogsim.study.engine import RunWatch
+from fogsim.study.execution import RunWatch
 from fogsim.study.table import write_table
 
 FILES = ("study.json", "study.parquet", "study.csv", "comparison.csv", "report.html")

@@ -14,7 +14,7 @@ import pytest
 
 from fogsim.core.compiling import shipped_code
 from fogsim.core.compiling.shipped_code import KINDS, compiled_for, usable_kind, why_not_taken
-from fogsim.core.files.cache_entries import write_entry
+from fogsim.core.files.user_cache import write_entry
 
 SOURCE = """
 from fogsim.core.jit import kernel

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fogsim.conditions.bodies import Body, clearance
+from fogsim.conditions.moment import Body, clearance
 
 CAR = Body(0.0, 0.0, 0.0, 4.0, 2.0)
 

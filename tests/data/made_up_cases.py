@@ -8,7 +8,7 @@ from typing import Any
 from fogsim.core.files.atomic import write_json
 from fogsim.scenario import Scenario
 from fogsim.scenario.variation import NONE_FAILS, Verdict
-from fogsim.study.engine import RunWatch, result_file
+from fogsim.study.execution import RunWatch, result_file
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest
 

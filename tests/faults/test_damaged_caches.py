@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogsim.core.files.cache_entries import keep_newest, read_entry, replace_file, write_entry
 from fogsim.core.files.generated_files import kept_text, write_generated
+from fogsim.core.files.user_cache import keep_newest, read_entry, replace_file, write_entry
 from fogsim.traffic.road import map_cache, network
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.road_map import RoadMap
@@ -201,7 +201,7 @@ def test_a_kernel_that_cannot_be_kept_is_compiled(tmp_path: Path, monkeypatch: p
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fogsim.core.compiling.kept_code.write_entry", full)
+    monkeypatch.setattr("fogsim.core.compiling.code_libraries.write_entry", full)
     monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     used = _kernel(tmp_path / "package", "*")
     assert used.use() == (42.0, 1)

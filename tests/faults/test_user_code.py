@@ -15,7 +15,7 @@ from fogsim.advice import ADVISERS
 from fogsim.errors import InputError, MethodError
 from fogsim.scenario import build
 from fogsim.study.execution import run_to_file
-from fogsim.testing.direct import ThisProcess
+from fogsim.testing.execution import ThisProcess
 from fogsim.values.image import for_kernels
 
 Command = Callable[..., "CompletedProcess[str]"]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.core.mixture import majority
+from fogsim.core.linear_algebra import majority
 from fogsim.errors import InputError
 from fogsim.fusion import make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY

@@ -2,8 +2,7 @@
 
 import pytest
 
-from fogsim.lighting.beams import high_beam, low_beam
-from fogsim.lighting.head_lamps import LampMount, own_head_lamps
+from fogsim.lighting.beams import LampMount, high_beam, low_beam, own_head_lamps
 from fogsim.values import Lamp
 
 

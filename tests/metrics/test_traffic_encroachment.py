@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogsim.metrics.crossing import TrafficEncroachment
-from fogsim.metrics.crossing.way_kernels import crossing_pieces
+from fogsim.metrics.crossing.tracks import crossing_pieces
 from fogsim.metrics.metric import JsonValue
 from fogsim.values import TrafficState
 from tests.metrics.roads import lanes, watched

@@ -8,17 +8,12 @@ import pytest
 
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
-from fogsim.metrics.histogram import Histogram
+from fogsim.metrics.metric import Histogram
 from fogsim.metrics.surrogate import crash_potential
-from fogsim.metrics.traffic_cohort import TrafficCohort
-from fogsim.metrics.traffic_collisions import TrafficCollisions
-from fogsim.metrics.traffic_comfort import TrafficComfort
-from fogsim.metrics.traffic_compliance import TrafficCompliance
-from fogsim.metrics.traffic_conflicts import TrafficConflicts
-from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_flow import TrafficFlow
-from fogsim.metrics.traffic_headways import TrafficHeadways
-from fogsim.metrics.traffic_sight import TrafficSight
+from fogsim.metrics.traffic_comfort import TrafficComfort, TrafficCompliance, TrafficSight
+from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts, TrafficHeadways
+from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
+from fogsim.metrics.traffic_span import TrafficCohort
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Cohort, Collision
 from tests.metrics.roads import lanes, watched

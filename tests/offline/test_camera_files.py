@@ -10,7 +10,7 @@ from PIL import Image, ImageOps
 from fogsim.errors import InputError
 from fogsim.offline import find_source
 from fogsim.offline.image_files import read_image
-from fogsim.offline.video_file import VideoWriter
+from fogsim.offline.video_source import VideoWriter
 from fogsim.recorders.video import ffmpeg_program
 
 TIMES = (0.0, 0.05, 0.1, 0.5, 0.9, 2.0)

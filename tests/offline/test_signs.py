@@ -17,7 +17,7 @@ from fogsim.offline import ImageFiles, SignWatch, estimate_images, record_lines,
 from fogsim.offline.drive.sign_file import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
 from fogsim.offline.drive.track_file import load_track, metres_per_radian
 from fogsim.offline.overlay import Overlay
-from fogsim.recorders.sign_map import NET, write_sign_map
+from fogsim.recorders.sign_marks import NET, write_sign_map
 from fogsim.recorders.style import ADVICE, MUTED
 from fogsim.values import Camera, Sign, SignMap
 

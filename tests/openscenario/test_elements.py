@@ -9,8 +9,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario, read_parameter_cases
-from fogsim.openscenario.elements import HARMLESS, REFUSED
-from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, read_xml
 
 DATA = Path(__file__).parents[1] / "data"
 SCHEMA = {

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import fogsim
 from fogsim.cli.app import app
-from fogsim.core.files.maps import MAPS
+from fogsim.core.files.readers import MAPS
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net

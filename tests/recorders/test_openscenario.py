@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogsim.openscenario.xml_tree import Node, read_xml
-from fogsim.recorders.exchange.openscenario import FARTHEST, OpenScenarioRecorder
+from fogsim.recorders.trajectories import FARTHEST, OpenScenarioRecorder
 from tests.recorders.synthetic import make_step
 
 # Sequences of ASAM's OpenSCENARIO 1.2 schema, as far as they are written.

@@ -12,7 +12,7 @@ from PIL import Image
 from fogsim.metrics import RunMetrics, step_metrics
 from fogsim.recorders import ReportRecorder, RunDirectory, RunInformation, versions
 from fogsim.recorders.report import key_numbers, shown_metric
-from fogsim.recorders.report_data import MOST_PICTURES, Album, DecisiveFrames
+from fogsim.recorders.report_figures import MOST_PICTURES, Album, DecisiveFrames
 from fogsim.values import Step
 from tests.recorders.synthetic import METHODS, drive, make_step
 

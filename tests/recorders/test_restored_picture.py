@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 
 import fogsim
-from fogsim.recorders.panel.camera_picture import draw_camera_picture
-from fogsim.recorders.panel.restored_picture import draw_restored_picture
+from fogsim.recorders.panel.camera_picture import draw_camera_picture, draw_restored_picture
 from fogsim.values import LightMeasurement, Step
 
 SMALL = ("camera.width=320", "camera.height=240", "traffic.events=[]", "duration_s=2")

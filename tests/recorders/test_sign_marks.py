@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.recorders.panel.camera_picture import draw_camera_picture
-from fogsim.recorders.report_data import SignBook
+from fogsim.recorders.report_figures import SignBook
 from fogsim.recorders.sign_marks import looks_of, sign_looks, sign_text
 from fogsim.recorders.style import ADVICE, MUTED, Colour
 from fogsim.values import SignLook, SignSighting, Step

@@ -9,8 +9,8 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.render import RENDERERS, Renderer, RenderError, best_renderer, make_renderer
 from fogsim.render.cpu.rasteriser import CPURasteriser
-from fogsim.render.culling import shapes_of
 from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable
+from fogsim.render.renderer import shapes_of
 from fogsim.render.shading.surfaces import retroreflection
 from fogsim.scene import vehicle_batches
 from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Surface

@@ -13,7 +13,7 @@ from fogsim.render import RenderError
 from fogsim.render.cpu.rasteriser import CPURasteriser
 from fogsim.render.drawing import NEAR, NOTHING, RECORD, Drawing, MeshTable
 from fogsim.render.opengl.context import context
-from fogsim.render.opengl.packing import COMMAND, COPY, corners, packed
+from fogsim.render.opengl.meshes import COMMAND, COPY, corners, packed
 from fogsim.render.opengl.rasteriser import GLRasteriser
 from fogsim.values import Camera, CameraPose, Mesh
 from fogsim.values.pinhole import camera_axes

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.render.projection import clip_from_camera, highest_terrain_row
+from fogsim.render.projection import clip_from_camera
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
@@ -46,11 +46,3 @@ def test_a_ray_projects_back_to_its_pixel() -> None:
         right, down, ahead = camera_axes(CAMERA, POSE) @ ray
         assert ahead == pytest.approx(1.0)
         assert (310 + 577 * right, 250 + 577 * down) == pytest.approx(pixel)
-
-
-def test_the_first_row_with_terrain_is_the_one_below_the_horizon() -> None:
-    level = Camera(64, 48, 60.0, (32.0, 24.0), 1.0, pitch=0.1)
-    here = CameraPose((0, 0, 1), 0.0)
-    assert highest_terrain_row(level, here) == math.floor(level.horizon_row) + 1
-    assert highest_terrain_row(Camera(64, 48, 60.0, (32.0, 24.0), 1.0, pitch=-0.9), here) == 48
-    assert highest_terrain_row(Camera(64, 48, 60.0, (32.0, 24.0), 1.0, pitch=0.9), here) == 0

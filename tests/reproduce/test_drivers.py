@@ -9,12 +9,22 @@ from fogsim.core.kinematics import safe_speed
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.drivers import reproduce
 from fogsim.reproduce.drivers.findings import FINDINGS, SIX
-from fogsim.reproduce.drivers.motorway import drive
-from fogsim.reproduce.drivers.pairs import follow, measured_pairs
 from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME, Measures, Passages, measured, passages
-from fogsim.reproduce.drivers.plan import CALIBRATION_SEEDS, CLEAR, DEFAULT, SEEING, SIGNED, SLOW, SPARSE, Case, Plan
+from fogsim.reproduce.drivers.plan import (
+    CALIBRATION_SEEDS,
+    CLEAR,
+    DEFAULT,
+    SEEING,
+    SIGNED,
+    SLOW,
+    SPARSE,
+    Case,
+    Plan,
+    Results,
+    interval,
+)
 from fogsim.reproduce.drivers.published import Bound, Look, Sign, Size, Verdict
-from fogsim.reproduce.drivers.results import Results, interval
+from fogsim.reproduce.drivers.road import drive, follow, measured_pairs
 
 PART = Plan(
     seeds=(1,),

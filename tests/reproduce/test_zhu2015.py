@@ -13,10 +13,9 @@ from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
-from fogsim.reproduce.road_sweeps import GROWTHS, SETTINGS
+from fogsim.reproduce.road_sweeps import GROWTHS, ROAD, SETBACK, SETTINGS, drive, observed, worn
 from fogsim.reproduce.road_sweeps import VISIBILITIES as VISIBILITIES_OF_SWEEPS
 from fogsim.reproduce.zhu2015 import CAMERA, EDGE, TITLES, WEATHERS, Size, reproduce, right_share
-from fogsim.reproduce.zhu2015_drive import ROAD, SETBACK, drive, observed, worn
 from fogsim.values import CameraPose, View
 
 DRIVES, VISIBILITIES, FRAMES = 2, 2, 4

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fogsim.scene.bodies import LIT_AREAS, bodies, body_of, body_shapes
+from fogsim.scene.vehicles import LIT_AREAS, bodies, body_of, body_shapes
 from fogsim.values import Surface
 from make_bodies import FILE, pack_bodies
 from vehicle_bodies.lamp_patches import lamp_patches, lamp_quads

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.scene.chainage import Chainage
-from fogsim.scene.polyline import arc_length, at_distance, parallel
+from fogsim.scene.polyline import Chainage, arc_length, at_distance, parallel
 from fogsim.values import Lane, LaneMarking
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
-from fogsim.scene.bodies import body_shapes
 from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSITIES
+from fogsim.scene.vehicles import body_shapes
 from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
 from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 

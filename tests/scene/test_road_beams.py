@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fogsim.lighting.head_lamps import LampMount
+from fogsim.lighting.beams import LampMount
 from fogsim.scene import road_beams
 from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import Side, dark_on

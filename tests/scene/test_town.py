@@ -12,7 +12,7 @@ from fogsim.render.photometry import lamp_radiance
 from fogsim.scene import build_scene, light_sources
 from fogsim.scene.road import KERB
 from fogsim.scene.town import person_batches, person_shapes, signal_batches, signal_posts, signal_shapes
-from fogsim.scene.town.figures import STANDING
+from fogsim.scene.town.persons import STANDING
 from fogsim.scene.town.traffic_lights import directed_share
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.units import luminance_of

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.render import Renderer, make_renderer
-from fogsim.scene.bodies import bodies, body_shapes
+from fogsim.scene.vehicles import bodies, body_shapes
 from fogsim.values import Batch, Camera, CameraPose, Mesh, Scene
 
 ILLUMINANCE = 1e4

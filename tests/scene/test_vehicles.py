@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fogsim.scene import vehicle_batches
-from fogsim.scene.bodies import body_of, body_shapes
+from fogsim.scene.vehicles import body_of, body_shapes
 from fogsim.values import Lamp, TrafficState
 
 KINDS = ("car", "van", "truck", "bus", "motorcycle", "hovercraft")

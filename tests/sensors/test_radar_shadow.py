@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.sensors import LeadSensor, RadarShadow, measure_lead
-from fogsim.sensors.radar_shadow import foliage_loss
+from fogsim.sensors.lead import foliage_loss
 from fogsim.values import Leader, Structure, StructureKind
 
 RADAR, REAR = (0.0, 0.0, 0.6), ((100.0, -1.0, 0.6), (100.0, 0.0, 0.6), (100.0, 1.0, 0.6))

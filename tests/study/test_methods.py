@@ -13,8 +13,7 @@ from fogsim.study import load_study
 from fogsim.study.comparison import compare_to_baseline
 from fogsim.study.plan import Study
 from fogsim.study.report import study_methods
-from fogsim.study.report_tables import event_count
-from fogsim.study.report_words import scarce_events
+from fogsim.study.report_words import event_count, scarce_events
 
 ALONE = """
 scenario: motorway_fog_bank

@@ -8,7 +8,7 @@ import pytest
 
 from fogsim.scenario import load_scenario
 from fogsim.study import StudyRun
-from fogsim.study.engine import result_file
+from fogsim.study.execution import result_file
 from fogsim.study.pool import ProcessPool
 
 SCENARIO = load_scenario("motorway_fog_bank")

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.metrics import RunMetrics, TrafficRunMetrics, road_speeds
-from fogsim.study.pooled_profiles import PooledProfiles
-from fogsim.study.profiles import RunProfiles
+from fogsim.study.profiles import PooledProfiles, RunProfiles
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Step, TrafficState, TrafficStep
 from tests.metrics.roads import lanes as traffic

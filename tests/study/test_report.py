@@ -12,9 +12,8 @@ import pytest
 from fogsim.scenario import load_scenario
 from fogsim.study.main_metrics import MAIN_METRICS, signed
 from fogsim.study.plan import Study, StudyRun
-from fogsim.study.pooled_profiles import PooledProfiles, pool_profiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure
-from fogsim.study.profiles import CLASSES
+from fogsim.study.profiles import CLASSES, PooledProfiles, pool_profiles
 from fogsim.study.report import trade_off_figure, write_report
 
 FACTORS = {"policy": ("none", "slow <1>"), "fog": ("thin", "thick")}

@@ -19,8 +19,7 @@ from fogsim.errors import InputError
 from fogsim.scenario.parts import methods
 from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
-from fogsim.study.engine import RunWatch, result_file
-from fogsim.study.execution import run_to_file
+from fogsim.study.execution import RunWatch, result_file, run_to_file
 from fogsim.study.profiles import RunProfiles
 from fogsim.values import SpeedAdvice
 

@@ -10,7 +10,7 @@ import pytest
 from early_motorway import ROUTES
 
 from fogsim.testing import check_one_case
-from fogsim.testing.direct import ThisProcess
+from fogsim.testing.execution import ThisProcess
 
 pytest_plugins = ["pytester"]
 

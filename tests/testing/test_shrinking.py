@@ -9,7 +9,7 @@ from early_motorway import ROUTES
 from made_up_cases import complete
 
 from fogsim.core.files.atomic import write_json
-from fogsim.study.engine import RunWatch, result_file
+from fogsim.study.execution import RunWatch, result_file
 from fogsim.study.plan import StudyRun
 from fogsim.testing import collect, run_tests
 from fogsim.testing.shrinking import shrink, smallest_text

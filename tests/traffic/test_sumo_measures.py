@@ -17,10 +17,8 @@ from fogsim.metrics.cross_sections.traffic_throughput import SPACING
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
-from fogsim.metrics.traffic_collisions import TrafficCollisions
-from fogsim.metrics.traffic_conflicts import TrafficConflicts
-from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_flow import TrafficFlow
+from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
+from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.traffic import DriverSetup, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink

@@ -1,4 +1,4 @@
-"""Models of the bodies of vehicles, from which ``tools/make_bodies.py`` makes the data of ``fogsim.scene.bodies``."""
+"""Models of the bodies of vehicles, from which ``tools/make_bodies.py`` makes the data of ``fogsim.scene.vehicles``."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.scene.bodies import LIT_AREAS
 from fogsim.scene.solids import Material, disc, grid, grid_faces, merge, mesh, polygon, quad
+from fogsim.scene.vehicles import LIT_AREAS
 from fogsim.values.scene import Mesh, Surface
 from vehicle_bodies.lamp_patches import with_lit_areas
 from vehicle_bodies.solids import PAINT, TYRE, UNDERBODY, both_sides, mirrored

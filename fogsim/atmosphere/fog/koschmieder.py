@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.airlight import airlight_source
 from fogsim.atmosphere.fog.frustum import frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder_kernels import BankedFog, fog_rows
-from fogsim.atmosphere.fog.layer_airlight import slant_airlight
-from fogsim.atmosphere.fog.layer_airlight_kernels import LayeredFog, layered_fog_rows
-from fogsim.atmosphere.fog.medium import has_closed_form
-from fogsim.atmosphere.fog.shelter_kernels import find_pixels_within
+from fogsim.atmosphere.fog.layer_airlight import LayeredFog, layered_fog_rows, slant_airlight
+from fogsim.atmosphere.fog.medium import find_pixels_within, has_closed_form
 from fogsim.core.jit import Bands, kernel
 from fogsim.obstruction import Obstructions, Tunnel
 from fogsim.values import Camera, CameraPose, FogBank, FogField, FogShelter, View

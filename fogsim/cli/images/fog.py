@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from fogsim.offline.layered_fog import FogLayer
-    from fogsim.offline.road_plane import RoadPlane
+    from fogsim.offline.rectification import RoadPlane
 
 
 def fog_command(
@@ -132,7 +132,7 @@ def _fog_depth(
 
 def _road(image: Path, camera: Path | None, geometry: dict[str, float | None]) -> "RoadPlane":
     from fogsim.offline.camera_file import load_calibration
-    from fogsim.offline.road_plane import RoadPlane, calibration_from_options
+    from fogsim.offline.rectification import RoadPlane, calibration_from_options
 
     given = {option: value for option, value in geometry.items() if value is not None}
     if camera is not None:

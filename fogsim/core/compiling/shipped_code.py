@@ -16,8 +16,8 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 import numba
 from numba.core import caching, config
 
-from fogsim.core.compiling.kept_code import KeptCode
-from fogsim.core.files.cache_entries import read_entry
+from fogsim.core.compiling.code_libraries import KeptCode
+from fogsim.core.files.user_cache import read_entry
 
 PACKAGE = Path(__file__).parents[2]
 FOLDER = PACKAGE / "_kernels"

@@ -5,9 +5,8 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from fogsim.core.files.cache_entries import keep_newest, read_entry, replace_file, write_entry
 from fogsim.core.files.readers import read_bytes
-from fogsim.core.files.user_cache import VARIABLE, cache_directory
+from fogsim.core.files.user_cache import VARIABLE, cache_directory, keep_newest, read_entry, replace_file, write_entry
 from fogsim.errors import InputError
 
 _MOST_KEPT = 200  # of each type; the oldest are removed

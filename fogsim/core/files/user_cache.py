@@ -1,8 +1,57 @@
 """The cache directory of the user."""
 
+import contextlib
+import hashlib
 import os
+import shutil
 import sys
 from pathlib import Path
+
+from fogsim.core.files.readers import read_bytes
+from fogsim.errors import InputError
+
+_CHECKSUM_SIZE = 32
+_MOST_BYTES = 2**30
+
+
+def read_entry(path: Path) -> bytes | None:
+    """Content of an entry; None if it is missing, damaged or unreadable."""
+    try:
+        stored = memoryview(read_bytes(path, _MOST_BYTES))
+    except InputError:
+        return None
+    content, checksum = stored[:-_CHECKSUM_SIZE], stored[-_CHECKSUM_SIZE:]
+    return bytes(content) if hashlib.sha256(content).digest() == checksum else None
+
+
+def write_entry(path: Path, content: bytes) -> None:
+    """Write an entry; raises OSError if it cannot be written."""
+    # The checksum is at the end, where pickle and zip ignore it: other readers of such files still work.
+    replace_file(path, content + hashlib.sha256(content).digest())
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file of the cache, replacing an existing one; several processes may do so at once."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.{os.urandom(8).hex()}.part")
+    try:
+        part.write_bytes(content)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def keep_newest(folder: Path, most: int) -> None:
+    """Remove all files and folders in a folder of the cache except the `most` newest."""
+    with contextlib.suppress(OSError):
+        for old in sorted(folder.iterdir(), key=lambda path: path.lstat().st_mtime)[:-most]:
+            if old.is_dir() and not old.is_symlink():
+                shutil.rmtree(old, ignore_errors=True)
+            else:
+                old.unlink(missing_ok=True)
+
 
 VARIABLE = "FOGSIM_CACHE_DIR"
 """Environment variable with another directory."""

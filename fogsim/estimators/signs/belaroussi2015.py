@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Self
 
-from fogsim.core.mixture import majority, reduced
+from fogsim.core.linear_algebra import majority, reduced
 from fogsim.core.parameters import FileName, Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck

@@ -8,8 +8,16 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.crossing.tracks import UNKNOWN, Floats, Fronts, Junctions, Numbers, Tracks, tracks_through
-from fogsim.metrics.crossing.way_kernels import crossing_pieces
+from fogsim.metrics.crossing.tracks import (
+    UNKNOWN,
+    Floats,
+    Fronts,
+    Junctions,
+    Numbers,
+    Tracks,
+    crossing_pieces,
+    tracks_through,
+)
 from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from fogsim.core.files.readers import number_within, read_json
 from fogsim.errors import InputError, shown
-from fogsim.recorders.sign_map import NET
+from fogsim.recorders.sign_marks import NET
 from fogsim.scene import SIGN_KINDS
 from fogsim.units import KMH_PER_MPS
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.opengl.context import context
-from fogsim.render.opengl.packing import corners, packed
+from fogsim.render.opengl.meshes import corners, packed
 from fogsim.render.projection import clip_from_offset
 from fogsim.render.protocol import RenderError
 from fogsim.values.camera import Camera, CameraPose

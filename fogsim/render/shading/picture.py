@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import Bands, kernel
 from fogsim.render.drawing import Drawing, MeshTable
-from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
+from fogsim.render.projection import Lens, lens_of
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
 from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Spans, Wide
-from fogsim.render.shading.noise import Noise, tiles
-from fogsim.render.shading.objects import shade_objects, shade_sky
 from fogsim.render.shading.pavement import Asphalt, asphalt
 from fogsim.render.shading.road import shade_road
-from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces
-from fogsim.render.shading.texture import GRASS, Row, memory_for_row, set_texture
+from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces, shade_objects, shade_sky
+from fogsim.render.shading.texture import GRASS, Noise, Row, memory_for_row, set_texture, tiles
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View

@@ -5,14 +5,13 @@ import math
 import numpy as np
 
 from fogsim.core.jit import kernel
-from fogsim.render.lens import Lens
+from fogsim.render.projection import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
 from fogsim.render.shading.layout import Array, Picture, Spans, Wide
 from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
-from fogsim.render.shading.noise import Noise
 from fogsim.render.shading.pavement import Asphalt, mean_of_stretches, reflectance_at
-from fogsim.render.shading.texture import ASPHALT, Row, set_texture
+from fogsim.render.shading.texture import ASPHALT, Noise, Row, set_texture
 from fogsim.render.vectors import Vector
 
 _DEPTH, _ALONG, _ACROSS, _WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE

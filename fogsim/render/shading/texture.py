@@ -1,5 +1,6 @@
 """Texture of the ground along a row of pixels, by where on the ground they look."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -7,10 +8,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.render.lens import Lens
+from fogsim.render.projection import Lens
 from fogsim.render.shading.layout import Array, Numbers
-from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
 from fogsim.render.vectors import Vector
+
+_GRAIN = 256
+"""Side of the tile of independent numbers."""
+
+_SMOOTH = 128
+"""Side of the tile of smooth noise."""
+
+_PER_CELL = 8
+"""Numbers of the smooth tile from one random value to the next."""
+
+
+class Noise(NamedTuple):
+    """Tiles; the squares of a tile lie row after row."""
+
+    grain: NDArray[np.float32]  # Independent numbers
+    smooth: NDArray[np.float32]  # Value noise
+
+
+@functools.cache
+def tiles() -> Noise:
+    """Make the tiles, the same ones always."""
+    rng = np.random.default_rng(20260)
+    grain = rng.uniform(-1.0, 1.0, (_GRAIN, _GRAIN))
+    cells = rng.uniform(-1.0, 1.0, (_SMOOTH // _PER_CELL, _SMOOTH // _PER_CELL))
+    share = np.arange(_SMOOTH) % _PER_CELL / _PER_CELL
+    weight, low = share * share * (3.0 - 2.0 * share), np.arange(_SMOOTH) // _PER_CELL
+    high = (low + 1) % len(cells)
+    rows = cells[low] * (1.0 - weight[:, None]) + cells[high] * weight[:, None]
+    smooth = rows[:, low] * (1.0 - weight) + rows[:, high] * weight
+    return Noise(_normalised(grain), _normalised(smooth))
+
+
+def _normalised(tile: NDArray[np.float64]) -> NDArray[np.float32]:
+    centred = tile - tile.mean()
+    flat: NDArray[np.float32] = (centred / centred.std()).astype(np.float32).ravel()
+    flat.flags.writeable = False
+    return flat
+
 
 ASPHALT = ((0.01, 0.25, 3.0, 12.0), (0.12, 0.025, 0.012, 0.02))
 """Sides of the squares of noise [m] and deviations of reflectance: grain, mottling, patches and large patches."""
@@ -85,19 +123,19 @@ def set_texture(
             # Squares are as large as the narrow side of a pixel, so that every pixel has its own.
             narrow = min(wide, long)
             if strength_1 > _FAINTEST:
-                scale_1, x_1, y_1 = _scale(0.5 * sides[0], GRAIN, narrow, eye[0], eye[1])
+                scale_1, x_1, y_1 = _scale(0.5 * sides[0], _GRAIN, narrow, eye[0], eye[1])
             if strength_2 > _FAINTEST:
-                scale_2, x_2, y_2 = _scale(sides[1] / PER_CELL, SMOOTH, narrow / PER_CELL, eye[0], eye[1])
+                scale_2, x_2, y_2 = _scale(sides[1] / _PER_CELL, _SMOOTH, narrow / _PER_CELL, eye[0], eye[1])
         place_0 = (eye[0] + rx * z - middle * ux, eye[1] + ry * z - middle * uy)
         _add_patches((sides[2], strength_3), (sides[3], strength_4), place_0, (ux, uy), begin, after, smooth, work)
         # Grain and mottling.
         if strength_1 > _FAINTEST:
-            _set_tile_places(work, rays, row, begin, after, (scale_1, x_1, y_1, GRAIN))
+            _set_tile_places(work, rays, row, begin, after, (scale_1, x_1, y_1, _GRAIN))
             amount = np.float32(strength_1)
             for i in range(np.uint64(begin), np.uint64(after)):
                 texture[i] += amount * grain[place[i]]
         if strength_2 > _FAINTEST:
-            _set_tile_places(work, rays, row, begin, after, (scale_2, x_2, y_2, SMOOTH))
+            _set_tile_places(work, rays, row, begin, after, (scale_2, x_2, y_2, _SMOOTH))
             amount = np.float32(strength_2)
             for i in range(np.uint64(begin), np.uint64(after)):
                 texture[i] += amount * smooth[place[i]]
@@ -176,13 +214,13 @@ def _doubled(side: float, narrow: float) -> float:
 @kernel
 def _smooth_at(tile: Array, x: float, y: float, side: float) -> float:
     """Smooth noise with cells of a side [m], between its numbers too."""
-    x, y = x * (PER_CELL / side), y * (PER_CELL / side)
+    x, y = x * (_PER_CELL / side), y * (_PER_CELL / side)
     left, top = math.floor(x), math.floor(y)
-    a, b, mask = x - left, y - top, SMOOTH - 1
+    a, b, mask = x - left, y - top, _SMOOTH - 1
     i, j = int(left) & mask, int(top) & mask
     k, m = (i + 1) & mask, (j + 1) & mask
-    upper = tile[j * SMOOTH + i] * (1.0 - a) + tile[j * SMOOTH + k] * a
-    lower = tile[m * SMOOTH + i] * (1.0 - a) + tile[m * SMOOTH + k] * a
+    upper = tile[j * _SMOOTH + i] * (1.0 - a) + tile[j * _SMOOTH + k] * a
+    lower = tile[m * _SMOOTH + i] * (1.0 - a) + tile[m * _SMOOTH + k] * a
     return float(upper * (1.0 - b) + lower * b)
 
 

@@ -17,8 +17,7 @@ from fogsim.reproduce.airlight.picture import picture
 from fogsim.reproduce.huang2015_chase import drawn
 from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
-from fogsim.reproduce.road_sweeps import CAMERA
-from fogsim.reproduce.zhu2015_drive import SPEED, drive
+from fogsim.reproduce.road_sweeps import CAMERA, SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, Frame, LeadMeasurement, Observation, View
 

@@ -2,12 +2,10 @@
 
 import math
 
-from fogsim.reproduce.drivers.motorway import drive
-from fogsim.reproduce.drivers.pairs import PairMeasures, follow
 from fogsim.reproduce.drivers.passages import Measures, measured
 from fogsim.reproduce.drivers.picture import picture
-from fogsim.reproduce.drivers.plan import REPORT_SEEDS, SIGNED, SIGNS, Case, Pair, Plan
-from fogsim.reproduce.drivers.results import Results
+from fogsim.reproduce.drivers.plan import REPORT_SEEDS, SIGNED, SIGNS, Case, Pair, Plan, Results
+from fogsim.reproduce.drivers.road import PairMeasures, drive, follow
 from fogsim.reproduce.drivers.tables import records, tables
 from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched

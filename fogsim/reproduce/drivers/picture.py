@@ -11,8 +11,7 @@ from PIL import Image
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME
-from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SEEING, SPARSE, Case, Plan
-from fogsim.reproduce.drivers.results import Results, interval
+from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SEEING, SPARSE, Case, Plan, Results, interval
 from fogsim.units import KMH_PER_MPS
 
 _COLOURS = {DEFAULT: "tab:blue", SEEING: "tab:orange"}

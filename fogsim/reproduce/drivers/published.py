@@ -8,8 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SIGNED, Case, Pair
-from fogsim.reproduce.drivers.results import Results
+from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SIGNED, Case, Pair, Results
 
 NEAR, _FACTOR = 0.3, 2.0
 """Relative error of a size up to which ours is inside, and factor up to which it is not outside [-]."""

@@ -5,17 +5,23 @@ SUMO's instantaneous loops write every passage into a file, which is read.
 
 import math
 import tempfile
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.core.files.xml_reader import read_tree
+from fogsim.reproduce.drivers.passages import Passages, passages
 from fogsim.scenario import build, load_scenario
-from fogsim.traffic import AfterCollision, Event, TrafficSetup, libsumo_traffic
+from fogsim.traffic import AfterCollision, BrakeEvent, Event, TrafficSetup, Trigger, libsumo_traffic
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField
+from fogsim.values import Command, Display, FogField, Stretch, StretchAdvice
 
-EDGE, EGO = "road", "first"
+_EDGE, EGO = "road", "first"
 """Ids of the road's edge, and of the ego, which drives ahead of all others and meets no one."""
 
 _WIDTH = 3.75
@@ -32,7 +38,7 @@ STEP = 0.2
 
 _FIRST_VEHICLE = (
     '<vType id="fast" vClass="passenger" speedFactor="1.3"/>'
-    f'<route id="r" edges="{EDGE}"/><vehicle id="{EGO}" type="fast" route="r" depart="0" departSpeed="max"/>'
+    f'<route id="r" edges="{_EDGE}"/><vehicle id="{EGO}" type="fast" route="r" depart="0" departSpeed="max"/>'
 )
 """The ego and the route of all, as the beginning of a demand."""
 
@@ -71,7 +77,7 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
     net.write_text(_net(lanes), encoding="utf-8")
     routes.write_text(f"<routes>{_FIRST_VEHICLE}{demand}</routes>", encoding="utf-8")
     rows = (
-        f'<instantInductionLoop id="{i}" lane="{EDGE}_{i}" pos="{_LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
+        f'<instantInductionLoop id="{i}" lane="{_EDGE}_{i}" pos="{_LOOPS_AT}" file="loops.xml"/>' for i in range(lanes)
     )
     loops.write_text(f"<additional>{''.join(rows)}</additional>", encoding="utf-8")
     return replace(
@@ -90,13 +96,92 @@ def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) ->
 def _net(lanes: int) -> str:
     y = [-(lanes - 0.5 - lane) * _WIDTH for lane in range(lanes)]
     rows = "".join(
-        f'<lane id="{EDGE}_{i}" index="{i}" speed="{LIMIT}" length="{LENGTH}" shape="0,{y[i]} {LENGTH},{y[i]}"/>'
+        f'<lane id="{_EDGE}_{i}" index="{i}" speed="{LIMIT}" length="{LENGTH}" shape="0,{y[i]} {LENGTH},{y[i]}"/>'
         for i in range(lanes)
     )
-    incoming = " ".join(f"{EDGE}_{i}" for i in range(lanes))
+    incoming = " ".join(f"{_EDGE}_{i}" for i in range(lanes))
     return (
-        f'<net version="1.20"><edge id="{EDGE}" from="a" to="b" priority="1">{rows}</edge>'
+        f'<net version="1.20"><edge id="{_EDGE}" from="a" to="b" priority="1">{rows}</edge>'
         '<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape="0,0 0,-8"/>'
         f'<junction id="b" type="dead_end" x="{LENGTH}" y="0" incLanes="{incoming}" intLanes="" '
         f'shape="{LENGTH},-8 {LENGTH},0"/></net>'
+    )
+
+
+_APART, _BEHIND = 120.0, 3.0
+"""Time from one leader to the next, and from a leader to its follower, as they enter [s]."""
+
+
+class PairMeasures(NamedTuple):
+    """What is measured of followers; NaN where nothing was there to be measured."""
+
+    out_of_sight: float  # share with a gap longer than V_met [-]
+    headway: float  # median [s]
+    headway_in_sight: float  # mean where the gap is at most V_met [s]
+
+
+def follow(overrides: tuple[str, ...], leader_speed: float, visibility: float, seed: int, count: int) -> PairMeasures:
+    """Measure drivers behind leaders of a given speed [m/s] after 2.5 km in fog of a visibility [m]."""
+    rows = "".join(
+        f'<vehicle id="leader{i}" type="car" route="r" depart="{_APART * (i + 1)}" departSpeed="{leader_speed}"/>'
+        f'<vehicle id="behind{i}" type="car" route="r" depart="{_APART * (i + 1) + _BEHIND}" departSpeed="max"/>'
+        for i in range(count)
+    )
+    demand = f'<vType id="car" vClass="passenger" tau="1.2" speedFactor="normc(1,0.1,0.7,1.3)"/>{rows}'
+    events = tuple(BrakeEvent(f"leader{i}", Trigger(at_position=0.0), to_speed=leader_speed) for i in range(count))
+    seen = passed(overrides, 1, demand, visibility, seed, _APART * (count + 4), events=events)
+    return measured_pairs(seen, visibility)
+
+
+def measured_pairs(events: Iterable[Mapping[str, str]], visibility: float) -> PairMeasures:
+    """Measure followers (``behind…``) and leaders (``leader…``) by the events of loops."""
+    left: dict[str, float] = {}
+    rows: list[tuple[float, float]] = []
+    for event in events:
+        name, time = event["vehID"], float(event["time"])
+        if event["state"] == "leave":
+            left[name] = time
+        leader = name.replace("behind", "leader")
+        if event["state"] == "enter" and leader != name and leader in left:
+            rows.append((time - left[leader], (time - left[leader]) * float(event["speed"])))
+    headway, gap = np.array(rows, np.float64).reshape(-1, 2).T
+    in_sight: NDArray[np.bool_] = gap <= visibility
+    return PairMeasures(
+        out_of_sight=float(np.mean(~in_sight)) if len(gap) else math.nan,
+        headway=float(np.median(headway)) if len(gap) else math.nan,
+        headway_in_sight=float(np.mean(headway[in_sight])) if in_sight.any() else math.nan,
+    )
+
+
+_WARM_UP = 300.0
+"""Before this time nothing counts: the road fills [s]."""
+
+_HEADWAYS = (0.5, 0.8, 1.1, 1.5, 2.0)
+"""Gaps that drivers of cars keep in clear air, of equal shares [s]: field headways spread about as much."""
+
+_LORRIES = 0.12
+"""Share of lorries, which drive at most 90 km/h."""
+
+
+def drive(
+    overrides: tuple[str, ...], demand: float, visibility: float, seed: int, seconds: float, advised: float = math.inf
+) -> Passages:
+    """Vehicles that pass the loops, by demand on both lanes [1/h], visibility [m], seconds and advised speed [m/s]."""
+    signs = StretchAdvice(advised, Stretch(edges=(_EDGE,)), Display.MESSAGE_SIGN)
+    command = Command(stretches=(signs,)) if math.isfinite(advised) else Command()
+    seen = passed(overrides, 2, _demand(demand), visibility, seed, _WARM_UP + seconds, command)
+    return passages(seen, since=_WARM_UP)
+
+
+def _demand(demand: float) -> str:
+    cars = "".join(
+        f'<vType id="car{i}" vClass="passenger" tau="{headway}" speedFactor="normc(1,0.1,0.7,1.3)" '
+        f'probability="{(1.0 - _LORRIES) / len(_HEADWAYS)}"/>'
+        for i, headway in enumerate(_HEADWAYS)
+    )
+    return (
+        f'<vTypeDistribution id="mixed">{cars}<vType id="lorry" vClass="truck" length="12" maxSpeed="25" '
+        f'tau="1.8" speedFactor="normc(1,0.05,0.8,1.2)" probability="{_LORRIES}"/></vTypeDistribution>'
+        f'<flow id="f" type="mixed" route="r" begin="0" end="1000000" period="exp({demand / 3600.0})" '
+        'departLane="random" departSpeed="max" departPos="base"/>'
     )

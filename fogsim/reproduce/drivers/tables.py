@@ -4,11 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from fogsim.reproduce.drivers.findings import FINDINGS
-from fogsim.reproduce.drivers.pairs import PairMeasures
 from fogsim.reproduce.drivers.passages import Measures
-from fogsim.reproduce.drivers.plan import SIGNED, Case, Pair, Plan
+from fogsim.reproduce.drivers.plan import SIGNED, Case, Interval, Pair, Plan, Results, interval
 from fogsim.reproduce.drivers.published import Finding, Look, Verdict
-from fogsim.reproduce.drivers.results import Interval, Results, interval
+from fogsim.reproduce.drivers.road import PairMeasures
 from fogsim.reproduce.result import Cell, Rows, TitledTable
 from fogsim.units import finite_or_none
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
-from fogsim.atmosphere.lamps.veil_kernels import VeilRays
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil, visibility_distance
 from fogsim.lighting.beams import high_beam
 from fogsim.units import extinction_from_visibility

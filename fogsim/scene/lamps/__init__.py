@@ -1,6 +1,6 @@
 """Lamps of a scene: how they shine in all directions."""
 
-from fogsim.scene.lamps.lobes import (
+from fogsim.scene.lamps.road_beams import (
     FULL,
     SIGNAL_LOBES,
     STREET_ANGLES,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.scene.roadside import placed
 from fogsim.scene.solids import Material, box, disc, merge, mesh
-from fogsim.scene.town.rods import rod
+from fogsim.scene.town.persons import rod
 from fogsim.units import luminance_of
 from fogsim.values.light import (
     SIGNAL_COLOURS,

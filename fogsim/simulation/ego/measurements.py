@@ -21,7 +21,7 @@ from fogsim.sensors import (
     measure_lead,
     signs_ahead,
 )
-from fogsim.sensors.radar_shadow import HEIGHT
+from fogsim.sensors.lead import HEIGHT
 from fogsim.values import FogField, LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
 from fogsim.values.fault import Where
 from fogsim.values.traffic import rear_of

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.files.cache_entries import keep_newest, read_entry, write_entry
-from fogsim.core.files.user_cache import cache_directory
+from fogsim.core.files.user_cache import cache_directory, keep_newest, read_entry, write_entry
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
 

@@ -14,8 +14,7 @@ from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.road_glow import RoadGlow
 from fogsim.errors import InputError
-from fogsim.lighting.beams import low_beam
-from fogsim.lighting.head_lamps import own_head_lamps
+from fogsim.lighting.beams import low_beam, own_head_lamps
 from fogsim.values import Beam, FogBank, HeadLamp, Lamp, Lights, LightSources
 from fogsim.values.luminous_intensity import luminous_intensity
 from tests.atmosphere.night_scene import CAMERA, POSE, RESPONSE, fog, rays, road_view

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, piece_length, row_points, spread_over_row
+from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
 
 PLANE = (1.0 / (0.02 + 0.00001 * np.arange(101))).astype(np.float32)
 

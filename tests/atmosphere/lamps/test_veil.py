@@ -7,8 +7,17 @@ import pytest
 
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, ray_pieces, veil_along
-from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays, integrate_veil
+from fogsim.atmosphere.lamps.veil import (
+    FOLD_DISTANCE,
+    INTERVALS,
+    LitAir,
+    VeilRays,
+    integrate_veil,
+    lit_air,
+    node_distances,
+    ray_pieces,
+    veil_along,
+)
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.units import extinction_from_visibility

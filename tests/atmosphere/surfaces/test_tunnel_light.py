@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import TunnelLight
-from fogsim.atmosphere.surfaces.tunnel_light import LAMPS_ON_ROAD
-from fogsim.atmosphere.surfaces.tunnel_light_kernels import daylight_share, sky_share
+from fogsim.atmosphere.surfaces.tunnel_light import LAMPS_ON_ROAD, daylight_share, sky_share
 from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, View
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fogsim.core.mixture import majority, reduced
+from fogsim.core.linear_algebra import majority, reduced
 from fogsim.errors import InputError
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange

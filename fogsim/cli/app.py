@@ -1,4 +1,4 @@
-"""``fogsim …``: the commands put together; errors that a user can mend, signals and exit codes."""
+"""The ``fogsim`` command: its subcommands, user errors, signals and exit codes."""
 
 import contextlib
 import errno
@@ -32,7 +32,7 @@ from fogsim.errors import FogSimError, MethodError
 
 app = typer.Typer(
     name="fogsim",
-    help="Driving in fog, closed loop: SUMO traffic, physically exact camera frames, visibility estimators, advice.",
+    help="Simulate driving in fog in a closed loop: SUMO traffic, exact camera frames, visibility estimators, advice.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -102,7 +102,7 @@ def _run_app() -> object:
     code: object = 0
     try:
         with warnings.catch_warnings():
-            # Without the place in the code that Python adds.
+            # Omit the code location that Python adds.
             warnings.showwarning = lambda message, *_, **__: print_remarks("warning", (message,), in_one_line=False)
             app()
     except SystemExit as end:

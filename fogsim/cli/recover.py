@@ -1,4 +1,4 @@
-"""``fogsim recover``: results of a run that was killed."""
+"""``fogsim recover``: recover the results of a killed run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,12 +9,10 @@ from fogsim.cli.printing import escape, stdout
 
 
 def recover_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a run that was killed.")],
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Let its results take the place of those of an earlier run.")
-    ] = False,
+    directory: Annotated[Path, typer.Argument(help="Directory of a killed run.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results of an earlier run.")] = False,
 ) -> None:
-    """Make steps.parquet of the rows of a run that was killed."""
+    """Write steps.parquet from the rows of a killed run."""
     from fogsim.recorders import recover_run
 
     for name in recover_run(directory, overwrite):

@@ -1,4 +1,4 @@
-"""``fogsim new`` and ``fogsim schema``: your own scenario from an existing one, and help for the editor."""
+"""``fogsim new`` and ``fogsim schema``: copy an existing scenario, and print schemas for editors."""
 
 import json
 from enum import StrEnum
@@ -11,7 +11,7 @@ from fogsim.cli.printing import escape, stdout
 
 
 class FileKind(StrEnum):
-    """Types of files that people write."""
+    """Types of files that users write."""
 
     SCENARIO = "scenario"
     STUDY = "study"
@@ -19,10 +19,10 @@ class FileKind(StrEnum):
 
 def new_command(
     name: Annotated[str, typer.Argument(help="Name of the new scenario, and of its folder.")],
-    source: Annotated[str, typer.Option("--from", help="A scenario of the catalogue, a file, or a folder.")],
-    parent: Annotated[Path, typer.Option("--in", help="Where the folder is made.")] = Path(),
+    source: Annotated[str, typer.Option("--from", help="Scenario name, file or folder to copy.")],
+    parent: Annotated[Path, typer.Option("--in", help="Parent of the new folder.")] = Path(),
 ) -> None:
-    """Begin a scenario of your own from one that is there, with its comments and SUMO files."""
+    """Create your own scenario from an existing one, with its comments and SUMO files."""
     from fogsim.scenario.starting import begin_scenario
 
     for file in begin_scenario(name, source, parent):
@@ -31,9 +31,9 @@ def new_command(
 
 
 def schema_command(
-    kind: Annotated[FileKind, typer.Argument(help="Which file's.")] = FileKind.SCENARIO,
+    kind: Annotated[FileKind, typer.Argument(help="Type of the file.")] = FileKind.SCENARIO,
 ) -> None:
-    """Print the JSON schema of scenario or study files, by which editors complete and check them."""
+    """Print the JSON schema of scenario or study files, which lets editors complete and check them."""
     from fogsim.scenario.json_schema import json_schema, scenario_json_schema
     from fogsim.study.plan import StudyFile
 

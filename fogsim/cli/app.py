@@ -1,4 +1,4 @@
-"""``fogsim …``: the commands put together; errors that a user can mend, signals and exit codes."""
+"""The ``fogsim`` command: its subcommands, user errors, signals and exit codes."""
 
 import contextlib
 import errno
@@ -33,7 +33,7 @@ from fogsim.errors import FogSimError, MethodError
 
 
 class FileKind(StrEnum):
-    """Types of files that people write."""
+    """Types of files that users write."""
 
     SCENARIO = "scenario"
     STUDY = "study"
@@ -41,10 +41,10 @@ class FileKind(StrEnum):
 
 def new_command(
     name: Annotated[str, typer.Argument(help="Name of the new scenario, and of its folder.")],
-    source: Annotated[str, typer.Option("--from", help="A scenario of the catalogue, a file, or a folder.")],
-    parent: Annotated[Path, typer.Option("--in", help="Where the folder is made.")] = Path(),
+    source: Annotated[str, typer.Option("--from", help="Scenario name, file or folder to copy.")],
+    parent: Annotated[Path, typer.Option("--in", help="Parent of the new folder.")] = Path(),
 ) -> None:
-    """Begin a scenario of your own from one that is there, with its comments and SUMO files."""
+    """Create your own scenario from an existing one, with its comments and SUMO files."""
     from fogsim.scenario.starting import begin_scenario
 
     for file in begin_scenario(name, source, parent):
@@ -53,9 +53,9 @@ def new_command(
 
 
 def schema_command(
-    kind: Annotated[FileKind, typer.Argument(help="Which file's.")] = FileKind.SCENARIO,
+    kind: Annotated[FileKind, typer.Argument(help="Type of the file.")] = FileKind.SCENARIO,
 ) -> None:
-    """Print the JSON schema of scenario or study files, by which editors complete and check them."""
+    """Print the JSON schema of scenario or study files, which lets editors complete and check them."""
     from fogsim.scenario.json_schema import json_schema, scenario_json_schema
     from fogsim.study.plan import StudyFile
 
@@ -65,7 +65,7 @@ def schema_command(
 
 app = typer.Typer(
     name="fogsim",
-    help="Driving in fog, closed loop: SUMO traffic, physically exact camera frames, visibility estimators, advice.",
+    help="Simulate driving in fog in a closed loop: SUMO traffic, exact camera frames, visibility estimators, advice.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -135,7 +135,7 @@ def _run_app() -> object:
     code: object = 0
     try:
         with warnings.catch_warnings():
-            # Without the place in the code that Python adds.
+            # Omit the code location that Python adds.
             warnings.showwarning = lambda message, *_, **__: print_remarks("warning", (message,), in_one_line=False)
             app()
     except SystemExit as end:

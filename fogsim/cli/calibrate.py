@@ -11,25 +11,25 @@ from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.core.interruption import interruptible
 
-calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must know of a camera.")
+calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method needs to know about a camera.")
 
 
 @calibrate.callback()
 def _commands() -> None:
-    """What is calibrated is named by a command of its own."""
+    """Group the calibrations, one command each."""
 
 
 @calibrate.command("signs")
 def calibrate_signs_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
-    sign_diameter: Annotated[float, typer.Option(help="Size of the signs in m.", min=0.1, max=5.0)] = 0.9,
-    out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("signs_range.json"),
-    approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4, max=100_000)] = 24,
-    seed: Annotated[int, typer.Option(help="Of places, errors and noise.", min=0)] = 0,
+    camera: Annotated[Path, typer.Option(help="Camera file of undistorted images (docs/how_to/own_camera.md).")],
+    sign_diameter: Annotated[float, typer.Option(help="Diameter of the signs in metres.", min=0.1, max=5.0)] = 0.9,
+    out: Annotated[Path, typer.Option(help="Calibration file to write.")] = Path("signs_range.json"),
+    approaches: Annotated[int, typer.Option(help="Signs approached in each fog.", min=4, max=100_000)] = 24,
+    seed: Annotated[int, typer.Option(help="Seed of positions, errors and noise.", min=0)] = 0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of the table.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON instead of a table.")] = False,
 ) -> None:
-    """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
+    """Measure the distance at which signs are detected in fog, from which belaroussi2015 estimates visibility."""
     from fogsim.calibration.sign_calibration import measure_operating_range
     from fogsim.core.files.atomic import write_bytes
     from fogsim.core.files.output_targets import refuse_unwritable
@@ -71,19 +71,17 @@ def calibrate_signs_command(
 
 @calibrate.command("halos")
 def calibrate_halos_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
-    out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("halos.json"),
-    scenes: Annotated[
-        int, typer.Option(help="Scenes that are drawn, each in clear air and in fog.", min=4, max=100_000)
-    ] = 80,
+    camera: Annotated[Path, typer.Option(help="Camera file of undistorted images (docs/how_to/own_camera.md).")],
+    out: Annotated[Path, typer.Option(help="Calibration file to write.")] = Path("halos.json"),
+    scenes: Annotated[int, typer.Option(help="Scenes to draw, each in clear air and in fog.", min=4, max=100_000)] = 80,
     lens_glare: Annotated[
-        float, typer.Option(help="Share of lamps' light that the lens scatters.", min=0.0, max=1.0)
+        float, typer.Option(help="Share of lamp light that the lens scatters.", min=0.0, max=1.0)
     ] = 0.01,
-    seed: Annotated[int, typer.Option(help="Of scenes, exposures and noise.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of scenes, exposures and noise.", min=0)] = 0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of a line.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON instead of one line.")] = False,
 ) -> None:
-    """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
+    """Measure how steeply light falls off around lamps: the Br50 below which gallen2014 sees fog."""
     from fogsim.calibration.halo_calibration import measure_halo_threshold
     from fogsim.core.files.atomic import write_bytes
     from fogsim.core.files.output_targets import refuse_unwritable

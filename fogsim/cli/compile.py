@@ -1,4 +1,4 @@
-"""``fogsim compile``: the kernels ahead of the first run, in several processes at once."""
+"""``fogsim compile``: compile kernels before the first run, in parallel processes."""
 
 import dataclasses
 import logging
@@ -25,7 +25,7 @@ _FEW = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
 """Settings that need few kernels."""
 
 _JOINT = "estimators=[joint_road]"
-"""Estimator with kernels that the images below do not reach, in other roads and fogs."""
+"""Estimator with kernels that the images below do not use, for other roads and fogs."""
 
 _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives by day": (
@@ -54,7 +54,7 @@ _SKY = 1e6
 
 
 def compile_command() -> None:
-    """Compile ahead what a first run would, on all cores; the result is kept on disk."""
+    """Compile the kernels of a first run in advance, and cache them on disk."""
     with stderr.status("compiling for this processor, about a minute"):
         for ready in compile_kernels():
             stdout.print(f"compiled: {ready}")
@@ -92,7 +92,7 @@ def _be_quiet() -> None:
 
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
-    """Render the first frames of a scenario with each of some settings.
+    """Render the first frames of a scenario with each of the given settings.
 
     For its metrics, all vehicles are in one junction.
     """

@@ -18,17 +18,17 @@ from fogsim.cli.scenario_options import (
 
 
 def dataset_command(
-    out: Annotated[Path, typer.Option(help="Directory; one that was interrupted is continued.")],
-    frames: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many frames.")],
+    out: Annotated[Path, typer.Option(help="Output directory; an interrupted data set is resumed.")],
+    frames: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of frames.")],
     scenario: ScenarioName = None,
     sumocfg: SumoConfiguration = None,
     ego: EgoId = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first run; further runs have the next ones.")] = 0,
-    every: Annotated[int, typer.Option(min=1, max=1_000_000, help="Take one frame of so many.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first run; further runs use the next seeds.")] = 0,
+    every: Annotated[int, typer.Option(min=1, max=1_000_000, help="Keep one frame out of this many.")] = 1,
     visibility: HomogeneousVisibility = None,
     settings: Settings = None,
 ) -> None:
-    """Write frames with depth, masks and true transmission, and a COCO file with boxes and all that is known."""
+    """Write frames with depth, masks, true transmission and COCO annotations."""
     from fogsim.dataset import write_dataset
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)

@@ -1,4 +1,4 @@
-"""``fogsim doctor``: what works on this machine, what does not, and how to get it."""
+"""``fogsim doctor``: check what works on this machine, and how to install what is missing."""
 
 import platform
 from collections.abc import Callable
@@ -30,7 +30,7 @@ _PACKAGES = (
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one check; `detail` is the version, or what is wrong and how to mend it."""
+    """Result of one check; `detail` is the version, or the problem and its fix."""
 
     subject: str
     works: bool
@@ -39,10 +39,10 @@ class Finding:
 
 def doctor_command(
     ahead: Annotated[
-        bool, typer.Option("--compile", help="Also compile ahead what a first run would, as `fogsim compile` does.")
+        bool, typer.Option("--compile", help="Also compile the kernels of a first run, like `fogsim compile`.")
     ] = False,
 ) -> None:
-    """Say what works on this machine, what is missing, and how to get it."""
+    """List what works on this machine, what is missing, and how to install it."""
     findings = examine()
     table = Table(box=None, show_header=False, pad_edge=False)
     for finding in findings:

@@ -1,4 +1,4 @@
-"""Checks of all commands' options: numbers are within a range, and paths are not empty."""
+"""Checks of command-line options: numbers must be within a range, and paths must not be empty."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from fogsim.cli.printing import BAD_INPUT, print_error
 from fogsim.errors import InputError, shown
 
 _LARGEST = 2**63 - 1
-"""Bound of numbers whose option has none, like that of seeds in scenario files."""
+"""Bound of numbers whose option has none, as for seeds in scenario files."""
 
 
 def check_values(app: typer.Typer) -> None:

@@ -1,4 +1,4 @@
-"""Plugin for pytest: ``*.fog.yaml`` files are tests, an item per expectation; ``fogsim_run`` runs one case.
+"""Plugin for pytest: ``*.fog.yaml`` files are tests, one item per expectation; ``fogsim_run`` runs one case.
 
 FogSim is imported only for such a file or a test that requests the fixture.
 """
@@ -24,7 +24,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("fogsim")
     group.addoption(
-        "--fogsim-processes", type=int, default=None, metavar="N", help="Runs of *.fog.yaml at once. [one a core]"
+        "--fogsim-processes", type=int, default=None, metavar="N", help="Concurrent runs of *.fog.yaml [one per core]."
     )
 
 
@@ -69,7 +69,7 @@ class FogItem(pytest.Item):
         self._test = test
 
     def runtest(self) -> None:
-        """Raise NotPassedError unless every clause of it passed."""
+        """Raise NotPassedError unless all its clauses passed."""
         from fogsim.testing.page import expectation_lines
 
         assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items

@@ -1,4 +1,4 @@
-"""``fogsim reproduce``: papers' evaluations run again."""
+"""``fogsim reproduce``: repeat papers' evaluations."""
 
 import json
 from collections.abc import Sequence
@@ -27,15 +27,17 @@ def reproduce_command(
     paper: Annotated[
         str,
         typer.Argument(
-            metavar="PAPER|all", help="A paper whose evaluation is run again; drivers: field studies of traffic in fog."
+            metavar="PAPER|all", help="Paper whose evaluation is repeated; drivers: field studies of traffic in fog."
         ),
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a picture like the paper's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a figure like the paper's.")] = None,
     table: Annotated[str | None, typer.Option(help="Run only what this table of the paper needs, such as 5.1.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer frames and seeds for the same figures.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print flat records, one per line, instead of tables.")
+    ] = False,
 ) -> None:
-    """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand next to ours."""
+    """Repeat a paper's evaluation on FogSim's frames or traffic, and compare the figures."""
     from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.reproduce import REPRODUCTIONS
 

@@ -1,4 +1,4 @@
-"""``fogsim run``: a scenario with its results in files."""
+"""``fogsim run``: run a scenario and write its results."""
 
 import sys
 import warnings
@@ -33,12 +33,10 @@ if TYPE_CHECKING:
 
 
 def recover_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a run that was killed.")],
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Let its results take the place of those of an earlier run.")
-    ] = False,
+    directory: Annotated[Path, typer.Argument(help="Directory of a killed run.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results of an earlier run.")] = False,
 ) -> None:
-    """Make steps.parquet of the rows of a run that was killed."""
+    """Write steps.parquet from the rows of a killed run."""
     from fogsim.recorders import recover_run
 
     for name in recover_run(directory, overwrite):
@@ -85,36 +83,38 @@ def run_command(
     visibility: HomogeneousVisibility = None,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="The same seed gives the same run, bit for bit. [0, or the case's]"),
+        typer.Option(min=0, help="The same seed gives the same run, bit for bit. Default: 0, or the case's."),
     ] = None,
     case: CaseValues = "",
     out: Annotated[
-        Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN, runs/SCENARIO-CASE]")
+        Path | None, typer.Option(help="Directory for the results. Default: runs/SCENARIO-seedN or runs/SCENARIO-CASE.")
     ] = None,
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing results.")] = False,
     video: Annotated[
-        bool | None, typer.Option("--video/--no-video", help="Write video.mp4 (as a rule where there is an ego).")
+        bool | None, typer.Option("--video/--no-video", help="Write video.mp4. Default: if there is an ego.")
     ] = None,
     restored_video: Annotated[
         bool,
-        typer.Option("--restored-video", help="Write restored.mp4 too: half the picture with its contrast restored."),
+        typer.Option(
+            "--restored-video", help="Also write restored.mp4, half of each frame with its contrast restored."
+        ),
     ] = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
-    trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
+    trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet for all vehicles.")] = False,
     events: Annotated[
-        bool | None, typer.Option("--events/--no-events", help="Write events.parquet (as a rule with a timeline).")
+        bool | None, typer.Option("--events/--no-events", help="Write events.parquet. Default: if there is a timeline.")
     ] = None,
     xosc: Annotated[bool, typer.Option("--xosc", help="Write scenario.xosc, the run as an OpenSCENARIO file.")] = False,
     osi: Annotated[
-        bool, typer.Option("--osi", help="Write ground_truth.osi, a trace of ASAM OSI (needs fogsim[osi]).")
+        bool, typer.Option("--osi", help="Write ground_truth.osi, an ASAM OSI trace (needs the extra `osi`).")
     ] = False,
     camera_processes: Annotated[
         int | None,
         typer.Option(
             min=0,
             max=1024,
-            help="Processes that draw for equipped vehicles other than the ego. [one less than processors]",
+            help="Processes that render for equipped vehicles other than the ego. Default: all processors but one.",
         ),
     ] = None,
     method_timeout: MethodTimeout = None,

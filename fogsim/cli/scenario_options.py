@@ -17,23 +17,24 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario
     from fogsim.scenario.variation import Case
 
-SCENARIO_HELP = "A scenario of the catalogue (fogsim list), a file or a folder."
+SCENARIO_HELP = "Scenario name (fogsim list), file or folder."
 
 ScenarioName = Annotated[str | None, typer.Argument(help=SCENARIO_HELP)]
-SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
+SumoConfiguration = Annotated[Path | None, typer.Option(help="SUMO configuration, instead of a scenario.")]
 EgoId = Annotated[
     str | None,
-    typer.Option(help="Id of the vehicle that is the ego; any for the first that suits, none for traffic alone."),
+    typer.Option(help="Id of the ego vehicle; any for the first suitable one, none for traffic only."),
 ]
 HomogeneousVisibility = Annotated[
     float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0, max=math.inf)
 ]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+    list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a value of the scenario file.")
 ]
 
 CaseValues = Annotated[
-    str, typer.Option("--case", metavar="NAME=VALUE,…", help="Only cases of a file that varies with these values.")
+    str,
+    typer.Option("--case", metavar="NAME=VALUE,…", help="Only the cases with these values, if the file has `vary`."),
 ]
 
 
@@ -58,7 +59,10 @@ Maps = Annotated[
 
 MethodTimeout = Annotated[
     float | None,
-    typer.Option(min=0.001, help="Fail a run in which one call of your own method takes longer [s]. [no limit]"),
+    typer.Option(
+        min=0.001,
+        help="Fail a run if one call of your own method takes longer than this many seconds. Default: no limit.",
+    ),
 ]
 
 
@@ -84,7 +88,7 @@ class CodeNotice:
 def chosen_scenario(
     name: str | None, sumocfg: Path | None, ego: str | None, visibility: float | None, settings: Sequence[str] | None
 ) -> "Scenario":
-    """Scenario of a name or of a SUMO configuration, exactly one; InputError if something is missing.
+    """Scenario given by exactly one of a name or a SUMO configuration; InputError if something is missing.
 
     The SUMO configuration also needs `ego` (``none`` for traffic alone) and a visibility [m] or a fog in the settings.
     """

@@ -12,7 +12,7 @@ from fogsim.errors import FogSimError
 
 
 def list_command() -> None:
-    """List scenarios and the methods that a scenario can name."""
+    """List scenarios and methods."""
     from fogsim.advice import ADVISERS
     from fogsim.estimators import ESTIMATORS
     from fogsim.fusion import FUSIONS
@@ -40,11 +40,14 @@ def list_command() -> None:
 def validate_command(
     files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")],
     allow_code: Annotated[
-        bool, typer.Option("--allow-code", help="Import Python files next to a scenario, to check parameters too.")
+        bool,
+        typer.Option(
+            "--allow-code", help="Also check parameters of Python files next to a scenario, by importing them."
+        ),
     ] = False,
     maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
-    """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
+    """Check scenario files, and report every mistake with file, line, key and allowed values."""
     from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario.loading import load_cases
 
@@ -66,7 +69,7 @@ def validate_command(
 
 def signs_command(
     scenario: Annotated[str, typer.Argument(help=SCENARIO_HELP)],
-    out: Annotated[Path, typer.Option(help="GeoJSON file.")] = Path("signs.geojson"),
+    out: Annotated[Path, typer.Option(help="GeoJSON file to write.")] = Path("signs.geojson"),
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:

@@ -1,4 +1,4 @@
-"""``fogsim study``: policies compared over seeds."""
+"""``fogsim study``: compare policies over seeds."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -24,22 +24,22 @@ class EngineName(StrEnum):
 
 
 def study_command(
-    study: Annotated[str, typer.Argument(help="A study file, or a study that comes with FogSim (fogsim list).")],
+    study: Annotated[str, typer.Argument(help="Study file, or the name of a study included in FogSim (fogsim list).")],
     out: Annotated[
-        Path | None, typer.Option(help="Directory; one that was interrupted is continued. [runs/STUDY]")
+        Path | None, typer.Option(help="Output directory; an interrupted study is resumed. Default: runs/STUDY.")
     ] = None,
     processes: Annotated[
-        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Runs at once. [one a core]")
+        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Concurrent runs. Default: one per core.")
     ] = None,
     engine: Annotated[
-        EngineName, typer.Option(help="What runs the runs: processes of this machine, or a Ray cluster.")
+        EngineName, typer.Option(help="Where to run: processes on this machine, or a Ray cluster.")
     ] = EngineName.POOL,
     address: Annotated[
         str | None,
-        typer.Option(help="With --engine ray: HOST:PORT of the head, auto or local. [$RAY_ADDRESS, or local]"),
+        typer.Option(help="With --engine ray: HOST:PORT of the head, auto or local. Default: $RAY_ADDRESS, or local."),
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Check the file and say how many runs it has; run none.")
+        bool, typer.Option("--check", help="Check the file and print its number of runs, without running any.")
     ] = False,
     method_timeout: MethodTimeout = None,
 ) -> None:

@@ -1,4 +1,4 @@
-"""``fogsim test``: scenario files with expectations, run case by case and judged."""
+"""``fogsim test``: run scenario files with expectations, and judge each case."""
 
 import os
 import time
@@ -24,27 +24,30 @@ _INDENT = " " * 15
 
 
 def check_command(
-    files: Annotated[list[str] | None, typer.Argument(help="Files, folders or scenarios. [the current folder]")] = None,
-    out: Annotated[Path, typer.Option(help="Directory of what came of them.")] = Path("runs/tests"),
-    processes: Annotated[
-        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Runs at once. [one a core]")
+    files: Annotated[
+        list[str] | None, typer.Argument(help="Files, folders or scenarios. Default: the current folder.")
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, for CI servers, to this file.")] = None,
+    out: Annotated[Path, typer.Option(help="Directory for the results.")] = Path("runs/tests"),
+    processes: Annotated[
+        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Concurrent runs. Default: one per core.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML for CI servers to this file.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page with plots and videos to this file.")] = None,
     keywords: Annotated[
-        str | None, typer.Option("-k", help="Only expectations whose names fit: fog and not (night or truck).")
+        str | None,
+        typer.Option("-k", help="Only expectations whose names match, such as: fog and not (night or truck)."),
     ] = None,
     case: CaseValues = "",
-    exit_first: Annotated[bool, typer.Option("-x", help="End with the first case that fails.")] = False,
-    of_last: Annotated[bool, typer.Option("--lf", help="Only cases that did not pass when last run.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where a call was cut off.")] = False,
-    shrink: Annotated[bool, typer.Option("--shrink", help="Look for the smallest case of what failed.")] = False,
-    evidence: Annotated[bool, typer.Option(help="Keep a video and plots of what did not pass.")] = True,
+    exit_first: Annotated[bool, typer.Option("-x", help="Stop at the first case that fails.")] = False,
+    of_last: Annotated[bool, typer.Option("--lf", help="Only cases that did not pass in the last run.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume an interrupted call.")] = False,
+    shrink: Annotated[bool, typer.Option("--shrink", help="Search for the smallest case that still fails.")] = False,
+    evidence: Annotated[bool, typer.Option(help="Keep a video and plots of cases that did not pass.")] = True,
     settings: Settings = None,
     method_timeout: MethodTimeout = None,
     maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
-    """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
+    """Test scenario files with `expect:`; exit code 0 (passed), 1 (not passed), 2 (bad input) or 5 (no tests)."""
     from fogsim.testing import find_files
     from fogsim.testing.junit import write_junit
     from fogsim.testing.page import PageContent, totals_text, write_page

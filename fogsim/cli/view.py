@@ -1,4 +1,4 @@
-"""``fogsim view``: the world around the ego at an instant, in pyrender's viewer or as an image."""
+"""``fogsim view``: show the world around the ego, in pyrender's viewer or as an image."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,13 +27,13 @@ def view_command(
     sumocfg: SumoConfiguration = None,
     ego: EgoId = None,
     visibility: HomogeneousVisibility = None,
-    at: Annotated[float, typer.Option(min=0.0, max=1e6, help="Instant of the run [s].")] = 0.0,
+    at: Annotated[float, typer.Option(min=0.0, max=1e6, help="Time of the run in seconds.")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Write what the window would show to this image instead.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the view to this image instead of opening a window.")] = None,
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
-    """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
+    """Show the world around the ego, in clear air, in pyrender's viewer, or write an image of it."""
     from fogsim.offline.image_files import refuse_unwritable_image, write_image
     from fogsim.render import to_pyrender
     from fogsim.render.pyrender_reference import first_picture, open_viewer, require_display

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import imageio.v3 as imageio
 import pytest
+import typer
 from early_motorway import EARLY
 from pyarrow import parquet
 
+from fogsim.cli.app import app
 from fogsim.scenario import catalogue
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -229,6 +231,14 @@ def test_doctor_finds_everything_here(command: Command) -> None:
 def test_version_and_help(command: Command) -> None:
     assert command("--version").stdout.startswith("fogsim ")
     assert "KEY.PATH=VALUE" in command("run", "--help").stdout
+
+
+def test_help_shows_units_and_defaults() -> None:
+    """Rich would read words in square brackets as markup, and drop them."""
+    commands = typer.main.get_command(app).commands.values()  # type: ignore[attr-defined]  # a group has commands
+    texts = [getattr(option, "help", None) or "" for one in commands for option in one.params]
+    assert len(texts) > 100
+    assert [text for text in texts if "[" in text] == []
 
 
 def test_the_command_line_starts_without_what_only_its_commands_need() -> None:

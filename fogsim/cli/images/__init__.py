@@ -1,1 +1,1 @@
-"""Commands on images and videos from disk: fog laid on them, estimated in them, and taken from them."""
+"""Commands on images and videos from disk: add, measure and remove fog."""

@@ -1,4 +1,4 @@
-"""``fogsim estimate``: the visibility in a person's own images and videos."""
+"""``fogsim estimate``: estimate visibility in a user's images and videos."""
 
 import contextlib
 import io
@@ -36,48 +36,51 @@ def estimate_command(
         list[str] | None,
         typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. Default: joint_road."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line and method on stdout.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="One row of CSV an image and method on stdout.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per image and method.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print one CSV row per image and method.")] = False,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw the visibility over time: .png, .svg or .pdf. Not for stills.")
+        Path | None, typer.Option(help="Plot visibility over time: .png, .svg or .pdf. Not for stills.")
     ] = None,
     overlay: Annotated[
-        Path | None, typer.Option(help="Draw what was found over the images: .mp4, or .png for one image.")
+        Path | None, typer.Option(help="Draw the results over the images: .mp4, or .png for one image.")
     ] = None,
     sequence: Annotated[
         bool | None,
         typer.Option(
-            "--sequence/--stills", help="Images follow one another, or each stands alone. Default: by their names."
+            "--sequence/--stills", help="Read images as a sequence, or each by itself. Default: by their names."
         ),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option(min=1e-6, max=1e6, help="Images of a sequence in a second. Default: 10.")
+        float | None, typer.Option(min=1e-6, max=1e6, help="Images per second of a sequence. Default: 10.")
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
     ] = False,
-    signs: Annotated[Path | None, typer.Option(help="Map of signs: GeoJSON, points in WGS 84. With --track.")] = None,
+    signs: Annotated[Path | None, typer.Option(help="Sign map: GeoJSON, points in WGS 84. With --track.")] = None,
     track: Annotated[
         Path | None,
-        typer.Option(help="Where the camera was, for signs or a guess: .gpx, or .csv (time_s, latitude, longitude)."),
+        typer.Option(help="Camera positions, for signs or a guess: .gpx, or .csv (time_s, latitude, longitude)."),
     ] = None,
     track_offset: Annotated[
-        float, typer.Option(min=-1e9, max=1e9, help="Seconds of the track at the first image.")
+        float, typer.Option(min=-1e9, max=1e9, help="Time of the track at the first image in seconds.")
     ] = 0.0,
     night: Annotated[
-        bool, typer.Option("--night", help="A drive by night: methods that read lamplight, unless some are named.")
+        bool,
+        typer.Option("--night", help="A drive by night: use methods that read lamplight, unless others are named."),
     ] = False,
     lamps: Annotated[
-        str | None, typer.Option(help="Own lamps that are lit by night, such as low_beam+front_fog. Default: low_beam.")
+        str | None,
+        typer.Option(help="The vehicle's lit lamps by night, such as low_beam+front_fog. Default: low_beam."),
     ] = None,
     setback: Annotated[
         float | None,
         typer.Option(min=0, max=10, help="Metres from the front bumper back to the lens, by night. Default: 1.9."),
     ] = None,
     head_lamps: Annotated[
-        Path | None, typer.Option(help="File of the own head lamps (docs/explanation/night.md). Default: a car's.")
+        Path | None,
+        typer.Option(help="File of the vehicle's head lamps (docs/explanation/night.md). Default: a car's."),
     ] = None,
-    halos: Annotated[Path | None, typer.Option(help="File of fogsim calibrate halos.")] = None,
+    halos: Annotated[Path | None, typer.Option(help="File from fogsim calibrate halos.")] = None,
     guess_camera: Annotated[
         bool, typer.Option("--guess-camera", help="Write the guess to --camera, and stop.")
     ] = False,
@@ -90,7 +93,7 @@ def estimate_command(
     ] = None,
     horizon_row: Annotated[
         float | None,
-        typer.Option(min=0, max=1e6, help="For a guess: row of the horizon, in place of the lines of the road."),
+        typer.Option(min=0, max=1e6, help="For a guess: row of the horizon, instead of finding it from lane marks."),
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""

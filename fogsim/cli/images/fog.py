@@ -23,30 +23,30 @@ if TYPE_CHECKING:
 def fog_command(
     image: Annotated[
         Path,
-        typer.Argument(metavar="IMAGE|VIDEO", help="Of 8 or 16 bits, grey or colour; with --road-plane also a video."),
+        typer.Argument(metavar="IMAGE|VIDEO", help="8 or 16 bits, grey or colour; with --road-plane also a video."),
     ],
     visibility: Annotated[
         float,
-        typer.Option(min=0.1, max=math.inf, help="Meteorological visibility in metres; inf gives the image back."),
+        typer.Option(
+            min=0.1, max=math.inf, help="Meteorological visibility in metres; inf leaves the image unchanged."
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="The fogged image, or .mp4 for a video.")],
+    out: Annotated[Path, typer.Option(help="Image with fog, or .mp4 for a video.")],
     depth: Annotated[
-        Path | None, typer.Option(help="Its depth map: .npy in metres, or 16-bit PNG; 0 or inf is sky.")
+        Path | None, typer.Option(help="Depth map: .npy in metres, or 16-bit PNG; 0 or inf is sky.")
     ] = None,
     road_plane: Annotated[
         bool, typer.Option("--road-plane", help="No depth map: a flat road below the horizon, sky above it.")
     ] = False,
-    camera: Annotated[
-        Path | None, typer.Option(help="camera.yaml; its response says what pixel values stand for.")
-    ] = None,
+    camera: Annotated[Path | None, typer.Option(help="camera.yaml; its response defines the pixel values.")] = None,
     depth_kind: Annotated[
         str | None,
         typer.Option(help="For --depth: planar (along the optical axis) or range (along the ray)."),
     ] = None,
     airlight: Annotated[
-        str | None, typer.Option(help="Its pixel value, or R,G,B; else the sky's median, or the brightest thousandth.")
+        str | None, typer.Option(help="Pixel value, or R,G,B. Default: the sky's median, or the brightest thousandth.")
     ] = None,
-    depth_scale: Annotated[float | None, typer.Option(min=1e-9, max=1e6, help="Metres in one unit of DEPTH.")] = None,
+    depth_scale: Annotated[float | None, typer.Option(min=1e-9, max=1e6, help="Metres per unit of DEPTH.")] = None,
     horizon_row: Annotated[
         float | None, typer.Option(min=0, max=1e6, help="For --road-plane without a camera file: row of the horizon.")
     ] = None,
@@ -58,16 +58,15 @@ def fog_command(
     ] = None,
     ground_albedo: Annotated[
         float | None,
-        typer.Option(
-            min=0, max=1, help="Of the land around, 0 to 1: airlight by elevation as photons have it, not an even one."
-        ),
+        typer.Option(min=0, max=1, help="Albedo of the surrounding land, 0 to 1: airlight then varies with elevation."),
     ] = None,
     layer_height: Annotated[
-        float | None, typer.Option(min=0.001, max=1e6, help="For --ground-albedo: metres of fog; else 250.")
+        float | None,
+        typer.Option(min=0.001, max=1e6, help="For --ground-albedo: height of the fog layer in metres. Default: 250."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
-    """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
+    """Add homogeneous fog to an image or video, by Koschmieder's law on light and slant range."""
     light = None if airlight is None else pixel_values(airlight)
     layer = _layer(ground_albedo, layer_height)
     geometry = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}

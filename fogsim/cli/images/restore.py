@@ -1,4 +1,4 @@
-"""``fogsim restore``: contrast that fog has taken from images and videos, restored."""
+"""``fogsim restore``: restore contrast that fog removed from images and videos."""
 
 import contextlib
 import math
@@ -22,25 +22,28 @@ def restore_command(
         typer.Argument(metavar="IMAGES|VIDEO", help="Image files, folders, patterns like 'a/*.png', or a video."),
     ],
     camera: Annotated[
-        Path, typer.Option(help="camera.yaml: the calibration; fogsim estimate --guess-camera makes it.")
+        Path, typer.Option(help="camera.yaml: the calibration; fogsim estimate --guess-camera writes one.")
     ],
-    out: Annotated[Path, typer.Option(help="The restored image or .mp4; of several images the folder.")],
+    out: Annotated[Path, typer.Option(help="Restored image or .mp4; for several images, a folder.")],
     method: Annotated[str, typer.Option(help="planar, dark_channel or tarel2009.")] = "planar",
     visibility: Annotated[
         float | None,
-        typer.Option(min=0.1, max=math.inf, help="Meteorological visibility in metres; else joint_road estimates it."),
+        typer.Option(
+            min=0.1, max=math.inf, help="Meteorological visibility in metres. Default: estimated by joint_road."
+        ),
     ] = None,
     most_gain: Annotated[
-        float | None, typer.Option(min=1, max=1000, help="Most by which light and noise are amplified; else 5.")
+        float | None, typer.Option(min=1, max=1000, help="Largest amplification of light and noise. Default: 5.")
     ] = None,
     airlight: Annotated[
-        str | None, typer.Option(metavar="R,G,B", help="Its pixel values; else those above the horizon.")
+        str | None,
+        typer.Option(metavar="R,G,B", help="Pixel values of the airlight. Default: those above the horizon."),
     ] = None,
     tone_map: Annotated[bool, typer.Option("--tone-map", help="Compress brightness for viewing.")] = False,
     beside: Annotated[bool, typer.Option("--beside", help="Write original and restored image side by side.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
-    """Restore the contrast that daytime fog took from your own images or video (docs/how_to/restoration.md)."""
+    """Restore contrast that daytime fog removed from your own images or video (docs/how_to/restoration.md)."""
     from fogsim.offline import find_source, load_calibration, straightened
     from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
     from fogsim.offline.source import ImageFiles
@@ -86,7 +89,7 @@ def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", la
 
 
 def _report_missing(lacking: "list[Restored]", files: bool) -> None:
-    """Say which images were not restored; frames of a video have stayed as they were."""
+    """Report which images were not restored; frames of a video are left unchanged."""
     if not lacking:
         return
     if not files:

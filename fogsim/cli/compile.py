@@ -114,10 +114,10 @@ def _estimate_visibility() -> None:
 
     from fogsim.core.parameters import accepted_parameters
     from fogsim.estimators import ESTIMATORS
+    from fogsim.estimators.lead_contrast import fit_decay
     from fogsim.fusion import FUSIONS
     from fogsim.values import Camera
     from fogsim.vision.uneven.uneven_kernels import extinction_at
-    from fogsim.vision.vehicle.decay_fit import fit_decay
 
     estimates: list[list[Estimate]] = []
     for width, height in _SIZES:

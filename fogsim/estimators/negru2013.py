@@ -21,9 +21,7 @@ from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.deriche import CannyDeriche
-from fogsim.vision.lines.edges import Edges
-from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
+from fogsim.vision.lines.edges import CannyDeriche, Edges
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
@@ -33,8 +31,7 @@ from fogsim.vision.lines.horizon import (
     calibrated_horizon,
 )
 from fogsim.vision.lines.road_lines import seen_horizon
-from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, seen_up_to
+from fogsim.vision.lines.vanishing_point import VanishingPoint, consensus_vanishing_point
 from fogsim.vision.region.inflection import (
     FogModel,
     Parameters,
@@ -42,13 +39,12 @@ from fogsim.vision.region.inflection import (
     inflection_parameters,
     printed_inflection,
     printed_parameters,
+    subpixel_inflections,
 )
-from fogsim.vision.region.law import extinction_deviation
+from fogsim.vision.region.law import check_law, detection_limit, extinction_deviation, fog_or_clear, seen_up_to
 from fogsim.vision.region.profile import RoadCurve, band_profile
-from fogsim.vision.region.region_kernels import GrowthLimits
 from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
-from fogsim.vision.region.road_region import constant_limits
-from fogsim.vision.region.subpixel_inflection import subpixel_inflections
+from fogsim.vision.region.road_region import GrowthLimits, constant_limits
 from fogsim.vision.strips.strip_curves import lowest_road_row
 
 _GROWTH_SHARE = 0.8

@@ -17,9 +17,10 @@ from fogsim.vision.lines.road_line_kernels import (
     RoadLines,
     fit_road_lines,
     hough_road_lines,
+    may_lie_on_road,
     refitted_lines,
+    row_points,
 )
-from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
 from fogsim.vision.lines.vanishing_point import VanishingPoint, all_pairs, crossings, sloped_lines, supports
 
 Floats = NDArray[np.float64]

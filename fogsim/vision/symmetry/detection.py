@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.symmetry.edge_kernels import Picture, clearest_gradients, edge_points, shrunk
-from fogsim.vision.symmetry.outline_kernels import SAMPLES, edge_density, fitted
-from fogsim.vision.symmetry.outlines import OUTLINES
-from fogsim.vision.symmetry.vote_kernels import pair_votes, peaks, triangle_votes
+from fogsim.vision.symmetry.edge_kernels import (
+    Picture,
+    clearest_gradients,
+    edge_points,
+    pair_votes,
+    peaks,
+    shrunk,
+    triangle_votes,
+)
+from fogsim.vision.symmetry.outline_kernels import OUTLINES, SAMPLES, edge_density, fitted
 
 Floats = NDArray[np.float32]
 

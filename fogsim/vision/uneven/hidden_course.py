@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogsim.values.camera import Camera
-from fogsim.vision.lines.road_course import RoadCourse
+from fogsim.vision.lines.road_course import SAG_DEVIATION, RoadCourse, beginning_cost, sag_from
 from fogsim.vision.lines.road_course_kernels import PIECES
-from fogsim.vision.lines.sags_ahead import SAG_DEVIATION, beginning_cost, sag_from
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.course_geometry import course_geometry
 from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit

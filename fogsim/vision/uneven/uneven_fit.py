@@ -15,15 +15,18 @@ from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven import uneven_kernels
 from fogsim.vision.uneven.fog_evidence import (
+    NODES,
     UNEVEN_CHANCES,
+    UNEVENNESS,
     EvenFog,
+    bank_nodes,
     even_fog_over,
+    fog_nodes,
     hidden_cost,
     left_out,
     of_each_bin,
     thinned_bins,
 )
-from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, bank_nodes, fog_nodes
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_kernels import FogNodes
 

@@ -10,15 +10,17 @@ from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.light.medians import median
 from fogsim.vision.vehicle.contrast_ratio import RearPicture, cell_centres, common_cell, resample
 from fogsim.vision.vehicle.patch import (
+    INDEPENDENT,
     Patch,
     PixelGrid,
     Placement,
     column_weights,
     downsample_to,
+    match_cost,
     pixel_grid,
     shrunk_rows,
+    vertex,
 )
-from fogsim.vision.vehicle.template_matching import INDEPENDENT, match_cost, vertex
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import pytest
 from sign_picture import AIRLIGHT, CAMERA, LATERAL, SETBACK, observed, picture
 
 from fogsim.estimators import make
-from fogsim.estimators.signs.approach_fit import GRID, ApproachFit, extinction_of
 from fogsim.estimators.signs.face_light import face_light
 from fogsim.estimators.signs.layout import LAYOUTS, UNKNOWN, face_maps, layout_of
+from fogsim.estimators.signs.sign_contrast import GRID, ApproachFit, extinction_of
 from fogsim.units import extinction_from_visibility
 from fogsim.values.estimate import NORMAL_90_PERCENT
 

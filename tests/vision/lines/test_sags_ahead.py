@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
-from fogsim.vision.lines.sags_ahead import (
+from fogsim.vision.lines.road_course import (
     BEGINS,
     SAG_DEVIATION,
     SAG_LENGTH,
@@ -14,6 +13,7 @@ from fogsim.vision.lines.sags_ahead import (
     sag_from,
     unseen_sags,
 )
+from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 
 
 def test_curvatures_of_neighbouring_pieces_are_alike_and_those_of_far_ones_are_not():

@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.lines.horizon import calibrated_horizon
-from fogsim.vision.strips.joint_prior import MOST_CLOUD, OVEREXPOSURE, SKY_DEVIATION, joint_prior
+from fogsim.vision.strips.airlight_slopes import MOST_CLOUD, OVEREXPOSURE, SKY_DEVIATION, joint_prior
 from fogsim.vision.strips.sky import Sky
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fogsim.vision.symmetry.detection import SearchRegion, SignDetection, detect_signs
-from fogsim.vision.symmetry.outlines import OUTLINES, polygon_outline
+from fogsim.vision.symmetry.outline_kernels import OUTLINES, polygon_outline
 
 FINE = 8
 CORNERS = {

@@ -12,7 +12,7 @@ from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 from fogsim.vision.strips.course_geometry import course_geometry
 from fogsim.vision.strips.joint_fit import fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, fog_nodes
+from fogsim.vision.uneven.fog_evidence import NODES, UNEVENNESS, fog_nodes
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_fit import fit_uneven
 from fogsim.vision.uneven.uneven_kernels import depth_at, distance_at_depth, extinction_at

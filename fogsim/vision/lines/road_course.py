@@ -3,11 +3,13 @@
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.linear_algebra import inverse_of, matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, matrix_product, times
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon
@@ -39,8 +41,7 @@ BEGINS = 0.05
 third does, in stretches of 200 to 400 m."""
 
 
-@dataclass(frozen=True, slots=True)
-class SagsAhead:
+class SagsAhead(NamedTuple):
     """What is known of vertical curvature ahead, if each piece of road may have some."""
 
     # (1 + pieces,): Row in which the road's tangent under the camera vanishes [px], and vertical curvature by piece,
@@ -48,31 +49,55 @@ class SagsAhead:
     mean: Floats
     covariance: Floats  # (1 + pieces, 1 + pieces): Theirs [px², px/m, 1/m²]
 
-    def row(self, sag: Floats) -> tuple[float, float]:
-        """Row in which the tangent vanishes if the road is curved so, and its variance [px, px²].
 
-        Takes `sag` (pieces,) [1/m].
-        """
-        gain = matrix_product(self.covariance[0, 1:], self._precision())
-        row = self.mean[0] + float(matrix_product(gain, sag - self.mean[1:]))
-        return row, max(float(self.covariance[0, 0] - matrix_product(gain, self.covariance[1:, 0])), 0.0)
-
-    def cost(self, sag: Floats) -> float:
-        """Minus twice the logarithm of how much likelier the lines are if the road is curved so, up to a constant [-].
-
-        What is known of curvature before any lines are seen is not in it.
-
-        Takes `sag` (pieces,) [1/m].
-        """
-        return _square(sag - self.mean[1:], self._precision()) - _square(sag, inverse_of(sag_covariance()))
-
-    def _precision(self) -> Floats:
-        return inverse_of(np.ascontiguousarray(self.covariance[1:, 1:]))
+@kernel
+def row_given(ahead: SagsAhead, sag: Floats) -> tuple[float, float]:
+    """Row in which the tangent vanishes given curvatures, and its variance [px, px²] (`sag` (pieces,) [1/m])."""
+    precision = inverse_of(ahead.covariance[1:, 1:].copy())
+    gain = np.zeros(sag.size)
+    for k in range(sag.size):
+        for j in range(sag.size):
+            gain[j] += ahead.covariance[0, 1 + k] * precision[k, j]
+    apart, shared = 0.0, 0.0
+    for j in range(sag.size):
+        apart += gain[j] * (sag[j] - ahead.mean[1 + j])
+        shared += gain[j] * ahead.covariance[1 + j, 0]
+    return ahead.mean[0] + apart, max(ahead.covariance[0, 0] - shared, 0.0)
 
 
+@kernel
+def cost_given(ahead: SagsAhead, sag: Floats, before: Floats) -> float:
+    """Minus twice the logarithm of how much likelier the lines are if the road is curved so, up to a constant [-].
+
+    What is known of curvature before any lines are seen is not in it: its precision is taken away.
+
+    Takes `sag` (pieces,) [1/m], `before` (pieces, pieces), see `sag_precision`.
+    """
+    precision = inverse_of(ahead.covariance[1:, 1:].copy())
+    return _square(sag - ahead.mean[1:], precision) - _square(sag, before)
+
+
+@kernel
+def _square(values: Floats, precision: Floats) -> float:
+    """Square of a vector's length in standard deviations [-]."""
+    through, total = times(precision, values), 0.0
+    for j in range(values.size):
+        total += values[j] * through[j]
+    return total
+
+
+@kernel
 def sag_from(piece: int, curvature: float) -> Floats:
     """(pieces,) float64: vertical curvature of a road that is straight up to a piece [1/m] (`curvature` [1/m])."""
-    return np.where(np.arange(PIECES) >= piece, curvature, 0.0)
+    sag = np.zeros(PIECES)
+    sag[piece:] = curvature
+    return sag
+
+
+@functools.cache
+def sag_precision() -> Floats:
+    """(pieces, pieces) float64: inverse covariance of the curvatures of a curved road [m²]; it is shared."""
+    return inverse_of(sag_covariance())
 
 
 @functools.cache
@@ -97,11 +122,7 @@ def unseen_sags(row: float, deviation: float) -> SagsAhead:
     return SagsAhead(np.array([row, *np.zeros(PIECES)]), covariance)
 
 
-def _square(values: Floats, precision: Floats) -> float:
-    """Square of a vector's length in standard deviations [-]."""
-    return float(matrix_product(values, matrix_product(precision, values)))
-
-
+@kernel
 def beginning_cost(curvature: float) -> float:
     """Minus twice the logarithm of how likely a curvature from some piece on is beforehand, but for its density [-].
 
@@ -310,6 +331,6 @@ def _precision(camera: Camera, row_deviation: float) -> Floats:
     """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
     out = np.zeros((SLOPE, SLOPE))
     out[COLUMN, COLUMN], out[ROW, ROW] = (_TANGENT * camera.focal_length) ** -2, row_deviation**-2
-    out[SAG:BEND, SAG:BEND] = inverse_of(sag_covariance())
+    out[SAG:BEND, SAG:BEND] = sag_precision()
     out[BEND:, BEND:] = inverse_of(curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
     return out

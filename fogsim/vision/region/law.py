@@ -1,14 +1,18 @@
 """Koschmieder's law over the rows of a flat road, and whether a curve of luminance follows it."""
 
+import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.linear_algebra import matrix_product, straight_line
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import straight_line
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.light.medians import median, quantile
 from fogsim.vision.region.profile import RoadCurve, path_lengths
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage
 
@@ -30,8 +34,7 @@ _SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
-@dataclass(frozen=True, slots=True)
-class LawFit:
+class LawFit(NamedTuple):
     """Road and airlight of an extinction, by least squares over a curve."""
 
     # airlight, road: A and R [linear grey levels]
@@ -60,18 +63,44 @@ def slants(curve: RoadCurve) -> Floats:
 
 def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
     """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
-    optical = extinction * curve.row_distance * slants(curve)
-    shape, weight = transmittance(optical, curve.below_horizon), curve.weight
-    total = max(float(weight.sum()), 1e-9)
-    mean_shape = float(matrix_product(weight, shape)) / total
-    mean = float(matrix_product(weight, curve.luminance)) / total
-    centred = shape - mean_shape
-    square = float(matrix_product(weight, centred**2))
-    drop = -float(matrix_product(weight * centred, curve.luminance)) / max(square, 1e-12)
+    rows = (curve.below_horizon, curve.distance, curve.weight, curve.luminance)
+    return _law_fit(*map(np.ascontiguousarray, rows), curve.row_distance, extinction)
+
+
+@kernel
+def _law_fit(
+    below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, extinction: float
+) -> LawFit:
+    shape, total = np.empty(below.size), max(weight.sum(), 1e-9)
+    mean, mean_shape = 0.0, 0.0
+    for i in range(below.size):
+        slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
+        shape[i] = row_transmittance(extinction * row_distance * slant, below[i])
+        mean_shape += weight[i] * shape[i] / total
+        mean += weight[i] * luminance[i] / total
+    square, both = 0.0, 0.0
+    for i in range(below.size):
+        centred = shape[i] - mean_shape
+        square += weight[i] * centred * centred
+        both += weight[i] * centred * luminance[i]
+    drop = -both / max(square, 1e-12)
     airlight = mean + drop * mean_shape
-    model = airlight - drop * shape
-    left = math.sqrt(float(matrix_product(weight, (curve.luminance - model) ** 2)) / total)
-    return LawFit(airlight, airlight - drop, model, left / drop if drop > 0.0 else math.inf)
+    model, left = airlight - drop * shape, 0.0
+    for i in range(below.size):
+        left += weight[i] * (luminance[i] - model[i]) ** 2
+    misfit = math.sqrt(left / total) / drop if drop > 0.0 else np.inf
+    return LawFit(airlight, airlight - drop, model, misfit)
+
+
+@kernel
+def row_transmittance(optical: float, below: float) -> float:
+    """`transmittance` of one row."""
+    total = 0.0
+    for j in range(3):
+        end = below + 0.5 * (j - 1)
+        if end > _SMALLEST:
+            total += (4.0 if j == 1 else 1.0) * math.exp(-optical / end)
+    return total / 6.0
 
 
 def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
@@ -90,7 +119,9 @@ def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
     return np.asarray(model[:, None] + residual[:, None] * _signs()[block])
 
 
+@functools.cache
 def _signs() -> Floats:
+    """(blocks, patterns); it is shared."""
     return np.random.default_rng(2015).choice([-1.0, 1.0], (_BLOCKS, _PATTERNS))
 
 
@@ -121,7 +152,7 @@ def spread(values: Floats, about: float) -> float:
     apart = np.abs(values[np.isfinite(values)] - about)
     if apart.size < 2:
         return math.inf
-    return float(max(1.4826 * np.median(apart), 0.6 * np.quantile(apart, 0.9)))
+    return max(1.4826 * median(apart), 0.6 * quantile(apart, 0.9))
 
 
 _NEAR_HORIZON = 4.0

@@ -15,6 +15,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.lines.horizon import Horizon
@@ -158,24 +159,31 @@ def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats
     return slope + bend * (lowest + highest), level
 
 
-def darkening_of_bins(grazing: Floats, below: Floats, prior: JointPrior) -> tuple[Floats, Floats]:
+@kernel
+def darkening_of_bins(
+    grazing: Floats, below: Floats, prior: JointPrior, angle: Floats, table: Floats
+) -> tuple[Floats, Floats]:
     """How the airlight darkens toward bins, for `fogsim.vision.strips.joint_kernels.Bins`.
 
-    Returns ``darker`` and ``darker_by_row``. Takes `grazing` (n,) [rad], `below` (n,) [px].
+    Returns ``darker`` and ``darker_by_row``. Takes `grazing` (n,) [rad], `below` (n,) [px], and ``angle`` and ``below``
+    of a `SlopeTable`.
     """
-    if prior.rise.size == 0:
-        nothing = np.zeros((0, below.size))
-        return nothing, nothing
-    table = slope_table()
-    at = np.clip(np.searchsorted(table.angle, grazing, side="right") - 1, 0, table.angle.size - 2)
-    step = table.angle[at + 1] - table.angle[at]
-    of_droplets = table.below[prior.droplets]
-    slope = (of_droplets[:, at + 1] - of_droplets[:, at]) / step
-    darker = of_droplets[:, at] + slope * (grazing - table.angle[at])
-    # Where the horizon is lower by a row, a bin is seen at a smaller angle.
-    return np.ascontiguousarray(darker), np.ascontiguousarray(-slope * grazing / below)
+    levels = 0 if prior.rise.size == 0 else table.shape[1]
+    darker, by_row = np.empty((levels, below.size)), np.empty((levels, below.size))
+    for i in range(below.size if levels else 0):
+        at = 0
+        while at < angle.size - 2 and angle[at + 1] <= grazing[i]:
+            at += 1
+        for level in range(levels):
+            low, high = table[prior.droplets, level, at], table[prior.droplets, level, at + 1]
+            slope = (high - low) / (angle[at + 1] - angle[at])
+            darker[level, i] = low + slope * (grazing[i] - angle[at])
+            # Where the horizon is lower by a row, a bin is seen at a smaller angle.
+            by_row[level, i] = -slope * grazing[i] / below[i]
+    return darker, by_row
 
 
+@kernel
 def slope_cost(prior: JointPrior) -> float:
     """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky."""
     if prior.rise.size == 0:

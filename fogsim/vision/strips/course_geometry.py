@@ -1,25 +1,30 @@
 """Strips of road that follow its course, and what the course leaves unsure of the extinction."""
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.core.linear_algebra import inverse_of, matrix_product, times
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
 from fogsim.vision.lines.road_course import RoadCourse
 from fogsim.vision.lines.road_course_kernels import PIECES, row_on_plane, turned
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
-from fogsim.vision.strips.strip_geometry import LANES, StripGeometry, laid_along
+from fogsim.vision.strips.strip_geometry import LANES, StripGeometry, View, lay, view_of
 
 Floats = NDArray[np.float64]
 
 _GRAIN, _GRAIN_LENGTH = 0.02, 3.0
 """Deviation of the albedo along a road, relative to it [-], and the length over which it forgets itself [m]."""
+
+_MOST_ASIDE = 0.6
+"""Deviation of a bent road's place up to which strips are on the road [m]."""
+
+SIDES = np.array(LANES)
+"""(strips, 2): sides of the strips to the right of the vehicle's axis [m]."""
 
 _ROUNDING = 0.1
 """Deviation of a bin's mean that quantisation leaves [linear grey levels]."""
@@ -121,33 +126,68 @@ def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats
     return out
 
 
-_MOST_ASIDE = 0.6
-"""Deviation of a bent road's place up to which strips are on the road [m]."""
-
-
 def course_geometry(geometry: StripGeometry, camera: Camera, course: RoadCourse) -> StripGeometry:
     """Lay strips along a road that bends, sags or crests.
 
     Rows are given by where they would be seen were the road the plane that touches it under the camera, about the
     course's horizon; so the joint fit takes them as it takes those of a plane.
     """
-    shift, unit, height = course.row - camera.horizon_row, camera.row_distance, camera.mount_height
-    seen = geometry.below - shift
-    middle, top, bottom = (
-        rows_on_plane(np.maximum(rows, 1e-3), course.sag, unit, height)
-        for rows in (seen, seen - geometry.half, seen + geometry.half)
+    bend = Bend(course.column, course.bend, course.bend_covariance)
+    return lay_along(geometry, view_of(camera), course.row - camera.horizon_row, course.sag, bend, SIDES)
+
+
+class Bend(NamedTuple):
+    """Course of a road to the side."""
+
+    column: float  # Where the road's tangent under the camera vanishes [px]
+    curvature: Floats  # (pieces,): Positive to the right [1/m]
+    covariance: Floats  # (pieces, pieces): Of the curvatures [1/m²]
+
+
+@kernel
+def lay_along(
+    straight: StripGeometry, view: View, shift: float, sag: Floats, bend: Bend, sides: Floats
+) -> StripGeometry:
+    """Strips between sides (strips, 2) [m] of a course whose horizon lies some rows (`shift`) below the calibrated one.
+
+    Takes `sag` (pieces,) [1/m].
+    """
+    count, strips = straight.below.size, len(sides)
+    rows, half = np.empty((3, count)), np.empty(count)
+    for j in range(3):
+        seen = straight.below - shift + (j - 1) * straight.half
+        rows[j] = rows_on_plane(np.maximum(seen, 1e-3), sag, view.unit, view.height)
+    middle, extent = rows[1].copy(), np.ones(count)
+    for i in range(count):
+        if rows[0, i] <= 0.0:
+            middle[i], half[i] = 1.0, 0.5
+        else:
+            half[i] = 0.5 * (rows[2, i] - rows[0, i])
+            extent[i] = view.unit * 2.0 * half[i] / max(middle[i] * middle[i] - half[i] * half[i], 1e-9)
+    distance = view.unit / middle
+    aside, unsure = sideways(distance, bend.curvature, bend.covariance)
+    left, right = np.empty((strips, count)), np.empty((strips, count))
+    for s in range(strips):
+        for i in range(count):
+            across = view.focal / distance[i]
+            left[s, i] = bend.column + across * (aside[i] + sides[s, 0])
+            right[s, i] = bend.column + across * (aside[i] + sides[s, 1])
+            if rows[0, i] <= 0.0 or unsure[i] > _MOST_ASIDE:
+                right[s, i] = left[s, i]
+    left, right, path, off_axis = lay(left, right, straight.below, view)
+    return StripGeometry(
+        straight.first,
+        straight.last,
+        middle + shift,
+        half,
+        distance,
+        extent,
+        straight.grazing,
+        left,
+        right,
+        path,
+        off_axis,
     )
-    hidden = top <= 0.0
-    middle = np.where(hidden, 1.0, middle)
-    half = np.where(hidden, 0.5, 0.5 * (bottom - top))
-    distance, sides = unit / middle, np.array(LANES)
-    aside, unsure = sideways(distance, course.bend, course.bend_covariance)
-    across, heading = camera.focal_length / distance, course.column
-    left, right = (heading + across * (aside + side) for side in (sides[:, :1], sides[:, 1:]))
-    right = np.where(hidden | (unsure > _MOST_ASIDE), left, right)
-    placed = laid_along(geometry, left, right, camera)
-    extent = np.where(hidden, 1.0, unit * 2.0 * half / np.maximum(middle**2 - half**2, 1e-9))
-    return replace(placed, below=middle + shift, half=half, distance=distance, extent=extent)
 
 
 def course_deviation(
@@ -174,6 +214,14 @@ def course_deviation(
         noise=noise,
     )
     deviations = np.array([min(prior.below, prior.above), prior.shift_deviation, *course.sag_deviation])
-    response = extinction_response(seen, deviations, camera.mount_height)
-    total = float(matrix_product(response, matrix_product(course.covariance, response)))
-    return math.sqrt(max(total - float(response[0] ** 2 * course.covariance[0, 0]), 0.0))
+    return math.sqrt(_course_variance(seen, deviations, course.covariance, float(camera.mount_height)))
+
+
+@kernel
+def _course_variance(seen: Seen, deviations: Floats, covariance: Floats, height: float) -> float:
+    """Variance of the extinction by the course, beyond that by its horizon [1/m²] (`covariance` of `RoadCourse`)."""
+    response = extinction_response(seen, deviations, height)
+    through, total = times(covariance, response), 0.0
+    for a in range(response.size):
+        total += response[a] * through[a]
+    return max(total - response[0] * response[0] * covariance[0, 0], 0.0)

@@ -11,8 +11,8 @@ import numpy as np
 
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.strips import strip_kernels
 from fogsim.vision.strips.sky import Sky
+from fogsim.vision.strips.strip_curves import airlight_shares
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.uneven_fit import UnevenFit
 
@@ -63,7 +63,7 @@ def airlight_edge(
         min(round(camera.principal_point[0] + reach), camera.width),
     )
     alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
-    shares = strip_kernels.airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
+    shares = airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
     front = _front(shares)
     if front is None:
         return None

@@ -3,20 +3,34 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
-from fogsim.vision.lines.road_course import SAG_DEVIATION, RoadCourse, beginning_cost, sag_from
+from fogsim.vision.lines.road_course import (
+    SAG_DEVIATION,
+    RoadCourse,
+    SagsAhead,
+    beginning_cost,
+    cost_given,
+    row_given,
+    sag_from,
+    sag_precision,
+)
 from fogsim.vision.lines.road_course_kernels import PIECES
-from fogsim.vision.strips import joint_fit
-from fogsim.vision.strips.course_geometry import course_geometry
-from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
-from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.albedo_filter import Albedo
+from fogsim.vision.strips.course_geometry import SIDES, Bend, lay_along
+from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit, bins_of
+from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.uneven.fog_evidence import EvenFog, even_fog_over, thinned_bins
+from fogsim.vision.strips.strip_geometry import StripGeometry, View, view_of
+from fogsim.vision.uneven.fog_evidence import EvenFog, chance_of_even, even_fog_over, even_start, thinned_bins
+
+Floats = NDArray[np.float64]
 
 _TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Curvatures that are tried first, over their standard deviation [-]."""
@@ -30,8 +44,16 @@ _LEAST_VARIANCE = 1e-4
 _RIVAL = 20.0
 """By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
 
-_AlongCourse = Callable[[int, float], EvenFog]
-"""Even fog by albedo and curvature."""
+
+class _Ahead(NamedTuple):
+    """A road whose sags and crests are sought, and how it is looked at."""
+
+    straight: StripGeometry  # Strips of a straight road
+    lens: View
+    bend: Bend
+    sags: SagsAhead  # What lines say of sags and crests
+    before: Floats  # (pieces, pieces): See `sag_precision`
+    sides: Floats  # (strips, 2): Sides of the strips [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,42 +73,70 @@ class HiddenCourse:
         self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int, gain: float
     ) -> list[EvenFog]:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
-        found: list[EvenFog] = []
-        begun: list[tuple[float, _AlongCourse, float, float]] = []
+        course, found, begun = self.course, [], []
+        bend = Bend(course.column, course.bend, course.bend_covariance)
+        sides = SIDES[: len(curves.variance)]
+        ahead = _Ahead(self.straight, view_of(self.camera), bend, course.ahead, sag_precision(), sides)
+        first, costs = even_start(start), _costs(ahead, np.array(_TRIED))
+
+        def along(piece: int, over: int, curvature: float) -> EvenFog:
+            return _even_fog(ahead, curves, prior, first, piece, curvature, ALBEDOS[over], chance_of_even(over))
+
         for piece in range(1, PIECES):
-            tried = [value for value in _TRIED if self._cost(piece, value) < gain + _RIVAL]
+            tried = [value for value, cost in zip(_TRIED, costs[piece], strict=True) if cost < gain + _RIVAL]
             if len(tried) < 3:
                 continue
-            along: _AlongCourse = functools.partial(self._even_fog, curves, prior, start, piece)
-            curvature, one, width = _likeliest(functools.partial(along, albedo), tried)
-            found.append(replace(one, cost=one.cost + width))
-            begun.append((found[-1].cost, along, curvature, width))
+            curvature, one, width = _likeliest(functools.partial(along, piece, albedo), tried)
+            found.append(one._replace(cost=one.cost + width))
+            begun.append((found[-1].cost, piece, curvature, width))
         least = min((one.cost for one in found), default=math.inf)
-        for cost, along, curvature, width in begun:
+        for cost, piece, curvature, width in begun:
             if cost < least + _RIVAL:
-                others = (along(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
-                found += [replace(one, cost=one.cost + width) for one in others]
+                others = (along(piece, other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
+                found += [one._replace(cost=one.cost + width) for one in others]
         return found
 
-    def _cost(self, piece: int, curvature: float) -> float:
-        """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
-        sag = sag_from(piece, curvature * SAG_DEVIATION)
-        return self.course.ahead.cost(sag) + beginning_cost(curvature * SAG_DEVIATION)
 
-    def _even_fog(
-        self, curves: StripCurves, prior: JointPrior, start: JointFit, piece: int, albedo: int, curvature: float
-    ) -> EvenFog:
-        """Even fog over a road that sags or crests from a piece on, with how likely that is beforehand and by lines."""
-        ahead, sag = self.course.ahead, sag_from(piece, curvature * SAG_DEVIATION)
-        row, variance = ahead.row(sag)
-        moved = row - ahead.row(np.zeros(PIECES))[0]
-        deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
-        around = prior._replace(shift=prior.shift + moved, shift_deviation=deviation)
-        course = replace(self.course, row=self.camera.horizon_row + around.shift, sag=sag)
-        geometry = course_geometry(self.straight, self.camera, course).only(list(range(len(curves.variance))))
-        bins = thinned_bins(joint_fit.strip_bins(curves, geometry, around))
-        found = even_fog_over(bins, albedo, around, replace(start, shift=around.shift))
-        return replace(found, cost=found.cost + self._cost(piece, curvature))
+@kernel
+def _cost(ahead: _Ahead, sag: Floats, curvature: float) -> float:
+    """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
+    return cost_given(ahead.sags, sag, ahead.before) + beginning_cost(curvature)
+
+
+@kernel
+def _costs(ahead: _Ahead, curvatures: Floats) -> Floats:
+    """(pieces, n): `_cost` of courses that begin at each piece, by curvatures over their standard deviation [-]."""
+    out = np.empty((PIECES, curvatures.size))
+    for piece in range(PIECES):
+        for i in range(curvatures.size):
+            curvature = curvatures[i] * SAG_DEVIATION
+            out[piece, i] = _cost(ahead, sag_from(piece, curvature), curvature)
+    return out
+
+
+@kernel
+def _even_fog(
+    ahead: _Ahead,
+    curves: StripCurves,
+    prior: JointPrior,
+    first: tuple[float, float, float],
+    piece: int,
+    curvature: float,
+    albedo: Albedo,
+    chance: float,
+) -> EvenFog:
+    """Even fog over a road that sags or crests from a piece on, with how likely that is beforehand and by lines."""
+    sag = sag_from(piece, curvature * SAG_DEVIATION)
+    row, variance = row_given(ahead.sags, sag)
+    level, _ = row_given(ahead.sags, np.zeros(PIECES))
+    deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
+    around = with_horizon(prior, prior.shift + (row - level), deviation)
+    horizon = ahead.lens.horizon
+    geometry = lay_along(ahead.straight, ahead.lens, horizon + around.shift - horizon, sag, ahead.bend, ahead.sides)
+    bins = thinned_bins(bins_of(curves, geometry, around, np.zeros(0), np.zeros((0, 0, 0))))
+    found = even_fog_over(bins, albedo, around, (first[0], first[1], around.shift), chance)
+    cost = found.cost + _cost(ahead, sag, curvature * SAG_DEVIATION)
+    return EvenFog(cost, found.extinction, found.variance, found.left_out)
 
 
 def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple[float, EvenFog, float]:

@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.albedo_filter import HIDDEN, USED
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.uneven import uneven_kernels
 from fogsim.vision.uneven.fog_evidence import (
     NODES,
     UNEVEN_CHANCES,
     UNEVENNESS,
     EvenFog,
     bank_nodes,
+    chance_of_even,
     even_fog_over,
+    even_start,
     fog_nodes,
     hidden_cost,
     left_out,
@@ -28,7 +28,14 @@ from fogsim.vision.uneven.fog_evidence import (
     thinned_bins,
 )
 from fogsim.vision.uneven.hidden_course import HiddenCourse
-from fogsim.vision.uneven.uneven_kernels import FogNodes
+from fogsim.vision.uneven.uneven_kernels import (
+    OTHERS,
+    FogNodes,
+    denser_part,
+    first_profile,
+    path_depths,
+)
+from fogsim.vision.uneven.uneven_kernels import fit_uneven as fit_over_nodes
 
 Floats = NDArray[np.float64]
 
@@ -73,19 +80,12 @@ _UNSURE = -2.0 * math.log(1.0 - _SURELY_EVEN_SHARE)
 _STEPS, _MORE_STEPS = 12, 8
 """Most Gauss–Newton steps of a first fit, and from one answer to the next."""
 
-_SWALLOWED = 1.0
-"""Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
-crests and in sags road seems to fade a little."""
-
 _LEAST_ROAD = 0.3
 """Share of bins that even fog must explain for there to be a road that other fog may lie on [-]."""
 
 _EXPLAINS, _FEW = 0.5, 3
 """Share of the bins that even fog leaves out, and number of them, that uneven fog may leave out and be believed: else
 what is there is an obstacle to both [-]."""
-
-_DENSER, _SURELY_DENSER = math.log(2.5), 2.5
-"""Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,11 +159,12 @@ def _fitted(
     bins = thinned_bins(joint_fit.strip_bins(curves, geometry, prior))
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
-    flat = [even_fog_over(bins, albedo, prior, even) for albedo in range(len(ALBEDOS))]
+    first = even_start(even)
+    flat = [even_fog_over(bins, albedo, prior, first, chance_of_even(which)) for which, albedo in enumerate(ALBEDOS)]
     evens = [one.cost - _BENT * hidden.is_bent for one in flat]
     likely = int(np.argmin(evens))
-    first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
-    begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
+    guess = first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
+    begin = np.concatenate([guess, [prior.airlight, prior.shift, 0.0]])
     tried = [_uneven(bins, likely, prior, _GENTLE, begin, _STEPS)]
     tried.append(_uneven(bins, likely, prior, _FIRST_UNEVEN, begin, _STEPS))
     tried += _banks(bins, likely, prior, begin)
@@ -180,7 +181,7 @@ def _fitted(
         if albedo != likely and cost < evens[likely] + _UNLIKELY:
             tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, _MORE_STEPS))
     fogs = [
-        replace(one, cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
+        one._replace(cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
         for one, cost in zip(flat, evens, strict=True)
     ]
     gain = min(evens) - min(t.cost for t in tried)
@@ -188,7 +189,7 @@ def _fitted(
         courses = hidden.even_fogs(curves, prior, even, likely, gain)
         explained = min(evens) - min((one.cost for one in courses), default=math.inf)
         doubt = _HIDDEN_COURSE if explained > _MOSTLY * gain else 0.0
-        fogs += [replace(one, cost=one.cost - doubt) for one in courses]
+        fogs += [one._replace(cost=one.cost - doubt) for one in courses]
     return _weighed(even, fogs, tried, bins, geometry)
 
 
@@ -220,13 +221,13 @@ def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
 
 def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:
     """Fit of fog of some unevenness."""
-    fog = fog_nodes(*UNEVENNESS[unevenness], start.size - uneven_kernels.OTHERS)
+    fog = fog_nodes(*UNEVENNESS[unevenness], start.size - OTHERS)
     return _candidate(bins, albedo, prior, fog, UNEVEN_CHANCES[unevenness], start, steps)
 
 
 def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_Candidate]:
     """Fits of banks that begin where a first fit has the fog become denser, or one node on."""
-    count = start.size - uneven_kernels.OTHERS
+    count = start.size - OTHERS
     if count <= _FIRST_BANK + 1:
         return []
     rises = np.diff(start[:count])
@@ -242,8 +243,7 @@ def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_C
 def _candidate(
     bins: Bins, albedo: int, prior: JointPrior, fog: FogNodes, chance: float, start: Floats, steps: int
 ) -> _Candidate:
-    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
-    found = uneven_kernels.fit_uneven(bins, albedos, prior, fog, start, steps)
+    found = fit_over_nodes(bins, ALBEDOS[albedo], prior, fog, start, steps)
     if int((found.used[0] == USED).sum()) < joint_fit.LEAST_BINS:
         return _Candidate(math.inf, found, fog, chance)
     likelihood = found.cost + hidden_cost(found, bins)
@@ -274,12 +274,10 @@ def _weighed(
     for weight, candidate in zip(of_tried, tried, strict=True):
         if weight < 1e-3:
             continue
-        mean, variance = _mean_extinction(candidate, reach)
-        k, k2 = k + weight * mean, k2 + weight * (mean**2 + variance)
-        for i, place in enumerate(distance):
-            value, spread = _depth(candidate, float(place))
-            depth[i] += weight * value
-            depth2[i] += weight * (value**2 + spread)
+        seen_fog = path_depths(*_solved(candidate), distance, reach)
+        k, k2 = k + weight * seen_fog.mean, k2 + weight * (seen_fog.mean**2 + seen_fog.mean_variance)
+        depth += weight * seen_fog.depth
+        depth2 += weight * (seen_fog.depth**2 + seen_fog.variance)
     sd = math.sqrt(max(k2 - k * k, 0.0))
     deviation = np.sqrt(np.maximum(depth2 - depth**2, 0.0))
     if share > 0.5:
@@ -294,58 +292,10 @@ def _weighed(
         used=of_each_bin(best.solution.used == USED, geometry.distance),
         hidden=of_each_bin(best.solution.used == HIDDEN, geometry.distance)[0],
     )
-    return UnevenFit(fit, reach, distance, depth, deviation, share, _denser(best, reach))
+    denser = denser_part(*_solved(best), reach)
+    return UnevenFit(fit, reach, distance, depth, deviation, share, None if math.isnan(denser[0]) else denser)
 
 
-def _mean_extinction(candidate: _Candidate, reach: float) -> tuple[float, float]:
-    """Mean extinction up to the meteorological visibility, or to a reach that is nearer [1/m], and its variance."""
-    nodes, solution = candidate.fog.nodes, candidate.solution
-    logs = solution.theta[: nodes.size]
-    distance = uneven_kernels.distance_at_depth(nodes, logs, OPTICAL_DEPTH_AT_VISIBILITY)
-    if distance > reach:
-        depth, variance = _depth(candidate, reach)
-        return depth / reach, variance / reach**2
-    # A depth that is greater by dτ is reached dτ / k sooner.
-    depth, variance = _depth(candidate, distance)
-    slope = depth / distance**2 / uneven_kernels.extinction_at(nodes, logs, distance)
-    return depth / distance, slope**2 * variance
-
-
-def _depth(candidate: _Candidate, distance: float) -> tuple[float, float]:
-    """Optical depth up to a distance, and its variance [-]."""
-    nodes = candidate.fog.nodes
-    depth, gradient = uneven_kernels.depth_at(nodes, candidate.solution.theta[: nodes.size], distance)
-    return depth, _variance(gradient, candidate.solution.covariance)
-
-
-def _variance(gradient: Floats, covariance: Floats) -> float:
-    size = gradient.size
-    return float((gradient[:, None] * covariance[:size, :size] * gradient).sum())
-
-
-def _denser(candidate: _Candidate, reach: float) -> tuple[float, float, float] | None:
-    """Where fog is surely much denser than near the camera, if anywhere."""
-    nodes, solution = candidate.fog.nodes, candidate.solution
-    seen = int((nodes <= reach).sum())
-    if _depth(candidate, reach)[0] < _SWALLOWED:
-        return None
-    logs, covariance = solution.theta[:seen], solution.covariance[:seen, :seen]
-    for node in range(2, seen):
-        # The near road is all before the node, each stretch weighed by its length.
-        lengths = np.diff(nodes[: node + 1])
-        weight = np.zeros(seen)
-        weight[:node], weight[node] = -lengths / lengths.sum(), 1.0
-        rise = float((weight * logs).sum())
-        if rise > _DENSER and rise > _SURELY_DENSER * math.sqrt(_variance(weight, covariance)):
-            return _half_density(nodes, logs, node, node + int(np.argmax(logs[node:])))
-    return None
-
-
-def _half_density(nodes: Floats, logs: Floats, node: int, densest: int) -> tuple[float, float, float]:
-    """Where extinction reaches half of that of the densest node, how surely [m], and that extinction [1/m]."""
-    half = logs[densest] - math.log(2.0)
-    while logs[node] < half:
-        node += 1
-    before, after = float(nodes[node - 1]), float(nodes[node])
-    share = (half - logs[node - 1]) / max(logs[node] - logs[node - 1], 1e-9)
-    return before + min(max(share, 0.0), 1.0) * (after - before), 0.5 * (after - before), math.exp(logs[densest])
+def _solved(candidate: _Candidate) -> tuple[Floats, Floats, Floats]:
+    """Nodes, parameters and their covariance."""
+    return candidate.fog.nodes, candidate.solution.theta, candidate.solution.covariance

@@ -18,6 +18,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import without_far_objects
+from fogsim.vision.light.medians import median
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION
@@ -246,7 +247,7 @@ class LeadContrast:
         try:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
-            fit = self._fit()
+            fit = self._fit(self._track.likely_distances())
             about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, _LEAST_EXTINCTION), DENSEST)
             self._track.relevel(about)
             crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
@@ -277,24 +278,21 @@ class LeadContrast:
         return min(jump, surprise)
 
     def _estimate(self, reason: str, road: RoadFall | None, found: dict[str, object]) -> Estimate:
-        found |= {
-            "distance": self._track.likely_distances(),
-            "contrast": np.array([s.contrast.ratio for s in self._track.detections]),
-        }
-        fit = self._fit()
+        distance = self._track.likely_distances()
+        found |= {"distance": distance, "contrast": np.array([s.contrast.ratio for s in self._track.detections])}
+        fit = self._fit(distance)
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
         reason = _rejection_reason(fit, road)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
-        reach = float(self._track.likely_distances().max()) + self._setback
+        reach = float(distance.max()) + self._setback
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
-    def _fit(self) -> DecayFit | None:
+    def _fit(self, distance: Floats) -> DecayFit | None:
         if len(self._track.detections) < _MIN_SAMPLES or sum(one.alike for one in self._track.detections) < _MIN_ALIKE:
             return None
-        distance = self._track.likely_distances()
         contrast, noise, lever = (
             np.array([getattr(s.contrast, name) for s in self._track.detections])
             for name in ("ratio", "deviation", "lever")
@@ -303,7 +301,8 @@ class LeadContrast:
         uneven = max(s.airlight_deviation for s in self._track.detections)
         level = math.hypot(_AIRLIGHT_DEVIATION, _RECKONED_LEVEL * uneven)
         airlight = _CLIPPED_AIRLIGHT_DEVIATION if clipped else level
-        offset = max(airlight * float(np.median(lever)), 1e-6)
+        usual = median(lever)
+        offset = max(airlight * usual, 1e-6)
         fit = fit_decay(distance, contrast, noise, _REGISTRATION, offset)
         if fit is None:
             return None
@@ -314,7 +313,7 @@ class LeadContrast:
             return None
         certain = contrast**2 / (noise**2 + (relative * contrast) ** 2 + offset**2)
         # What is wrong of an uneven airlight's shape is so at the nearest range, and nearly nothing far away.
-        shape = math.hypot(self._shape(fit.extinction, float(np.median(lever))), uneven * float(np.median(lever)))
+        shape = math.hypot(self._shape(fit.extinction, usual), uneven * usual)
         by_shape = shape / max(_span(distance, certain), SPACING)
         return replace(fit, deviation=math.hypot(fit.deviation, by_shape, _SMOOTHED * fit.extinction))
 

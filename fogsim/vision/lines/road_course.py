@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.core.linear_algebra import inverse_of, matrix_product, times
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon
@@ -262,54 +262,85 @@ def _middle(lines: RoadLines) -> float:
 
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
-    unknown, covariance = fit.unknown, fit.covariance
-    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
-    if bent < _SHOWN:
-        unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
-    kept = np.array([ROW, *range(SAG, BEND)])
-    ahead = SagsAhead(unknown[kept] + horizon.row * (kept == ROW), covariance[np.ix_(kept, kept)])
-    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], sag_covariance())
-    flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
-    apart = (unknown - flat)[kept]
-    within = sagging * ahead.covariance + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
-    if sagging < _SHOWN:
-        unknown, share = flat, sagging
-    else:
-        share = 1.0 - sagging
+    bends = curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH)
+    found = _weighed(fit.unknown, fit.covariance, horizon.row, bends, sag_covariance())
     return RoadCourse(
-        column=camera.principal_point[0] + float(unknown[COLUMN]),
-        row=horizon.row + float(unknown[ROW]),
-        sag=unknown[SAG:BEND].copy(),
-        bend=unknown[BEND:].copy(),
-        covariance=within + share * apart[:, None] * apart[None, :],
-        bend_covariance=covariance[BEND:, BEND:].copy(),
+        column=camera.principal_point[0] + float(found.unknown[COLUMN]),
+        row=horizon.row + float(found.unknown[ROW]),
+        sag=found.unknown[SAG:BEND],
+        bend=found.unknown[BEND:],
+        covariance=found.covariance,
+        bend_covariance=found.bend_covariance,
         lines=fit.lines,
-        ahead=ahead,
+        ahead=found.ahead,
     )
 
 
-def _share(mean: Floats, covariance: Floats, prior: Floats) -> float:
-    """Probability that curvatures are not all 0 (Savage and Dickey's ratio)."""
-    exponent = 0.5 * float(matrix_product(mean, matrix_product(inverse_of(covariance), mean)))
-    logarithm = min(exponent + 0.5 * (_log_determinant(covariance) - _log_determinant(prior)), 50.0)
+class _Weighed(NamedTuple):
+    """A course, straight where it is more likely so, with covariances of `RoadCourse`."""
+
+    unknown: Floats  # See `CourseFit`
+    covariance: Floats
+    bend_covariance: Floats
+    ahead: SagsAhead
+
+
+@kernel
+def _weighed(unknown: Floats, covariance: Floats, row: float, bends: Floats, sags: Floats) -> _Weighed:
+    """Bends, then sags and crests, weighed with none, by what is known of them beforehand (pieces, pieces)."""
+    if _share(unknown, covariance, BEND, bends) < _SHOWN:
+        unknown, covariance = _without(unknown, covariance, BEND)
+    own = covariance[ROW:BEND, ROW:BEND].copy()
+    mean = unknown[ROW:BEND].copy()
+    mean[0] += row
+    sagging = _share(unknown, covariance, SAG, sags)
+    flat, flat_covariance = _without(unknown, covariance, SAG)
+    apart = (unknown - flat)[ROW:BEND]
+    within = sagging * own + (1.0 - sagging) * flat_covariance[ROW:BEND, ROW:BEND]
+    share = 1.0 - sagging
+    if sagging < _SHOWN:
+        unknown, share = flat, sagging
+    within += share * apart.reshape(-1, 1) * apart
+    return _Weighed(unknown.copy(), within, covariance[BEND:, BEND:].copy(), SagsAhead(mean, own))
+
+
+@kernel
+def _share(unknown: Floats, covariance: Floats, first: int, prior: Floats) -> float:
+    """Probability that curvatures, from an unknown on, are not all 0 (Savage and Dickey's ratio)."""
+    mean, own = unknown[first : first + PIECES], covariance[first : first + PIECES, first : first + PIECES].copy()
+    exponent = 0.5 * _square(mean, inverse_of(own))
+    logarithm = min(exponent + 0.5 * (_log_determinant(own) - _log_determinant(prior)), 50.0)
     odds = _CURVED_SHARE / (1.0 - _CURVED_SHARE) * math.exp(logarithm)
     return odds / (1.0 + odds)
 
 
+@kernel
 def _log_determinant(matrix: Floats) -> float:
     """Logarithm of the determinant of a positive definite matrix, by elimination."""
     left, total = matrix.copy(), 0.0
     for i in range(len(left)):
         total += math.log(max(left[i, i], 1e-300))
-        left[i + 1 :, i + 1 :] -= left[i + 1 :, i, None] * (left[i, None, i + 1 :] / left[i, i])
+        for a in range(i + 1, len(left)):
+            for b in range(i + 1, len(left)):
+                left[a, b] -= left[a, i] * (left[i, b] / left[i, i])
     return total
 
 
-def _without(unknown: Floats, covariance: Floats, which: slice) -> tuple[Floats, Floats]:
-    """Condition a normal distribution on some unknowns' being 0."""
-    gain = matrix_product(covariance[:, which], inverse_of(np.ascontiguousarray(covariance[which, which])))
-    rest, spread = unknown - matrix_product(gain, unknown[which]), covariance - matrix_product(gain, covariance[which])
-    rest[which], spread[which], spread[:, which] = 0.0, 0.0, 0.0
+@kernel
+def _without(unknown: Floats, covariance: Floats, first: int) -> tuple[Floats, Floats]:
+    """Condition a normal distribution on curvatures' being 0, from an unknown on."""
+    end = first + PIECES
+    inverse = inverse_of(covariance[first:end, first:end].copy())
+    rest, spread = unknown.copy(), covariance.copy()
+    for a in range(unknown.size):
+        for k in range(PIECES):
+            gain = 0.0
+            for j in range(PIECES):
+                gain += covariance[a, first + j] * inverse[j, k]
+            rest[a] -= gain * unknown[first + k]
+            for b in range(unknown.size):
+                spread[a, b] -= gain * covariance[first + k, b]
+    rest[first:end], spread[first:end], spread[:, first:end] = 0.0, 0.0, 0.0
     return rest, spread
 
 

@@ -109,16 +109,23 @@ Priors = tuple[JointPrior, ...]
 
 
 class _Answers(NamedTuple):
-    """Solutions under one prior by albedo, each with its cost, in which how likely the albedo is is counted."""
+    """Solutions under one prior by albedo, and what comes of the likeliest."""
 
-    cost: Floats  # (m,): Minus twice the logarithm of the evidence [-]
-    theta: Floats  # (m, 4): See `fogsim.vision.strips.joint_kernels.Solution`
-    variance: Floats  # (m,): Of k [1/m²]
-    albedo: Ints  # (m,): Which of `ALBEDOS`
-    # road, misfit, used: of the likeliest
+    # (m, 7): Minus twice the logarithm of the evidence with how likely the albedo is, the four parameters of
+    # `fogsim.vision.strips.joint_kernels.Solution`, the variance of k [1/m²], and which of `ALBEDOS`
+    table: Floats
     road: float
     misfit: float
     used: NDArray[np.uint8]
+
+
+class _Mixture(NamedTuple):
+    """Solutions averaged by their evidence."""
+
+    theta: Floats  # (4,): Their mean
+    deviation: float  # Of k [1/m]
+    uneven: float  # Share of those whose airlight is not even [-]
+    albedo: Floats  # (albedos,): Share of each albedo [-]
 
 
 class _Tried(NamedTuple):
@@ -171,29 +178,18 @@ def _answers(
     """Answers under one prior; `angle` and `below` of a `SlopeTable`, `near` as in `_from_near`."""
     bins = bins_of(curves, geometry, prior, angle, below)
     best = likeliest = _from_near(bins, near, prior, _albedo(tried, 0))
-    found = _Answers(
-        np.empty(tried.number.size),
-        np.empty((tried.number.size, PARAMETERS)),
-        np.empty(tried.number.size),
-        tried.number.copy(),
-        0.0,
-        0.0,
-        best.used,
-    )
     most = len(ALBEDOS) if best.misfit > _EXPLAINED else _SMOOTH
-    before, least, count = slope_cost(prior) + prior.cost, np.inf, 0
+    table, before, least, count = np.empty((tried.number.size, 7)), slope_cost(prior) + prior.cost, np.inf, 0
     for a in range(tried.number.size):
         if tried.number[a] >= most:
             continue
         one = best if a == 0 else gauss_newton(bins, _albedo(tried, a), prior, best.theta, MORE_STEPS)
-        cost = one.cost + before - 2.0 * math.log(tried.chances[a])
-        if cost < least:
-            least, likeliest = cost, one
-        found.cost[count], found.variance[count] = cost, one.covariance[0, 0]
-        found.theta[count], found.albedo[count] = one.theta[:PARAMETERS], tried.number[a]
+        table[count, 0] = one.cost + before - 2.0 * math.log(tried.chances[a])
+        table[count, 1:5], table[count, 5], table[count, 6] = one.theta[:4], one.covariance[0, 0], tried.number[a]
+        if table[count, 0] < least:
+            least, likeliest = table[count, 0], one
         count += 1
-    shown = (found.cost[:count], found.theta[:count], found.variance[:count], found.albedo[:count])
-    return _Answers(*shown, likeliest.road, likeliest.misfit, likeliest.used)
+    return _Answers(table[:count], likeliest.road, likeliest.misfit, likeliest.used)
 
 
 @kernel
@@ -276,30 +272,39 @@ def _refined_from(bins: Bins, prior: JointPrior, k: float, airlight: float, shif
 
 
 def _average(priors: Priors, found: list[_Answers]) -> JointFit:
-    costs = np.concatenate([one.cost for one in found])
-    weight = np.exp(-0.5 * (costs - costs.min()))
-    weight /= weight.sum()
-    thetas = np.concatenate([one.theta for one in found])
-    mean = (weight[:, None] * thetas).sum(axis=0)
-    variances = np.concatenate([one.variance for one in found]) + (thetas[:, 0] - mean[0]) ** 2
-    best = min(found, key=lambda one: float(one.cost.min()))
     # Priors of even airlight come first.
     uneven = [(prior, one) for prior, one in zip(priors, found, strict=True) if prior.rise.size]
-    count = sum(one.cost.size for _, one in uneven)
-    share = np.bincount(np.concatenate([one.albedo for one in found]), weight)
+    table = found[0].table if len(found) == 1 else np.concatenate([one.table for one in found])
+    mixture = _mixed(table, len(table) - sum(len(one.table) for _, one in uneven))
+    best = min(found, key=lambda one: float(one.table[:, 0].min()))
     return JointFit(
-        extinction=float(mean[0]),
-        extinction_deviation=math.sqrt((weight * variances).sum()),
-        airlight=float(mean[1]),
-        shift=float(mean[2]),
+        extinction=float(mixture.theta[0]),
+        extinction_deviation=mixture.deviation,
+        airlight=float(mixture.theta[1]),
+        shift=float(mixture.theta[2]),
         road=best.road,
         misfit=best.misfit,
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
-        darkening_chance=float(weight[weight.size - count :].sum()),
-        droplets=_droplets([np.logaddexp.reduce(-0.5 * (one.cost - prior.cost)) for prior, one in uneven]),
-        albedos=tuple(np.flatnonzero(share > _NEGLIGIBLE).tolist()),
+        darkening_chance=mixture.uneven,
+        droplets=_droplets([np.logaddexp.reduce(-0.5 * (one.table[:, 0] - prior.cost)) for prior, one in uneven]),
+        albedos=tuple(albedo for albedo, share in enumerate(mixture.albedo.tolist()) if share > _NEGLIGIBLE),
     )
+
+
+@kernel
+def _mixed(table: Floats, even: int) -> _Mixture:
+    """Answers, of `_Answers`, averaged; the first ones (`even`) are of even airlight."""
+    weight = np.exp(-0.5 * (table[:, 0] - table[:, 0].min()))
+    weight /= weight.sum()
+    theta, albedo, uneven, variance = np.zeros(PARAMETERS), np.zeros(len(ALBEDOS)), 0.0, 0.0
+    for a in range(weight.size):
+        theta += weight[a] * table[a, 1:5]
+        albedo[int(table[a, 6])] += weight[a]
+        uneven += weight[a] if a >= even else 0.0
+    for a in range(weight.size):
+        variance += weight[a] * (table[a, 5] + (table[a, 1] - theta[0]) ** 2)
+    return _Mixture(theta, math.sqrt(variance), uneven, albedo)
 
 
 def _droplets(logarithms: list[float]) -> tuple[float, ...]:

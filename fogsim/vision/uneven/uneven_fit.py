@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.albedo_filter import HIDDEN, USED
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
@@ -201,22 +202,31 @@ def _is_free(even: JointFit, curves: StripCurves) -> bool:
 
 def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
     """Fog that is the same all along the way."""
-    reach = _reach(even.used, geometry.path / geometry.below)
+    reach = _reach(even.used, geometry.path, geometry.below)
     k = max(even.extinction, 0.0)
     distance = _distances(reach)
     return UnevenFit(even, reach, distance, k * distance, even.extinction_deviation * distance)
 
 
+@kernel
 def _distances(reach: float) -> Floats:
     """Distances of a curve up to a reach [m]."""
-    count = max(math.ceil(math.log(max(reach, _NEAREST) / 10.0) / math.log(1.15)), 1)
-    return np.geomspace(10.0, max(reach, _NEAREST), count + 1)
+    farthest = max(reach, _NEAREST)
+    count = max(math.ceil(math.log(farthest / 10.0) / math.log(1.15)), 1)
+    out = 10.0 * (farthest / 10.0) ** (np.arange(count + 1) / count)
+    out[count] = farthest
+    return out
 
 
-def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
+@kernel
+def _reach(used: NDArray[np.bool_], path: Floats, below: Floats) -> float:
     """Path to the farthest bin in use [m]."""
-    seen = paths[: len(used)][used]
-    return float(seen.max()) if seen.size else 0.0
+    farthest = 0.0
+    for s in range(used.shape[0]):
+        for i in range(used.shape[1]):
+            if used[s, i]:
+                farthest = max(farthest, path[s, i] / below[i])
+    return farthest
 
 
 def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:
@@ -264,7 +274,7 @@ def _weighed(
     best = tried[int(np.argmax(of_tried))]
     used = even.used if share > 0.5 else best.solution.used == USED
     seen = geometry if share > 0.5 else bins
-    reach = _reach(used, seen.path / seen.below)
+    reach = _reach(used, seen.path, seen.below)
     if reach <= 0.0:
         return None
     distance = _distances(reach)

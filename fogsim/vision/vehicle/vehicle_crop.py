@@ -1,18 +1,20 @@
 """The part of a daytime image in which the vehicle ahead must be, as contrast to the sky."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.camera import Camera
+from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.clipped_sky import Clipping, clipping
 from fogsim.vision.light.luminance import linear_pixels, linear_table
-from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
+from fogsim.vision.light.medians import median
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
@@ -208,13 +210,9 @@ def daytime_crop(
 
 
 def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
-    part = pixels.pixels[rows, cols]
-    # Channel by channel, for a look-up of all at once is slower.
-    total = pixels.tables[0][part[:, :, 0]]
-    for channel in range(1, part.shape[2]):
-        total = total + pixels.tables[channel][part[:, :, channel]]
-    light: NDArray[Any] = total
-    return light
+    first, end, step = rows.indices(len(pixels.pixels))
+    left, right, _ = cols.indices(pixels.pixels.shape[1])
+    return part_luminance(pixels, first, end, step, left, right)
 
 
 def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
@@ -274,8 +272,15 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
 
     Takes `luminance` (rows, cols) [linear grey levels], `sky` [linear grey levels].
     """
-    table = linear_table(camera.response, camera.bits, camera.black_level)
-    slope = np.gradient(table.astype(np.float64))
-    here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
+    table, slope = _table_with_slope(camera.response, camera.bits, camera.black_level)
+    here, there = (int(np.searchsorted(table, level)) for level in (median(luminance), sky))
     most = table.size - 1
     return float(slope[min(here, most)] / slope[min(there, most)])
+
+
+@functools.lru_cache(maxsize=8)
+def _table_with_slope(
+    response: Response, bits: int, black_level: float
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    table = linear_table(response, bits, black_level)
+    return table, np.gradient(table.astype(np.float64))

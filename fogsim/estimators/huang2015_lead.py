@@ -64,7 +64,7 @@ _NEARER = 0.9
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
 
 
-class LeadTrack(TrackedVehicle[Comparison]):
+class _LeadTrack(TrackedVehicle[Comparison]):
     """Pictures of one vehicle ahead, and where it was last; the reference is kept, and renewed as it comes nearer.
 
     Parameters
@@ -309,9 +309,9 @@ class Huang2015Lead:
         """How many vehicles have been begun to be followed since the last reset."""
         return self._tracks
 
-    def _new_track(self) -> LeadTrack:
+    def _new_track(self) -> _LeadTrack:
         smoothed_by = 0.0 if self._as_published or self._camera_range is not None else RANGE_DEVIATION
-        return LeadTrack(self._camera, self._setback, self._spacing, self._blur, smoothed_by)
+        return _LeadTrack(self._camera, self._setback, self._spacing, self._blur, smoothed_by)
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from this and all earlier pictures of the vehicle ahead.

@@ -94,7 +94,7 @@ def _sums_up_to(sums: Floats, place: Floats) -> Floats:
     return np.asarray(sums[row] * (1.0 - part) + sums[row + 1] * part)
 
 
-def steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
+def _steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     """Steepest row of each of some curves, by a parabola over the logarithm of v − v_h about the peak.
 
     Returns v − v_h [px]; NaN where it never brightens upward (m,).
@@ -143,13 +143,13 @@ def _peaks(at: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.fl
     return out
 
 
-def highest_place(curve: RoadCurve, reach: float) -> float:
+def _highest_place(curve: RoadCurve, reach: float) -> float:
     """Place nearest to the horizon about which enough rows are seen for a slope [px below it]; infinite without any."""
     seen = np.isfinite(slopes(curve, curve.luminance[:, None], reach)[:, 0])
     return float(places(curve)[seen][0]) if seen.any() else np.inf
 
 
-def fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
+def _fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     """Extinctions whose laws are steepest, over the same rows and windows, where some curves are.
 
     At the inflection itself that is k = 2 (v_i − v_h) / λ (zhu2015 eq. 21); a window of some width, and rows of one,
@@ -157,11 +157,11 @@ def fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> F
 
     Returns k [1/m]; NaN where a curve never brightens upward (m,).
     """
-    seen = steepest_rows(curve, luminance, reach)
+    seen = _steepest_rows(curve, luminance, reach)
     optical = 2.0 * seen
     for _ in range(_STEPS):
         law = -transmittance(optical * slants(curve)[:, None], curve.below_horizon[:, None])
-        optical = optical * np.clip(seen / steepest_rows(curve, law, reach), 0.5, 2.0)
+        optical = optical * np.clip(seen / _steepest_rows(curve, law, reach), 0.5, 2.0)
     return np.asarray(optical / curve.row_distance)
 
 
@@ -336,8 +336,8 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
             return _of_last_row(curve, road)
         return Inflection(0.0, detection_limit(seen_up_to(curve), apart, camera.row_distance))
     extinction = float(_read(curve, curve.luminance[:, None])[0])
-    resolved = _RESOLVED * highest_place(curve, REACH)
-    if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
+    resolved = _RESOLVED * _highest_place(curve, REACH)
+    if extinction > 0.0 and _steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
         airlight, dark = check_law(curve, extinction, road.image)
         deviation = extinction_deviation(curve, extinction, _read, apart)
         return Inflection(*fog_or_clear(extinction, deviation), airlight, dark)
@@ -377,7 +377,7 @@ def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
 
 
 def _read(curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
-    return fog_of_steepest_rows(curve, luminance, REACH)
+    return _fog_of_steepest_rows(curve, luminance, REACH)
 
 
 def _curve(road: SeenRoad, camera: Camera, *, own_lane: bool) -> RoadCurve:

@@ -44,7 +44,7 @@ class Presence:
         return self.step > self.threshold
 
 
-def vehicle_presence(
+def _vehicle_presence(
     luminance: NDArray[np.float32],
     origin: tuple[int, int],
     camera: Camera,
@@ -343,7 +343,7 @@ class Gabb2014:
         if why := lit_by_lamps(level, self._camera, observation.lead):
             raise CannotTellError(why)
         light = crop.sky.luminance, crop.noise
-        seen = vehicle_presence(crop.luminance, crop.origin, self._camera, depth, ASIDE, light)
+        seen = _vehicle_presence(crop.luminance, crop.origin, self._camera, depth, ASIDE, light)
         found |= {"distance": depth, "threshold": seen.threshold}
         if seen.found and abs(seen.aside) <= _NEARLY_AHEAD:
             self._ahead_until = observation.time + _SEEN_BEFORE
@@ -371,7 +371,7 @@ class Gabb2014:
         camera = self._camera
         wide = linear_luminance(level[rows, columns], camera.response, camera.bits, camera.black_level)
         light = crop.sky.luminance, crop.noise
-        return not vehicle_presence(wide, (columns.start, rows.start), camera, crop.depth, aside, light).found
+        return not _vehicle_presence(wide, (columns.start, rows.start), camera, crop.depth, aside, light).found
 
     def _left(self, depth: float, time: float) -> float:
         """What even the densest fog must have left of the contrast that the vehicle had a moment ago [-]."""

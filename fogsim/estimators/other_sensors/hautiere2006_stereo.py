@@ -41,14 +41,14 @@ _BELOW_ROAD = 1.35
 """Disparity over that of a flat road in the same row below which nothing can be: under the road [-]."""
 
 
-class SeenEdges(NamedTuple):
+class _SeenEdges(NamedTuple):
     """Edges that both pictures show."""
 
     disparity: Floats  # (n,): By how much farther left the second camera has each [px]
     contrast: Floats  # (n,): Local contrast (L_bright − L_dark) / L_bright [-]
 
 
-def seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, least: float) -> SeenEdges:
+def _seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, least: float) -> _SeenEdges:
     """Find edges across which contrast is at least so much, and their disparities.
 
     Blocks are compared by the sum of absolute differences of their horizontal gradients (OpenCV's StereoBM, after
@@ -67,7 +67,7 @@ def seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, lea
     # What lies under the road, or so near that its disparity was not sought, is a false match.
     road = _road_disparity(camera, baseline)[:, None]
     is_edge &= (shift > 0.0) & (_BELOW_ROAD * shift + 0.5 >= road) & (road * _NEAREST <= camera.focal_length * baseline)
-    return SeenEdges(shift[is_edge].astype(np.float64), contrast[is_edge].astype(np.float64))
+    return _SeenEdges(shift[is_edge].astype(np.float64), contrast[is_edge].astype(np.float64))
 
 
 def _disparities(left: NDArray[np.uint8], right: NDArray[np.uint8], most: float) -> NDArray[np.float32]:
@@ -112,7 +112,7 @@ _STEPS = 8
 """Iterations of the fit, whose weights go by what it finds."""
 
 
-class ContrastClass(NamedTuple):
+class _ContrastClass(NamedTuple):
     """Edges at about one distance."""
 
     distance: float  # Median distance [m]
@@ -120,7 +120,7 @@ class ContrastClass(NamedTuple):
     contrast: float  # Their best contrast [-]
 
 
-class ContrastDecay(NamedTuple):
+class _ContrastDecay(NamedTuple):
     """What the fit of ln C = ln C₀ − k d finds."""
 
     # extinction, standard_deviation: k and its standard deviation [1/m]
@@ -129,12 +129,12 @@ class ContrastDecay(NamedTuple):
     intrinsic: float  # C₀ [-]
 
 
-def contrast_classes(edges: SeenEdges, scale: float, deviation: float, least: float) -> list[ContrastClass]:
+def _contrast_classes(edges: _SeenEdges, scale: float, deviation: float, least: float) -> list[_ContrastClass]:
     """Classes of distances in which both pictures show edges, nearest first.
 
     Takes `scale` [m px], `deviation` [px], `least` [px].
     """
-    found: list[ContrastClass] = []
+    found: list[_ContrastClass] = []
     far = float(edges.disparity.max(initial=0.0))
     while far > least:
         near, far = far, far / STEP
@@ -142,11 +142,11 @@ def contrast_classes(edges: SeenEdges, scale: float, deviation: float, least: fl
         if np.count_nonzero(inside) >= _FEWEST:
             disparity = float(np.median(edges.disparity[inside]))
             best = float(np.quantile(edges.contrast[inside], _BEST))
-            found.append(ContrastClass(scale / disparity, deviation / disparity, best))
+            found.append(_ContrastClass(scale / disparity, deviation / disparity, best))
     return found
 
 
-def fit_decay(classes: list[ContrastClass]) -> ContrastDecay:
+def fit_decay(classes: list[_ContrastClass]) -> _ContrastDecay:
     """Fit the contrast's fall over classes, with what is known of the contrast without fog.
 
     Iteratively reweighted least squares: a class's deviation is that of its things and of its distance, k σ_d, and one
@@ -167,7 +167,7 @@ def fit_decay(classes: list[ContrastClass]) -> ContrastDecay:
         determinant = a * c - b * b
         start, k = float((c * p - b * q) / determinant), max(float((b * p - a * q) / determinant), 0.0)
         spread = math.sqrt(float(a / determinant))
-    return ContrastDecay(k, spread, math.exp(start))
+    return _ContrastDecay(k, spread, math.exp(start))
 
 
 _VISIBLE = 0.05
@@ -263,8 +263,8 @@ class Hautiere2006Stereo:
         second = for_kernels(checked_image(right.image, self._camera))
         if why := self._why_no_day(image, observation):
             return Estimate.invalid(self.method, why)
-        edges = seen_edges(image, second, self._camera, right.baseline, _VISIBLE)
-        classes = contrast_classes(edges, self._scale(right), self._deviation, FARTHEST)
+        edges = _seen_edges(image, second, self._camera, right.baseline, _VISIBLE)
+        classes = _contrast_classes(edges, self._scale(right), self._deviation, FARTHEST)
         sure = [one for one in classes if one.contrast >= _TRUSTED]
         sure = [one for one in sure if one.distance >= min(NEAR, 0.5 * sure[-1].distance)]
         if not sure:
@@ -280,7 +280,7 @@ class Hautiere2006Stereo:
     def _scale(self, right: SecondView) -> float:
         return self._camera.focal_length * right.baseline
 
-    def _estimate(self, classes: list[ContrastClass], sure: list[ContrastClass]) -> Estimate:
+    def _estimate(self, classes: list[_ContrastClass], sure: list[_ContrastClass]) -> Estimate:
         """By classes of distances, and those of them whose contrasts are no noise."""
         fit, last = fit_decay(sure), max(classes, key=lambda one: one.distance)
         found: dict[str, object] = {
@@ -298,7 +298,7 @@ class Hautiere2006Stereo:
         return Estimate(self.method, fit.extinction, deviation, diagnostics=found, reach=farthest)
 
     def _nothing_far_enough(
-        self, fit: ContrastDecay, deviation: float, farthest: float, found: dict[str, object]
+        self, fit: _ContrastDecay, deviation: float, farthest: float, found: dict[str, object]
     ) -> Estimate:
         most = fit.extinction + NORMAL_90_PERCENT * deviation
         reason = f"the farthest thing that both cameras show, at {farthest:.0f} m, has lost too little contrast"

@@ -35,7 +35,7 @@ UNKNOWN = 1e6
 
 # Place [px], relative size and blur [px].
 _LEAST, _MOST = np.array([-1.5, -1.5, 0.9, 0.3]), np.array([1.5, 1.5, 1.1, 2.0])
-LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
+_LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
 """Place [px], relative size and blur [px] by detection, map and distance, and their standard deviations. The blur has
 the pixels' own size in it."""
 
@@ -63,7 +63,7 @@ class Face:
         return len(self.layout.areas) == 1
 
     def columns(self, right: Floats, down: Floats, state: Floats) -> Floats:
-        """What the picture is a sum of: face, background and its slopes, reflectance, symbol; state as in `LOOSE`."""
+        """What the picture is a sum of: face, background and its slopes, reflectance, symbol; state as in `_LOOSE`."""
         u, v, size, blur = state.tolist()
         radius, blur = size * self.radius, max(blur, 0.2)
         covered, shine, box = face_maps(self.layout, right - u, down - v, radius, blur, self.narrowed)
@@ -113,10 +113,10 @@ def face_light(
     if picked.size < 20:
         return None
     right, down, seen = right[picked], down[picked], light.ravel()[picked].astype(np.float64)
-    state, weight = LOOSE[0], np.full(picked.size, _FIRST_NOISE**-2.0)
+    state, weight = _LOOSE[0], np.full(picked.size, _FIRST_NOISE**-2.0)
     face = Face(layout, radius, narrowed)
     for _ in range(_ROUNDS):
-        fit = _placed(seen, right, down, face, state, weight, LOOSE)
+        fit = _placed(seen, right, down, face, state, weight, _LOOSE)
         weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep), fit.state
     weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep)
     fit = _placed(seen, right, down, face, state, weight, (state, _PLACED))

@@ -74,7 +74,7 @@ class ApproachFit:
     misfit: float  # Mean square of the standardised residuals at the likeliest k [-]
 
 
-def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachFit:
+def _fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachFit:
     """Weigh every extinction coefficient by the looks at one sign.
 
     By Koschmieder's law the face's black has the contrast −(1 − g) e^(−kd) + ε to the airlight, and its slope over
@@ -341,7 +341,7 @@ class SignContrast:
             approach.looks.append(look)
             approach.time = time
             if len(approach.looks) >= _MIN_LOOKS and approach.span >= _LEAST_SPAN:
-                approach.fit = fit_approach(approach.looks, self._range_deviation)
+                approach.fit = _fit_approach(approach.looks, self._range_deviation)
         return ""
 
     def _is_wanted(self, one: Registration, time: float) -> bool:

@@ -1,6 +1,6 @@
 """Search frame after frame for the signs of the map, and follow how far away each is detected."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,8 +110,6 @@ _MIN_AIRLIGHT = 6.0
 
 _WELL_SEEN = 30.0
 """Range within which a sign must have been searched to know that it is not simply too far to see [m]."""
-
-Detector = Callable[..., tuple[object, ...]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ def footprint(extent: float, length: float) -> float:
 
 
 @kernel
-def add_products(whitened: Floats, gram: Floats) -> None:
+def _add_products(whitened: Floats, gram: Floats) -> None:
     """Add the products of whitened columns to the upper half of a Gram matrix."""
     for a in range(COLUMNS + 1):
         value = whitened[a]
@@ -159,7 +159,7 @@ def sky_pass(
         variance -= vh * vh / innovation
         shared -= so * so / innovation
         cross -= vh * so / innovation
-        add_products(whitened, gram)
+        _add_products(whitened, gram)
         total += 0.5 * math.log(2.0 * math.pi * innovation)
     return total
 
@@ -189,7 +189,7 @@ def road_pass(
         seen[2] = shared[i]
         variance = _take_in(p, state, steps, seen, noise[i], columns, i, whitened)
         half += 0.5 * math.log(2.0 * math.pi * variance)
-        add_products(whitened, gram)
+        _add_products(whitened, gram)
     while cut < cuts.size:
         grams[cut], halves[cut] = gram, half
         cut += 1
@@ -204,7 +204,7 @@ _MOST_ALBEDO = 0.95
 
 
 @kernel
-def log_normal_share(value: float) -> float:
+def _log_normal_share(value: float) -> float:
     """Logarithm of a normal law's share below a value."""
     if value > -5.0:
         return math.log(0.5 * math.erfc(-value / math.sqrt(2.0)))
@@ -286,9 +286,9 @@ def evidence(gram: Floats, half: float, law: Law, least_airlight: float, first: 
         r_square += of_road * of_road
         d_square += both * both
     result = -0.5 * square - half
-    result += log_normal_share(road / math.sqrt(r_square)) + log_normal_share(apart / math.sqrt(d_square))
+    result += _log_normal_share(road / math.sqrt(r_square)) + _log_normal_share(apart / math.sqrt(d_square))
     if least_airlight > 0.0:
-        result += log_normal_share((airlight - least_airlight) / math.sqrt(a_square + 1e-6))
+        result += _log_normal_share((airlight - least_airlight) / math.sqrt(a_square + 1e-6))
     return float(result)
 
 

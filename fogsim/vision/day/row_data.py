@@ -15,7 +15,7 @@ from fogsim.vision.light.pixel_kernels import even_column
 
 Floats = NDArray[np.float64]
 
-POINTS = 1025
+_POINTS = 1025
 """Signals, evenly from 0 to 1, at which a curve is tabulated."""
 
 MOST_SLOPE = 12.0
@@ -53,7 +53,7 @@ class Curves(NamedTuple):
 @lru_cache(maxsize=8)
 def curves_of(camera: Camera) -> Curves:
     """Curves that a camera may have, the stated one first."""
-    signal = np.linspace(0.0, 1.0, POINTS)
+    signal = np.linspace(0.0, 1.0, _POINTS)
     others = (
         dict(_OTHERS) if camera.response is not Response.SRGB else {n: c for n, c in _OTHERS.items() if n != "srgb"}
     )
@@ -123,7 +123,7 @@ class RowBins(NamedTuple):
 
 
 @kernel
-def bright_part(seen: Floats) -> tuple[float, float]:
+def _bright_part(seen: Floats) -> tuple[float, float]:
     """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it (`seen` (n,))."""
     count = seen.size
     centre = seen[count - 1 - count // _SKY_SHARE]
@@ -142,7 +142,7 @@ def bright_part(seen: Floats) -> tuple[float, float]:
 
 
 @kernel
-def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, out: Floats) -> None:
+def _bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, out: Floats) -> None:
     """Median of each bin, and the median distance from it [pixel values].
 
     Takes `image` (rows, cols, channels) uint8, `out` (3, n).
@@ -167,7 +167,7 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, 
         out[1, i] = apart[count // 2]
         if bins.last[i] < sky_end:
             # Trees and houses hide sky on both sides: what is alike near the brightest counts.
-            out[0, i], out[1, i] = bright_part(seen)
+            out[0, i], out[1, i] = _bright_part(seen)
         row = (bins.first[i] + bins.last[i]) // 2
         count = min(bins.outer_right[i] - bins.outer_left[i] + 1, _MOST_COLUMNS)
         for b in range(count):
@@ -200,16 +200,16 @@ _WALKS = np.array([[0.015], [0.04], [0.1]])
 def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float) -> RowData:
     """Read the bins of an image (`image` (rows, cols, channels) uint8)."""
     found = np.empty((3, bins.first.size))
-    wide = np.flatnonzero(bins.right - bins.left < 0.5 * SKY_WIDTH * camera.width)
+    wide = np.flatnonzero(bins.right - bins.left < 0.5 * _SKY_WIDTH * camera.width)
     sky_end = int(bins.first[wide[0]]) if wide.size else 0
-    bin_medians(image, bins, image.shape[2] // 2, sky_end, found)
+    _bin_medians(image, bins, image.shape[2] // 2, sky_end, found)
     signal, scatter, across = found / (2**camera.bits - 1)
     middle = 0.5 * (bins.first + bins.last)
     by_row = np.zeros(signal.size)
     by_row[1:-1] = (signal[2:] - signal[:-2]) / (middle[2:] - middle[:-2])
     curves = curves_of(camera)
-    place = np.clip(signal, 0.0, 1.0) * (POINTS - 1)
-    low = np.minimum(place.astype(np.int64), POINTS - 2)
+    place = np.clip(signal, 0.0, 1.0) * (_POINTS - 1)
+    low = np.minimum(place.astype(np.int64), _POINTS - 2)
     share = place - low
     light, slope = (table[:, low] * (1.0 - share) + table[:, low + 1] * share for table in (curves.light, curves.slope))
     noise = np.sqrt(_NOISE**2 + (_OF_SCATTER * scatter) ** 2 + (_OF_SLOPE * by_row) ** 2)
@@ -252,7 +252,7 @@ def _free(signal: Floats, noise: Floats, clipped: NDArray[np.bool_]) -> Floats:
     return np.asarray(np.logaddexp.reduce(ends, axis=0) - math.log(len(_WALKS)))
 
 
-_SKY_HEIGHT, _SKY_BINS, SKY_WIDTH = 0.25, 8, 0.56
+_SKY_HEIGHT, _SKY_BINS, _SKY_WIDTH = 0.25, 8, 0.56
 """How far above the horizon sky is read [rad], in how many bins, over what share of the columns."""
 
 _HALF_LANE = 1.15
@@ -288,7 +288,7 @@ def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
     middle, u0 = 0.5 * (first + last), camera.principal_point[0]
     half = np.where(
         last < horizon - around,
-        0.5 * SKY_WIDTH * camera.width,
+        0.5 * _SKY_WIDTH * camera.width,
         np.maximum(_HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
     )
     wider = np.maximum(half, _OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)

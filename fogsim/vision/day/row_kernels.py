@@ -15,7 +15,7 @@ from fogsim.core.jit import kernel
 
 Floats = NDArray[np.float64]
 
-AIRLIGHT, ROAD, SHEEN, VIGNETTING, STRAY, SKY, SHIFT, DARKENING, WET, OTHER_SKY, TONE, NEAR_TONE, COLUMNS = range(13)
+AIRLIGHT, ROAD, SHEEN, VIGNETTING, _STRAY, SKY, SHIFT, DARKENING, WET, OTHER_SKY, _TONE, _NEAR_TONE, COLUMNS = range(13)
 """Columns: airlight, road, sheen at grazing angles, shade of the lens, stray light, a sky's brightness higher up, a
 small shift of the horizon; how the airlight darkens downward, mirror image of the sky on a wet road, a sky that is not
 the airlight's, two shapes of local tone mapping; and their number. The light itself is in one column more."""
@@ -108,12 +108,12 @@ def fill_columns(
             columns[i, DARKENING] -= weight * (1.0 - through) * (1.0 - math.exp(-angle / _DARKENING_ANGLE))
             columns[i, SHEEN] += weight * through * math.exp(-angle / _SHEEN_ANGLE)
             columns[i, WET] += weight * through * fresnel(angle / slant)
-            columns[i, STRAY] += weight
+            columns[i, _STRAY] += weight
         angle = (middle - horizon) / focal
         off = (middle - lens[2]) / focal
         columns[i, VIGNETTING] = off * off
-        columns[i, TONE] = math.exp(-((angle / _TONE_ANGLE) ** 2))
-        columns[i, NEAR_TONE] = math.exp(-((angle / _NEAR_TONE_ANGLE) ** 2))
+        columns[i, _TONE] = math.exp(-((angle / _TONE_ANGLE) ** 2))
+        columns[i, _NEAR_TONE] = math.exp(-((angle / _NEAR_TONE_ANGLE) ** 2))
         below = max(angle, 0.25 / focal)
         place[i, 0] = left
         place[i, 1] = min(height / below, FARTHEST)
@@ -189,7 +189,7 @@ def _lights() -> Lights:
     mean[:, AIRLIGHT], deviation[:, AIRLIGHT] = _USUAL_AIRLIGHT, _AIRLIGHT_DEVIATION
     mean[:, ROAD], deviation[:, ROAD] = _USUAL_ROAD, _ROAD_DEVIATION
     deviation[:, SHEEN], deviation[:, WET] = 0.06 * _USUAL_ROAD, 0.05
-    deviation[:, VIGNETTING], deviation[:, STRAY], deviation[:, SKY] = 0.3, 0.02, 0.1
+    deviation[:, VIGNETTING], deviation[:, _STRAY], deviation[:, SKY] = 0.3, 0.02, 0.1
     for i, (darkening, wet, sky, tone, _) in enumerate(rows):
         if darkening:
             mean[i, DARKENING], deviation[i, DARKENING] = 0.32, 0.16
@@ -198,7 +198,7 @@ def _lights() -> Lights:
         if wet:
             deviation[i, WET] = 0.5
         if tone:
-            deviation[i, TONE], deviation[i, NEAR_TONE] = 0.12, 0.06
+            deviation[i, _TONE], deviation[i, _NEAR_TONE] = 0.12, 0.06
     return Lights(
         mean,
         deviation,

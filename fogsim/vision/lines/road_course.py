@@ -103,10 +103,10 @@ def sag_precision() -> Floats:
 @functools.cache
 def sag_covariance() -> Floats:
     """(pieces, pieces) float64: covariance of the curvatures of a curved road [1/m²]; it belongs to all who ask."""
-    return curvature_covariance(SAG_DEVIATION, SAG_LENGTH)
+    return _curvature_covariance(SAG_DEVIATION, SAG_LENGTH)
 
 
-def curvature_covariance(deviation: float, length: float) -> Floats:
+def _curvature_covariance(deviation: float, length: float) -> Floats:
     """(pieces, pieces) float64: covariance of curvatures that change over a length [1/m²].
 
     Takes `deviation` [1/m], `length` [m].
@@ -262,7 +262,7 @@ def _middle(lines: RoadLines) -> float:
 
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
-    bends = curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH)
+    bends = _curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH)
     found = _weighed(fit.unknown, fit.covariance, horizon.row, bends, sag_covariance())
     return RoadCourse(
         column=camera.principal_point[0] + float(found.unknown[COLUMN]),
@@ -363,5 +363,5 @@ def _precision(camera: Camera, row_deviation: float) -> Floats:
     out = np.zeros((SLOPE, SLOPE))
     out[COLUMN, COLUMN], out[ROW, ROW] = (_TANGENT * camera.focal_length) ** -2, row_deviation**-2
     out[SAG:BEND, SAG:BEND] = sag_precision()
-    out[BEND:, BEND:] = inverse_of(curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
+    out[BEND:, BEND:] = inverse_of(_curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
     return out

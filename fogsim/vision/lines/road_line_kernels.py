@@ -195,7 +195,7 @@ class RoadLines(NamedTuple):
         return RoadLines(self.offset[mask], self.slope[mask], self.kind[mask], self.points[mask])
 
 
-class RoadFit(NamedTuple):
+class _RoadFit(NamedTuple):
     """Least squares of all lines at once."""
 
     # column, row: where they meet, from the expected vanishing point [px]
@@ -327,7 +327,7 @@ class _Fit(NamedTuple):
 
 
 @kernel
-def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, bend_deviation: float) -> RoadFit:
+def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, bend_deviation: float) -> _RoadFit:
     """Least squares of all lines at once (Gauss–Newton): they meet in one point and bend alike.
 
     A line along a road of constant curvature is u = u_h + s (v − v_h) + c / (v − v_h), with the same c for all lines.
@@ -363,7 +363,7 @@ def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, 
         if fit.number[line] >= LEAST_POINTS:
             low, high = min(low, unknown[_SLOPE + line]), max(high, unknown[_SLOPE + line])
             used, total = used + 1, total + fit.number[line]
-    return RoadFit(unknown[_COLUMN], unknown[_ROW], float(inverse[_ROW, _ROW]), used, high - low, total)
+    return _RoadFit(unknown[_COLUMN], unknown[_ROW], float(inverse[_ROW, _ROW]), used, high - low, total)
 
 
 @kernel

@@ -65,7 +65,7 @@ def inflection_parameters(
     return 2.0 * below_horizon / row_distance, luminance + (math.e**2 - 1.0) * change, luminance - change
 
 
-def printed_parameters(
+def _printed_parameters(
     below_horizon: Floats, luminance: Floats, gradient: Floats, row_distance: float
 ) -> tuple[Floats, Floats, Floats]:
     """Fog from the row of the inflection with negru2013's eqs. 17 and 18 as printed, whose signs are wrong.
@@ -82,7 +82,7 @@ def printed_parameters(
 
 def printed_inflection(curve: RoadCurve) -> FogModel | None:
     """As `best_inflection`, with the equations as the paper prints them."""
-    return best_inflection(curve, printed_parameters)
+    return best_inflection(curve, _printed_parameters)
 
 
 def best_inflection(curve: RoadCurve, parameters: Parameters = inflection_parameters) -> FogModel | None:
@@ -224,7 +224,7 @@ def _add_errors(
 
 @kernel
 def _road_and_airlight(level: float, change: float, printed: bool) -> tuple[float, float]:
-    """R and A of `inflection_parameters`, or of `printed_parameters`, for a change X."""
+    """R and A of `inflection_parameters`, or of `_printed_parameters`, for a change X."""
     square = math.e**2
     if printed:
         return level - (1.0 - square) * square * change, level + change

@@ -34,7 +34,7 @@ _SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
-class LawFit(NamedTuple):
+class _LawFit(NamedTuple):
     """Road and airlight of an extinction, by least squares over a curve."""
 
     # airlight, road: A and R [linear grey levels]
@@ -61,7 +61,7 @@ def slants(curve: RoadCurve) -> Floats:
     return np.asarray(distance * below / curve.row_distance)
 
 
-def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
+def law_fit(curve: RoadCurve, extinction: float) -> _LawFit:
     """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
     rows = (curve.below_horizon, curve.distance, curve.weight, curve.luminance)
     return _law_fit(*map(np.ascontiguousarray, rows), curve.row_distance, extinction)
@@ -70,7 +70,7 @@ def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
 @kernel
 def _law_fit(
     below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, extinction: float
-) -> LawFit:
+) -> _LawFit:
     shape, total = np.empty(below.size), max(weight.sum(), 1e-9)
     mean, mean_shape = 0.0, 0.0
     for i in range(below.size):
@@ -89,7 +89,7 @@ def _law_fit(
     for i in range(below.size):
         left += weight[i] * (luminance[i] - model[i]) ** 2
     misfit = math.sqrt(left / total) / drop if drop > 0.0 else np.inf
-    return LawFit(airlight, airlight - drop, model, misfit)
+    return _LawFit(airlight, airlight - drop, model, misfit)
 
 
 @kernel

@@ -18,7 +18,7 @@ class GrowthLimits(NamedTuple):
 
 
 @kernel
-def grow_upward(
+def _grow_upward(
     luminance: NDArray[np.float32], edges: NDArray[np.uint8], limits: GrowthLimits, seed: float
 ) -> NDArray[np.uint8]:
     """Grow a region from the bottom row upward; see `fogsim.vision.region.road_region.grow_region`.
@@ -75,7 +75,7 @@ def region_tops(region: NDArray[np.uint8]) -> NDArray[np.int64]:
 
 
 @kernel
-def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
+def _column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
     """Row to which each column of a region reaches unbroken from the bottom.
 
     Returns `rows` for a column that does not start at the bottom (cols,) int64. Takes `region` (rows, cols) uint8,
@@ -136,7 +136,7 @@ def _comes_first(tops: NDArray[np.int64], luminance: NDArray[np.float32], start:
 
 
 @kernel
-def highest_band(
+def _highest_band(
     tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, luminance: NDArray[np.float32]
 ) -> tuple[int, int, int]:
     """Highest row that neighbouring columns reach, and the best run of them.
@@ -194,7 +194,7 @@ def grow_region(luminance: NDArray[np.float32], edges: NDArray[np.uint8], limits
 
     Returns 1 inside the region (rows, cols) uint8. Takes `luminance` (rows, cols), `edges` (rows, cols) uint8.
     """
-    return grow_upward(luminance, edges, limits, median(luminance[-1]))
+    return _grow_upward(luminance, edges, limits, median(luminance[-1]))
 
 
 def region_medians(luminance: NDArray[np.float32], region: NDArray[np.uint8]) -> SpanMedians:
@@ -222,8 +222,8 @@ def crossing_band(
     (rows, cols), `centre` [px], `min_width` [px], `max_width` [px], `hole` [px].
     """
     bottom = region.shape[0] - 1
-    tops = column_tops(region, hole)
-    top, first, width = highest_band(tops, bottom, min_width, max_width, float(centre), luminance)
+    tops = _column_tops(region, hole)
+    top, first, width = _highest_band(tops, bottom, min_width, max_width, float(centre), luminance)
     if width == 0:
         return None
     kept = min(width, max_width)

@@ -260,7 +260,7 @@ def direction_of(tree: SourceTree, source: int) -> tuple[float, float]:
 def _halo_of(tree: SourceTree, source: int) -> Halo | None:
     u, v = tree.centres(source)[0].tolist()
     along = direction_of(tree, source)
-    profile = _falling(level_along(tree.level, u, v, *along, round(REACH * tree.level.shape[1])))
+    profile = _falling(_level_along(tree.level, u, v, *along, round(REACH * tree.level.shape[1])))
     if len(profile) < 3:
         return None
     half = half_of(profile)
@@ -268,7 +268,7 @@ def _halo_of(tree: SourceTree, source: int) -> Halo | None:
 
 
 @kernel
-def level_along(
+def _level_along(
     level: NDArray[np.uint8], u: float, v: float, along_u: float, along_v: float, count: int
 ) -> NDArray[np.float64]:
     """Level at whole pixels along a line, interpolated between four pixels; it ends at the picture's border.

@@ -54,7 +54,7 @@ class Seen(NamedTuple):
 
 
 @kernel
-def rows_on_plane(below: Floats, sag: Floats, unit: float, height: float) -> Floats:
+def _rows_on_plane(below: Floats, sag: Floats, unit: float, height: float) -> Floats:
     """`row_on_plane` for many rows, nearest first: 0 from the first that shows no road on (`below` (n,) [px])."""
     out = np.zeros(below.size)
     start = below[0]
@@ -83,7 +83,7 @@ def sideways(distance: Floats, curvature: Floats, covariance: Floats) -> tuple[F
 
 
 @kernel
-def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats:
+def _extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats:
     """By how much the extinction errs with the row and with the vertical curvatures, least squares all at once.
 
     Returns error of k by row [1/m per px], and by curvature [-] (1 + pieces,). Takes `deviations` (2 + pieces,) [linear
@@ -156,7 +156,7 @@ def lay_along(
     rows, half = np.empty((3, count)), np.empty(count)
     for j in range(3):
         seen = straight.below - shift + (j - 1) * straight.half
-        rows[j] = rows_on_plane(np.maximum(seen, 1e-3), sag, view.unit, view.height)
+        rows[j] = _rows_on_plane(np.maximum(seen, 1e-3), sag, view.unit, view.height)
     middle, extent = rows[1].copy(), np.ones(count)
     for i in range(count):
         if rows[0, i] <= 0.0:
@@ -220,7 +220,7 @@ def course_deviation(
 @kernel
 def _course_variance(seen: Seen, deviations: Floats, covariance: Floats, height: float) -> float:
     """Variance of the extinction by the course, beyond that by its horizon [1/m²] (`covariance` of `RoadCourse`)."""
-    response = extinction_response(seen, deviations, height)
+    response = _extinction_response(seen, deviations, height)
     through, total = times(covariance, response), 0.0
     for a in range(response.size):
         total += response[a] * through[a]

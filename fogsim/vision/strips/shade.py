@@ -64,7 +64,7 @@ class Levels(NamedTuple):
 
 
 @kernel
-def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
+def _pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
     """Luminance of the pieces of every bin.
 
     Returns from left to right [linear grey levels]. Takes `rows` (2, n) int64, `left`, `right` (strips, n).
@@ -184,7 +184,7 @@ def _fitted(levels: Levels, sums: Floats, prior: JointPrior, divided: bool) -> L
 
 
 @kernel
-def fit_levels(
+def _fit_levels(
     pieces: Floats, bins: Bins, extinctions: Floats, prior: JointPrior, pixel: float, divided: bool
 ) -> Levels:
     """Find the extinction with which a road has two levels, in sun and in shade, or only one.
@@ -247,7 +247,7 @@ _MISLED = 0.15
 
 
 @dataclass(frozen=True, slots=True)
-class DividedRoad:
+class _DividedRoad:
     """Strips in sun and in shade, and their fit."""
 
     curves: StripCurves  # Luminance by bin; the first strip is the own lane's, in shade if there is enough of it
@@ -272,7 +272,7 @@ def divided_road(
     stated: Horizon,
     noise: float,
     free: float,
-) -> DividedRoad | None:
+) -> _DividedRoad | None:
     """Divide strips into sun and shade, and fit even fog to them.
 
     Returns None if no shade is found. Takes `noise` [linear grey levels], `free` [m].
@@ -284,7 +284,7 @@ def divided_road(
     some, laid = _divided(pixels, curves, geometry, levels, noise, camera, free)
     near = JointFit(levels.extinction, 0.0, levels.airlight, priors[0].shift, levels.lit, 1.0, NOTHING, NOTHING)
     fit = fit_jointly(some, laid, stated_too, near)
-    return None if fit is None or fit.extinction <= 0.0 else DividedRoad(some, laid, fit, levels.share)
+    return None if fit is None or fit.extinction <= 0.0 else _DividedRoad(some, laid, fit, levels.share)
 
 
 def shade_levels(
@@ -295,17 +295,17 @@ def shade_levels(
     Returns None if no shade is found.
     """
     bins = strip_bins(curves, geometry, prior)
-    pieces = pieces_of(pixels, np.stack([geometry.first, geometry.last]), geometry.left, geometry.right)
+    pieces = _pieces_of(pixels, np.stack([geometry.first, geometry.last]), geometry.left, geometry.right)
     grid = extinction_grid(bins, _EXTINCTIONS)
-    found = fit_levels(pieces, bins, grid, prior, noise, True)
+    found = _fit_levels(pieces, bins, grid, prior, noise, True)
     if found.shaded > _MOST_RATIO * found.lit or found.mixed < _LEAST_MIXED:
         return None
-    whole = fit_levels(pieces, bins, grid, prior, noise, False)
+    whole = _fit_levels(pieces, bins, grid, prior, noise, False)
     if whole.cost - found.cost < _LEAST_GAIN:
         return None
     step = math.log(grid[1] / grid[0])
     around = found.extinction * np.exp(np.linspace(-step, step, _FINER + 2)[1:-1])
-    return fit_levels(pieces, bins, around, prior, noise, True)
+    return _fit_levels(pieces, bins, around, prior, noise, True)
 
 
 def _seen_or_stated(prior: JointPrior, stated: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:

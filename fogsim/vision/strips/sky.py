@@ -2,7 +2,7 @@
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
-from fogsim.vision.light.medians import MOST_SAMPLES, median, sort_few
+from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 
 _SKY_SHARE, _SKY_WIDTH = 7, 0.012
@@ -263,8 +263,7 @@ _UNEVEN, _LEAST_SEEN, _MOST_VIGNETTING = 0.02, 0.7, 1.5
 show it, and most that it can be [-]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sky:
+class Sky(NamedTuple):
     """The sky above the horizon."""
 
     luminance: float  # At the horizon, of its bright part [linear grey levels]
@@ -331,78 +330,82 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:
         return None
-    rows = even_rows(top, bottom, _SKY_ROWS)
-    side = camera.width // 6
-    noise = pixel_noise(image, rows)
-    bright, share = sky_rows(image, rows, side, camera.width - side, max(noise, 0.3))
-    height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
-    darker = max(_DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
-    level, _, scatter, lowest = level_at_horizon(bright, height, darker)
+    axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
+    found = _read_sky(image, even_rows(top, bottom, _SKY_ROWS), axis, margin)
+    return None if math.isnan(found.luminance) else found
+
+
+@kernel
+def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin: float) -> Sky:
+    """`sky_above` of rows (n,), given principal point, horizon and focal length [px]; NaN where it is hidden."""
+    side, noise = image.pixels.shape[1] // 6, pixel_noise(image, rows)
+    bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3))
+    height = (axis[2] - rows.astype(np.float64)) / axis[3]
+    level, _, scatter, lowest = level_at_horizon(bright, height, max(_DARKER, 2.0 * noise / max(bright.max(), 1e-9)))
     if lowest > _MOST_HIDDEN:
-        return None
+        level = np.nan
     saturated, clipped = saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
-    free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
-    shading = _shading(image, camera, rows[free], bright[free], noise, _Shading(level, scatter))
-    level, scatter = shading.level, shading.deviation
-    unseen = _UNSEEN * max(float(lowest) - margin / camera.focal_length - _CLOSE, 0.0) * level
-    deviation = math.hypot(scatter, unseen)
+    seen, last = 0, rows.size - 1
+    while last >= 0 and height[last] < lowest:
+        last -= 1
+    free = np.empty(rows.size, np.int64)
+    for row in range(last, -1, -2):
+        if clipped <= SATURATED_SHARE:
+            free[seen] = row
+            seen += 1
+    shading = _shading(image, rows[free[:seen]], axis, bright[free[:seen]], noise, level, scatter)
+    unseen = _UNSEEN * max(lowest - margin / axis[3] - _CLOSE, 0.0) * shading.level
+    deviation = math.hypot(shading.deviation, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
-    covered = median(share) < _PATCHY and scatter > _SCATTERED * level
-    upward = _BRIGHTER * level if covered else deviation
-    seen = height[free] if free.size else np.zeros(1)
-    return Sky(
-        luminance=level,
-        deviation=deviation,
-        upward=upward,
-        noise=noise,
-        saturated=saturated,
-        clipped=clipped,
-        vignetting=shading.vignetting,
-        vignetting_deviation=shading.vignetting_deviation,
-        unevenness=shading.unevenness,
-        slope=shading.slope,
-        slope_deviation=shading.slope_deviation,
-        heights=(float(seen.min()), float(seen.max())),
-    )
+    covered = np.median(share) < _PATCHY and shading.deviation > _SCATTERED * shading.level
+    upward = _BRIGHTER * shading.level if covered else deviation
+    heights = (height[free[0]], height[free[seen - 1]]) if seen else (0.0, 0.0)
+    light = (shading.level, deviation, upward, noise, saturated, clipped)
+    lens = (shading.vignetting, shading.vignetting_deviation, shading.unevenness)
+    return Sky(*light, *lens, shading.slope, shading.slope_deviation, heights)
 
 
-@dataclass(frozen=True, slots=True)
-class _Shading:
+class _Shading(NamedTuple):
     """A sky's brightness at the horizon, vignetting, their deviations, unevenness, and its slope upward."""
 
     level: float
     deviation: float
-    vignetting: float = 0.0
-    vignetting_deviation: float = UNKNOWN_VIGNETTING
-    unevenness: float = 0.0
-    slope: float = 0.0
-    slope_deviation: float = math.inf
+    vignetting: float
+    vignetting_deviation: float
+    unevenness: float
+    slope: float
+    slope_deviation: float
 
 
+@kernel
 def _shading(
-    image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float, unseen: _Shading
+    image: LinearPixels,
+    rows: NDArray[np.int64],
+    axis: Floats,
+    bright: Floats,
+    noise: float,
+    level: float,
+    deviation: float,
 ) -> _Shading:
     """Sky of even slopes behind a lens, or what is known without them where it does not fill most of its rows."""
-    if rows.size < 2 or median(bright) <= 0.0:
-        return unseen
-    height = (camera.horizon_row - rows) / camera.focal_length
-    axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
+    if rows.size < 2 or np.median(bright) <= 0.0:
+        return _Shading(level, deviation, 0.0, UNKNOWN_VIGNETTING, 0.0, 0.0, np.inf)
     found, covariance, seen, scatter = sky_shading(image, rows, axis, bright, noise)
-    level = float(found[0])
-    unevenness = scatter / level if level > 0.0 else 0.0
-    if seen < (_SEEN_TO_BRIGHTEN if found[2] > _BRIGHTENS * level else _LEAST_SEEN) or level <= 0.0:
-        return replace(unseen, unevenness=unevenness)
-    vignetting, deviation = 0.0, UNKNOWN_VIGNETTING
+    unevenness = scatter / found[0] if found[0] > 0.0 else 0.0
+    least = _SEEN_TO_BRIGHTEN if found[2] > _BRIGHTENS * found[0] else _LEAST_SEEN
+    if seen < least or found[0] <= 0.0 or np.isnan(level):
+        return _Shading(level, deviation, 0.0, UNKNOWN_VIGNETTING, unevenness, 0.0, np.inf)
+    vignetting, unsure = 0.0, UNKNOWN_VIGNETTING
     # What looks like a lens's shade under a more uneven sky are houses on both sides, which fade upward.
     if unevenness <= _LENS_UNEVENNESS:
-        vignetting = min(max(float(found[4]) / level, 0.0), _MOST_VIGNETTING)
-        deviation = min(math.hypot(_UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
+        vignetting = min(max(found[4] / found[0], 0.0), _MOST_VIGNETTING)
+        unsure = min(math.hypot(_UNEVEN, math.sqrt(covariance[4, 4]) / found[0]), UNKNOWN_VIGNETTING)
     # Mean slope over the heights that are seen.
-    ends = float(height.min() + height.max())
+    ends = (axis[2] - rows[0]) / axis[3] + (axis[2] - rows[-1]) / axis[3]
     variance = covariance[2, 2] + 2.0 * ends * covariance[2, 3] + ends**2 * covariance[3, 3]
-    slope = (float(found[2] + ends * found[3]), math.sqrt(max(variance, 0.0)))
-    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation, unevenness, *slope)
+    slope, slope_deviation = found[2] + ends * found[3], math.sqrt(max(variance, 0.0))
+    return _Shading(found[0], math.sqrt(covariance[0, 0]), vignetting, unsure, unevenness, slope, slope_deviation)
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ from fogsim.core.jit import kernel
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
-X, Y, NX, NY, SNR = range(5)
+X, Y, NX, NY, _SNR = range(5)
 """Columns of edge points: place [px], unit gradient [-], gradient over its noise [-]."""
 
 
@@ -42,10 +42,10 @@ def clearest_gradients(piece: Floats, share: float, least: float) -> tuple[Float
     (rows, cols). Takes `piece` (channels, rows, cols), `least` [1/px].
     """
     along, down, length = gradients(piece[0])
-    _scale(along, down, length, 1.0 / gradient_noise(length, share, least))
+    _scale(along, down, length, 1.0 / _gradient_noise(length, share, least))
     for channel in range(1, piece.shape[0]):
         x, y, both = gradients(piece[channel])
-        _scale(x, y, both, 1.0 / gradient_noise(both, share, least))
+        _scale(x, y, both, 1.0 / _gradient_noise(both, share, least))
         for row in range(length.shape[0]):
             for col in range(length.shape[1]):
                 if both[row, col] > length[row, col]:
@@ -93,7 +93,7 @@ def gradients(piece: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 @kernel
-def gradient_noise(length: Floats, share: float, least: float) -> float:
+def _gradient_noise(length: Floats, share: float, least: float) -> float:
     """Standard deviation of each component of the gradient by noise [1/px] (`length` (rows, cols), `least` [1/px])."""
     # A quarter of the pixels tells as well.
     inner = length[2:-2:2, 2:-2:2].copy().ravel()
@@ -127,7 +127,7 @@ def edge_points(along: Floats, down: Floats, length: Floats, least: float) -> tu
             bend = before - 2.0 * here + after
             shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
             points[found, X], points[found, Y] = col + shift * nx, row + shift * ny
-            points[found, NX], points[found, NY], points[found, SNR] = nx, ny, here
+            points[found, NX], points[found, NY], points[found, _SNR] = nx, ny, here
             number[row, col] = found
             found += 1
     return points[:found].copy(), number
@@ -170,7 +170,7 @@ def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float)
     for row in range(rows):
         starts[row + 1] = starts[row] + (number[row] >= 0).sum()
     x, y, nx, ny = points[:, X].copy(), points[:, Y].copy(), points[:, NX].copy(), points[:, NY].copy()
-    weight = np.log1p(points[:, SNR])
+    weight = np.log1p(points[:, _SNR])
     least, most = nearest * nearest, farthest * farthest
     for row in range(rows):
         for other in range(row, min(row + int(farthest) + 2, rows)):
@@ -209,7 +209,7 @@ def triangle_votes(points: Floats, number: Numbers, radii: Floats, direction: fl
             if abs(along) > _ALIGNED:
                 x, y = points[i, X], points[i, Y]
                 lines[n, 0], lines[n, 1], lines[n, 2], lines[n, 3] = a, b, x * a + y * b, y * a - x * b
-                lines[n, 4], lines[n, 5], lines[n, 6] = y, math.log1p(points[i, SNR]), math.copysign(1.0, along)
+                lines[n, 4], lines[n, 5], lines[n, 6] = y, math.log1p(points[i, _SNR]), math.copysign(1.0, along)
                 n += 1
     lift = 0.5 * math.sqrt(3.0) - 1.0 / math.sqrt(3.0)
     for i in range(n):

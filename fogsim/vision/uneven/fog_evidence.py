@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED, Albedo
-from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, JointFit
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, JointFit, bins_of
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution, gauss_newton, invert
+from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.uneven_kernels import FogNodes
 
 NODES = (0.0, *(12.0 * 1.4**i for i in range(5)), *(60.0 * 1.2**i for i in range(14)))
 """Nodes of the path [m]: nearly two rows apart, in a camera of 800 px·m, where the road is far."""
 
-MEAN, BROAD = math.log(0.01), 1.6
+_MEAN, _BROAD = math.log(0.01), 1.6
 """Mean and standard deviation of ln k of fog before anything is seen [ln 1/m]."""
 
 _ROUGHNESS = 0.03
@@ -38,10 +40,10 @@ def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
     size = np.maximum(np.diff(nodes, prepend=-NODES[1]) / length, 1e-3)
     share = np.sqrt(2.0 * (size - 1.0 + np.exp(-size))) / size
     apart = math.sqrt(3.0) / length * np.abs(nodes[:, None] - nodes)
-    covariance = deviation**2 * (1.0 + apart) * np.exp(-apart) * share[:, None] * share + BROAD**2
+    covariance = deviation**2 * (1.0 + apart) * np.exp(-apart) * share[:, None] * share + _BROAD**2
     covariance += _ROUGHNESS**2 * np.eye(count)
     logarithm = invert(covariance, np.empty_like(covariance))
-    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
+    return FogNodes(nodes, _MEAN, inverse_of(covariance), logarithm)
 
 
 @functools.cache
@@ -49,9 +51,9 @@ def bank_nodes(first: int, count: int) -> FogNodes:
     """Nodes of fog that is even up to a bank, and even in it."""
     nodes = fog_nodes(*UNEVENNESS[0], count).nodes
     inside = (np.arange(count) >= first).astype(np.float64)
-    covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + _ROUGHNESS**2 * np.eye(count)
+    covariance = _BROAD**2 + BANK**2 * inside[:, None] * inside + _ROUGHNESS**2 * np.eye(count)
     logarithm = invert(covariance, np.empty_like(covariance))
-    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
+    return FogNodes(nodes, _MEAN, inverse_of(covariance), logarithm)
 
 
 Floats = NDArray[np.float64]
@@ -71,7 +73,7 @@ _STRANGE = 2.0
 
 _CHANCE_OF_EVEN = 1.0 - sum(UNEVEN_CHANCES)
 
-_SPREAD, _NARROW = math.log(BROAD**2), BROAD**-2
+_SPREAD, _NARROW = math.log(_BROAD**2), _BROAD**-2
 """Logarithm of the variance of ln k beforehand, and one over it."""
 
 
@@ -106,7 +108,7 @@ def even_fog_over(
     first = np.array([max(start[0], 1e-5), start[1], start[2], 0.0])
     found = gauss_newton(bins, albedo, prior, first, MORE_STEPS)
     k, variance = max(found.theta[0], 1e-5), found.covariance[0, 0]
-    apart = (math.log(k) - MEAN) / BROAD
+    apart = (math.log(k) - _MEAN) / _BROAD
     cost = found.cost + math.log(variance) + math.log(k * k / variance + _NARROW) + _SPREAD + apart * apart
     cost += hidden_cost(found, bins) - 2.0 * math.log(chance)
     return EvenFog(cost, found.theta[0], variance, left_out(found, bins))
@@ -143,8 +145,9 @@ def hidden_cost(found: Solution, bins: Bins) -> float:
 
 
 @kernel
-def thinned_bins(bins: Bins) -> Bins:
-    """Bins of the near road taken together by threes: there fog varies little from bin to bin."""
+def thinned_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
+    """Bins under even airlight, those of the near road by threes: there fog varies little from bin to bin."""
+    bins = bins_of(curves, geometry, prior, np.zeros(0), np.zeros((0, 0, 0)))
     near = _taken_together(bins.distance)
     if near == 0:
         return bins

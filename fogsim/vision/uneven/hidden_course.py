@@ -4,7 +4,6 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +21,11 @@ from fogsim.vision.lines.road_course import (
     sag_precision,
 )
 from fogsim.vision.lines.road_course_kernels import PIECES
-from fogsim.vision.strips.albedo_filter import Albedo
 from fogsim.vision.strips.course_geometry import SIDES, Bend, lay_along
-from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit, bins_of
+from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import StripGeometry, View, view_of
+from fogsim.vision.strips.strip_geometry import StripGeometry, view_of
 from fogsim.vision.uneven.fog_evidence import EvenFog, chance_of_even, even_fog_over, even_start, thinned_bins
 
 Floats = NDArray[np.float64]
@@ -43,17 +41,6 @@ _LEAST_VARIANCE = 1e-4
 
 _RIVAL = 20.0
 """By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
-
-
-class _Ahead(NamedTuple):
-    """A road whose sags and crests are sought, and how it is looked at."""
-
-    straight: StripGeometry  # Strips of a straight road
-    lens: View
-    bend: Bend
-    sags: SagsAhead  # What lines say of sags and crests
-    before: Floats  # (pieces, pieces): See `sag_precision`
-    sides: Floats  # (strips, 2): Sides of the strips [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +61,16 @@ class HiddenCourse:
     ) -> list[EvenFog]:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
         course, found, begun = self.course, [], []
-        bend = Bend(course.column, course.bend, course.bend_covariance)
-        sides = SIDES[: len(curves.variance)]
-        ahead = _Ahead(self.straight, view_of(self.camera), bend, course.ahead, sag_precision(), sides)
-        first, costs = even_start(start), _costs(ahead, np.array(_TRIED))
+        view, bend = view_of(self.camera), Bend(course.column, course.bend, course.bend_covariance)
+        sides, first = SIDES[: len(curves.variance)], even_start(start)
+        costs = _costs(course.ahead, sag_precision(), np.array(_TRIED))
 
         def along(piece: int, over: int, curvature: float) -> EvenFog:
-            return _even_fog(ahead, curves, prior, first, piece, curvature, ALBEDOS[over], chance_of_even(over))
+            around, sag, cost = _around(course.ahead, sag_precision(), prior, piece, curvature)
+            shift = view.horizon + around.shift - view.horizon
+            bins = thinned_bins(curves, lay_along(self.straight, view, shift, sag, bend, sides), around)
+            one = even_fog_over(bins, ALBEDOS[over], around, (*first[:2], around.shift), chance_of_even(over))
+            return one._replace(cost=one.cost + cost)
 
         for piece in range(1, PIECES):
             tried = [value for value, cost in zip(_TRIED, costs[piece], strict=True) if cost < gain + _RIVAL]
@@ -98,45 +88,33 @@ class HiddenCourse:
 
 
 @kernel
-def _cost(ahead: _Ahead, sag: Floats, curvature: float) -> float:
+def _cost(ahead: SagsAhead, before: Floats, sag: Floats, curvature: float) -> float:
     """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
-    return cost_given(ahead.sags, sag, ahead.before) + beginning_cost(curvature)
+    return cost_given(ahead, sag, before) + beginning_cost(curvature)
 
 
 @kernel
-def _costs(ahead: _Ahead, curvatures: Floats) -> Floats:
+def _costs(ahead: SagsAhead, before: Floats, curvatures: Floats) -> Floats:
     """(pieces, n): `_cost` of courses that begin at each piece, by curvatures over their standard deviation [-]."""
     out = np.empty((PIECES, curvatures.size))
     for piece in range(PIECES):
         for i in range(curvatures.size):
             curvature = curvatures[i] * SAG_DEVIATION
-            out[piece, i] = _cost(ahead, sag_from(piece, curvature), curvature)
+            out[piece, i] = _cost(ahead, before, sag_from(piece, curvature), curvature)
     return out
 
 
 @kernel
-def _even_fog(
-    ahead: _Ahead,
-    curves: StripCurves,
-    prior: JointPrior,
-    first: tuple[float, float, float],
-    piece: int,
-    curvature: float,
-    albedo: Albedo,
-    chance: float,
-) -> EvenFog:
-    """Even fog over a road that sags or crests from a piece on, with how likely that is beforehand and by lines."""
+def _around(
+    ahead: SagsAhead, before: Floats, prior: JointPrior, piece: int, curvature: float
+) -> tuple[JointPrior, Floats, float]:
+    """Prior where the road sags or crests from a piece on, its curvatures by piece, and the cost of that."""
     sag = sag_from(piece, curvature * SAG_DEVIATION)
-    row, variance = row_given(ahead.sags, sag)
-    level, _ = row_given(ahead.sags, np.zeros(PIECES))
+    row, variance = row_given(ahead, sag)
+    level, _ = row_given(ahead, np.zeros(PIECES))
     deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
     around = with_horizon(prior, prior.shift + (row - level), deviation)
-    horizon = ahead.lens.horizon
-    geometry = lay_along(ahead.straight, ahead.lens, horizon + around.shift - horizon, sag, ahead.bend, ahead.sides)
-    bins = thinned_bins(bins_of(curves, geometry, around, np.zeros(0), np.zeros((0, 0, 0))))
-    found = even_fog_over(bins, albedo, around, (first[0], first[1], around.shift), chance)
-    cost = found.cost + _cost(ahead, sag, curvature * SAG_DEVIATION)
-    return EvenFog(cost, found.extinction, found.variance, found.left_out)
+    return around, sag, _cost(ahead, before, sag, curvature * SAG_DEVIATION)
 
 
 def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple[float, EvenFog, float]:

@@ -157,7 +157,7 @@ def _fitted(
     curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, hidden: HiddenCourse
 ) -> UnevenFit | None:
     """Fit of uneven fog, or None if even fog suffices."""
-    bins = thinned_bins(joint_fit.strip_bins(curves, geometry, prior))
+    bins = thinned_bins(curves, geometry, prior)
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
     first = even_start(even)

@@ -73,7 +73,7 @@ class FogNodes(NamedTuple):
 
 
 @kernel
-def depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Optical depth up to each node [-] (`nodes` (m,) [m], `extinctions` (m,) [1/m])."""
     depths = np.zeros(nodes.size)
     for j in range(1, nodes.size):
@@ -128,7 +128,7 @@ def _linearise(
     """Residual and derivatives by cells, airlight, horizon and vignetting of one strip."""
     cells = nodes.size
     extinctions, weights = np.exp(theta[:cells]), _node_weights(nodes)
-    depths = depths_at_nodes(nodes, extinctions)
+    depths = _depths_at_nodes(nodes, extinctions)
     airlight, shift, vignetting = theta[cells], theta[cells + 1], theta[cells + 2]
     drop = road - airlight
     columns, scale, veil = out.columns[strip], out.scale[strip], out.veil[strip]
@@ -326,7 +326,7 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
 def distance_at_depth(nodes: NDArray[np.float64], logs: NDArray[np.float64], depth: float) -> float:
     """Distance at which an optical depth is reached [m] (`nodes` (m,) [m], `logs` (m,))."""
     extinctions = np.exp(logs)
-    depths, node = depths_at_nodes(nodes, extinctions), nodes.size - 1
+    depths, node = _depths_at_nodes(nodes, extinctions), nodes.size - 1
     while node > 0 and depths[node] > depth:
         node -= 1
     here, rest = extinctions[node], depth - depths[node]
@@ -360,7 +360,7 @@ def extinction_at(nodes: NDArray[np.float64], logs: NDArray[np.float64], distanc
     return _extinction_at(nodes, np.exp(logs), _before(nodes, distance), distance)
 
 
-class PathDepths(NamedTuple):
+class _PathDepths(NamedTuple):
     """Optical depths along a path with the variance of each, and the mean extinction."""
 
     depth: NDArray[np.float64]  # (n,) [-]
@@ -377,7 +377,7 @@ def path_depths(
     covariance: NDArray[np.float64],
     distance: NDArray[np.float64],
     reach: float,
-) -> PathDepths:
+) -> _PathDepths:
     """Fog of a solution along the path (`nodes` (m,), `distance` (n,), `reach` [m])."""
     logs, depth, variance = theta[: nodes.size], np.empty(distance.size), np.empty(distance.size)
     for i in range(distance.size):
@@ -385,10 +385,10 @@ def path_depths(
     visible = distance_at_depth(nodes, logs, OPTICAL_DEPTH_AT_VISIBILITY)
     whole, unsure = _depth_with_variance(nodes, logs, covariance, min(visible, reach))
     if visible > reach:
-        return PathDepths(depth, variance, whole / reach, unsure / (reach * reach))
+        return _PathDepths(depth, variance, whole / reach, unsure / (reach * reach))
     # A depth that is greater by dτ is reached dτ / k sooner.
     slope = whole / (visible * visible) / extinction_at(nodes, logs, visible)
-    return PathDepths(depth, variance, whole / visible, slope * slope * unsure)
+    return _PathDepths(depth, variance, whole / visible, slope * slope * unsure)
 
 
 @kernel

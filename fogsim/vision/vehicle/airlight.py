@@ -145,8 +145,8 @@ def _median(pixels: Floats, otherwise: float) -> float:
     return float(np.float32(median(pixels))) if pixels.size else otherwise
 
 
-_BLOCKS, _BRIGHT_BLOCKS = 12, 80.0
-"""Blocks of columns of the sky, and the percentile of their brightness that is the airlight: trees hide the others."""
+_BLOCKS, _BRIGHT_SHARE = 12, 0.8
+"""Blocks of columns of the sky, and the quantile of their brightness that is the airlight: trees hide the others."""
 
 _HALF_TRUCK = 1.6
 """How much of the sky next to the axis a high vehicle ahead can hide [m]."""
@@ -183,7 +183,11 @@ def _neighbouring(light: NDArray[np.float32], about: float, noise: float, axis: 
         if last[i] > first[i] and (is_free[i] or free < _BLOCKS // 3):
             means[count] = _mean(light[:, first[i] : last[i]], about, noise)
             count += not np.isnan(means[count])
-    return float(np.percentile(means[:count], _BRIGHT_BLOCKS)) if count else about
+    if count == 0:
+        return about
+    ordered, place = np.sort(means[:count]), _BRIGHT_SHARE * (count - 1)
+    below = int(place)
+    return ordered[below] + (place - below) * (ordered[min(below + 1, count - 1)] - ordered[below])
 
 
 @kernel

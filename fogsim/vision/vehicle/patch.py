@@ -19,7 +19,7 @@ INDEPENDENT = 8.0
 """Neighbouring pixels that differ alike where a thing has changed: so many count as one [-]."""
 
 
-class MatchCost(NamedTuple):
+class _MatchCost(NamedTuple):
     """How unlikely each place of a template in an image is."""
 
     correlation: Floats  # (rows, cols): Correlation coefficient, 0 where negative [-]
@@ -29,7 +29,7 @@ class MatchCost(NamedTuple):
     col: int
 
 
-def match_cost(image: Floats, template: Floats, prior: Floats) -> MatchCost:
+def match_cost(image: Floats, template: Floats, prior: Floats) -> _MatchCost:
     """Correlate a template with every place of an image that it fits in, under what is known of its place.
 
     Takes `image` (rows, cols), `template` (m, n), `prior` (rows - m + 1, cols - n + 1).
@@ -37,7 +37,7 @@ def match_cost(image: Floats, template: Floats, prior: Floats) -> MatchCost:
     correlation = np.clip(correlations(np.ascontiguousarray(image), np.ascontiguousarray(template)), 0.0, 0.9999)
     cost = 0.5 * template.size / INDEPENDENT * np.log1p(-(correlation**2)) + prior
     row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
-    return MatchCost(correlation, cost, int(row), int(col))
+    return _MatchCost(correlation, cost, int(row), int(col))
 
 
 def vertex(values: Floats, at: int) -> float:

@@ -149,7 +149,7 @@ def _strip(
     first = np.maximum(np.ceil(middle + left * scale), 0.0)
     last = np.minimum(np.floor(middle + right * scale), camera.width - 1.0)
     seen = (np.floor(middle + right * scale) - first >= 0.5 * (right - left) * scale) & (first < camera.width)
-    return [first.astype(np.int64), np.where(seen, last, first - 1.0).astype(np.int64)]
+    return first.astype(np.int64), np.where(seen, last, first - 1.0).astype(np.int64)
 
 
 @kernel
@@ -172,4 +172,4 @@ def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArr
         if np.isfinite(share) and np.isfinite(beside):
             ratio[count] = share
             count += 1
-    return count > 0 and np.median(ratio[:count]) > _BEAM
+    return bool(count > 0 and np.median(ratio[:count]) > _BEAM)

@@ -151,8 +151,8 @@ def subpixel_inflections(curve: RoadCurve, luminance: Floats, *, printed: bool =
     Returns v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none
     (m,). Takes `luminance` (n, m) [linear grey levels].
     """
-    rows = (curve.below_horizon, curve.distance, curve.weight)
-    return _inflections(*map(np.ascontiguousarray, (*rows, luminance)), curve.row_distance, printed)
+    light = np.ascontiguousarray(luminance)
+    return _inflections(curve.below_horizon, curve.distance, curve.weight, light, curve.row_distance, printed)
 
 
 @kernel

@@ -63,8 +63,7 @@ def slants(curve: RoadCurve) -> Floats:
 
 def law_fit(curve: RoadCurve, extinction: float) -> _LawFit:
     """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
-    rows = (curve.below_horizon, curve.distance, curve.weight, curve.luminance)
-    return _law_fit(*map(np.ascontiguousarray, rows), curve.row_distance, extinction)
+    return _law_fit(curve.below_horizon, curve.distance, curve.weight, curve.luminance, curve.row_distance, extinction)
 
 
 @kernel

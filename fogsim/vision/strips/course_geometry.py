@@ -224,4 +224,4 @@ def _course_variance(seen: Seen, deviations: Floats, covariance: Floats, height:
     through, total = times(covariance, response), 0.0
     for a in range(response.size):
         total += response[a] * through[a]
-    return max(total - response[0] * response[0] * covariance[0, 0], 0.0)
+    return float(max(total - response[0] * response[0] * covariance[0, 0], 0.0))

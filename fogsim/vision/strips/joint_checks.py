@@ -101,7 +101,7 @@ def _is_straight(luminance: Floats, variance: Floats, below: Floats, table: NDAr
     rows, values = rows[:count] - rows[:count].mean(), values[:count] - values[:count].mean()
     slope = (rows * values).sum() / (rows * rows).sum()
     rise = -slope * (rows.max() - rows.min())
-    return rise > _LEAST_RISE and math.sqrt(((values - slope * rows) ** 2).mean()) < _STRAIGHT * rise
+    return bool(rise > _LEAST_RISE and math.sqrt(((values - slope * rows) ** 2).mean()) < _STRAIGHT * rise)
 
 
 @kernel
@@ -116,4 +116,4 @@ def _pixel_value(luminance: float, table: NDArray[np.float32]) -> float:
             low = middle
         else:
             high = middle
-    return low + max(luminance - table[low], 0.0) / (float(table[low + 1]) - float(table[low]))
+    return low + max(luminance - float(table[low]), 0.0) / (float(table[low + 1]) - float(table[low]))

@@ -115,10 +115,22 @@ class Solution(NamedTuple):
 @kernel
 def with_horizon(prior: JointPrior, shift: float, deviation: float) -> JointPrior:
     """Prior with another horizon (`shift`, `deviation` [px])."""
-    airlight = (prior.airlight, prior.below, prior.above)
-    lens = (prior.vignetting, prior.vignetting_deviation, prior.cloud)
-    sky = (prior.slope, prior.slope_deviation, prior.rise, prior.level, prior.droplets, prior.cost)
-    return JointPrior(*airlight, shift, deviation, *lens, *sky)
+    return JointPrior(
+        prior.airlight,
+        prior.below,
+        prior.above,
+        shift,
+        deviation,
+        prior.vignetting,
+        prior.vignetting_deviation,
+        prior.cloud,
+        prior.slope,
+        prior.slope_deviation,
+        prior.rise,
+        prior.level,
+        prior.droplets,
+        prior.cost,
+    )
 
 
 @kernel

@@ -207,4 +207,4 @@ def of_each_bin(thinned: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool
 @kernel
 def _taken_together(distance: Floats) -> int:
     """How many of the nearest bins are taken together."""
-    return (distance < NEAR).sum() // _TOGETHER * _TOGETHER
+    return int((distance < NEAR).sum()) // _TOGETHER * _TOGETHER

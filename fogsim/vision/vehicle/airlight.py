@@ -187,7 +187,7 @@ def _neighbouring(light: NDArray[np.float32], about: float, noise: float, axis: 
         return about
     ordered, place = np.sort(means[:count]), _BRIGHT_SHARE * (count - 1)
     below = int(place)
-    return ordered[below] + (place - below) * (ordered[min(below + 1, count - 1)] - ordered[below])
+    return float(ordered[below] + (place - below) * (ordered[min(below + 1, count - 1)] - ordered[below]))
 
 
 @kernel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED, Albedo
-from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, JointFit, bins_of
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, bins_of
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution, gauss_newton, invert
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
@@ -71,7 +71,8 @@ _STRANGE = 2.0
 """What an outlier adds to a cost next to its luminance's chance, where even fog is weighed against uneven [-]."""
 
 
-_CHANCE_OF_EVEN = 1.0 - sum(UNEVEN_CHANCES)
+CHANCES_OF_EVEN = tuple(chance * (1.0 - sum(UNEVEN_CHANCES)) for chance in ALBEDO_CHANCES)
+"""How likely even fog over each of the albedos is beforehand [-]."""
 
 _SPREAD, _NARROW = math.log(_BROAD**2), _BROAD**-2
 """Logarithm of the variance of ln k beforehand, and one over it."""
@@ -87,23 +88,13 @@ class EvenFog(NamedTuple):
     left_out: int  # How many bins it leaves unexplained
 
 
-def even_start(start: JointFit) -> tuple[float, float, float]:
-    """Extinction, airlight and shift that fits of even fog begin with."""
-    return start.extinction, start.airlight, start.shift
-
-
-def chance_of_even(albedo: int) -> float:
-    """How likely even fog over one of the albedos is beforehand [-]."""
-    return ALBEDO_CHANCES[albedo] * _CHANCE_OF_EVEN
-
-
 @kernel
 def even_fog_over(
     bins: Bins, albedo: Albedo, prior: JointPrior, start: tuple[float, float, float], chance: float
 ) -> EvenFog:
     """Even fog over an albedo, with ln k as its parameter and what is known of that.
 
-    Takes `start`, see `even_start`, `chance` [-].
+    Takes `start`, with extinction [1/m], airlight and shift, `chance` [-].
     """
     first = np.array([max(start[0], 1e-5), start[1], start[2], 0.0])
     found = gauss_newton(bins, albedo, prior, first, MORE_STEPS)

@@ -26,11 +26,11 @@ from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry, view_of
-from fogsim.vision.uneven.fog_evidence import EvenFog, chance_of_even, even_fog_over, even_start, thinned_bins
+from fogsim.vision.uneven.fog_evidence import CHANCES_OF_EVEN, EvenFog, even_fog_over, thinned_bins
 
 Floats = NDArray[np.float64]
 
-_TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
+_TRIED = np.array([-2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
 """Curvatures that are tried first, over their standard deviation [-]."""
 
 _MOST, _STEPS = 3.0, 3
@@ -62,28 +62,29 @@ class HiddenCourse:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
         course, found, begun = self.course, [], []
         view, bend = view_of(self.camera), Bend(course.column, course.bend, course.bend_covariance)
-        sides, first = SIDES[: len(curves.variance)], even_start(start)
-        costs = _costs(course.ahead, sag_precision(), np.array(_TRIED))
+        sides, before = SIDES[: len(curves.variance)], sag_precision()
+        costs = _costs(course.ahead, before, _TRIED).tolist()
 
         def along(piece: int, over: int, curvature: float) -> EvenFog:
-            around, sag, cost = _around(course.ahead, sag_precision(), prior, piece, curvature)
+            around, sag, cost = _around(course.ahead, before, prior, piece, curvature)
             shift = view.horizon + around.shift - view.horizon
             bins = thinned_bins(curves, lay_along(self.straight, view, shift, sag, bend, sides), around)
-            one = even_fog_over(bins, ALBEDOS[over], around, (*first[:2], around.shift), chance_of_even(over))
-            return one._replace(cost=one.cost + cost)
+            first = (start.extinction, start.airlight, around.shift)
+            one = even_fog_over(bins, ALBEDOS[over], around, first, CHANCES_OF_EVEN[over])
+            return EvenFog(one.cost + cost, *one[1:])
 
         for piece in range(1, PIECES):
-            tried = [value for value, cost in zip(_TRIED, costs[piece], strict=True) if cost < gain + _RIVAL]
+            tried = [value for value, cost in zip(_TRIED.tolist(), costs[piece], strict=True) if cost < gain + _RIVAL]
             if len(tried) < 3:
                 continue
             curvature, one, width = _likeliest(functools.partial(along, piece, albedo), tried)
-            found.append(one._replace(cost=one.cost + width))
+            found.append(EvenFog(one.cost + width, *one[1:]))
             begun.append((found[-1].cost, piece, curvature, width))
         least = min((one.cost for one in found), default=math.inf)
         for cost, piece, curvature, width in begun:
             if cost < least + _RIVAL:
                 others = (along(piece, other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
-                found += [one._replace(cost=one.cost + width) for one in others]
+                found += [EvenFog(one.cost + width, *one[1:]) for one in others]
         return found
 
 
@@ -123,13 +124,14 @@ def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple
     curve = 1.0
     for _ in range(_STEPS):
         at = sorted(tried)
-        middle = min(max(at.index(min(at, key=lambda value: tried[value].cost)), 1), len(at) - 2)
-        around = at[middle - 1 : middle + 2]
-        vertex, curve = _parabola(around, [tried[value].cost for value in around])
+        costs = [tried[value].cost for value in at]
+        middle = min(max(costs.index(min(costs)), 1), len(at) - 2)
+        vertex, curve = _parabola(at[middle - 1 : middle + 2], costs[middle - 1 : middle + 2])
         if curve <= 0.0 or vertex in tried:
             break
         tried[vertex] = fog(vertex)
-    best = min(tried, key=lambda value: tried[value].cost)
+    costs = [one.cost for one in tried.values()]
+    best = list(tried)[costs.index(min(costs))]
     return best, tried[best], math.log(max(curve, 1.0))
 
 

@@ -14,14 +14,13 @@ from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.fog_evidence import (
+    CHANCES_OF_EVEN,
     NODES,
     UNEVEN_CHANCES,
     UNEVENNESS,
     EvenFog,
     bank_nodes,
-    chance_of_even,
     even_fog_over,
-    even_start,
     fog_nodes,
     hidden_cost,
     left_out,
@@ -160,8 +159,11 @@ def _fitted(
     bins = thinned_bins(curves, geometry, prior)
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
-    first = even_start(even)
-    flat = [even_fog_over(bins, albedo, prior, first, chance_of_even(which)) for which, albedo in enumerate(ALBEDOS)]
+    first = (even.extinction, even.airlight, even.shift)
+    flat = [
+        even_fog_over(bins, albedo, prior, first, chance)
+        for albedo, chance in zip(ALBEDOS, CHANCES_OF_EVEN, strict=True)
+    ]
     evens = [one.cost - _BENT * hidden.is_bent for one in flat]
     likely = int(np.argmin(evens))
     guess = first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
@@ -182,7 +184,7 @@ def _fitted(
         if albedo != likely and cost < evens[likely] + _UNLIKELY:
             tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, _MORE_STEPS))
     fogs = [
-        one._replace(cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
+        EvenFog(cost, even.extinction, even.extinction_deviation**2, one.left_out)
         for one, cost in zip(flat, evens, strict=True)
     ]
     gain = min(evens) - min(t.cost for t in tried)
@@ -190,7 +192,7 @@ def _fitted(
         courses = hidden.even_fogs(curves, prior, even, likely, gain)
         explained = min(evens) - min((one.cost for one in courses), default=math.inf)
         doubt = _HIDDEN_COURSE if explained > _MOSTLY * gain else 0.0
-        fogs += [one._replace(cost=one.cost - doubt) for one in courses]
+        fogs += [EvenFog(one.cost - doubt, *one[1:]) for one in courses]
     return _weighed(even, fogs, tried, bins, geometry)
 
 

@@ -23,7 +23,7 @@ PRIOR = koschmieder_strips.PRIOR._replace(shift_deviation=0.2)
 """The road's lines tell the horizon; without them a bank may be a horizon that lies lower."""
 
 UNSEEN = unseen_course(CAMERA, Horizon(CAMERA.horizon_row, 0.2))
-LEVEL = replace(UNSEEN, ahead=replace(UNSEEN.ahead, covariance=np.diag([0.04, *np.full(PIECES, 1e-16)])))
+LEVEL = replace(UNSEEN, ahead=UNSEEN.ahead._replace(covariance=np.diag([0.04, *np.full(PIECES, 1e-16)])))
 """Lines that nobody sees, and lines that show the road to be level as far as it is seen."""
 
 Depth = Callable[[np.ndarray], np.ndarray]

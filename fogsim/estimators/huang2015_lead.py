@@ -41,9 +41,8 @@ from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.airlight import RoadFall
-from fogsim.vision.vehicle.camera_range import CameraRange, registered_deviation
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear
-from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
+from fogsim.vision.vehicle.vehicle_crop import CameraRange, VehicleCrop, registered_deviation
 
 _FOLLOWED = 0.4
 """Share of a new place that the expectation for the next frame takes over: pitch of the moment is no trend [-]."""

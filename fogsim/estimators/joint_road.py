@@ -45,9 +45,8 @@ from fogsim.vision.strips.strip_curves import (
     without_rows_below,
 )
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
-from fogsim.vision.uneven.airlight_edge import airlight_edge
 from fogsim.vision.uneven.hidden_course import HiddenCourse
-from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
+from fogsim.vision.uneven.uneven_fit import UnevenFit, airlight_edge, even_fog, fit_uneven
 
 _MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""

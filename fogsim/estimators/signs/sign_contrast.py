@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from fogsim.core.linear_algebra import convolution
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.signs.face_light import MARGIN, FaceLight, face_light
-from fogsim.estimators.signs.layout import layout_of
+from fogsim.estimators.signs.face_light import MARGIN, FaceLight, face_light, layout_of
 from fogsim.estimators.signs.regions import PoseDeviation, Registration
 from fogsim.estimators.signs.watch import SignWatch, sign_looks
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY

@@ -7,11 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
+from fogsim.values.camera import Camera
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.albedo_filter import HIDDEN, USED
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
-from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.sky import Sky
+from fogsim.vision.strips.strip_curves import StripCurves, airlight_shares
 from fogsim.vision.strips.strip_geometry import StripGeometry
 from fogsim.vision.uneven.fog_evidence import (
     CHANCES_OF_EVEN,
@@ -28,13 +31,7 @@ from fogsim.vision.uneven.fog_evidence import (
     thinned_bins,
 )
 from fogsim.vision.uneven.hidden_course import HiddenCourse
-from fogsim.vision.uneven.uneven_kernels import (
-    OTHERS,
-    FogNodes,
-    denser_part,
-    first_profile,
-    path_depths,
-)
+from fogsim.vision.uneven.uneven_kernels import OTHERS, FogNodes, denser_part, first_profile, path_depths
 from fogsim.vision.uneven.uneven_kernels import fit_uneven as fit_over_nodes
 
 Floats = NDArray[np.float64]
@@ -311,3 +308,84 @@ def _weighed(
 def _solved(candidate: _Candidate) -> tuple[Floats, Floats, Floats]:
     """Nodes, parameters and their covariance."""
     return candidate.fog.nodes, candidate.solution.theta, candidate.solution.covariance
+
+
+_ASIDE = 0.3
+"""How far to either side rows are looked at [rad]."""
+
+_ALIKE, _NOISE = 0.07, 3.0
+"""Difference to the sky's luminance up to which nothing else is seen, relative to it and in its pixels' deviations."""
+
+_LEAST_SHARE, _KEPT, STEP = 0.25, 0.7, 0.35
+"""Least share of a row that is airlight beyond the front, least of that which all rows above keep, and most of it that
+the ground two rows below has [-]: trees and vehicles that stand nearer hide the rest."""
+
+_NEAR_FOG = 40.0
+"""Up to where fog counts as near, and fronts are the joint fit's [m]."""
+
+_MOST_DEPTH = 1.5
+"""Most optical depth of the fog before the front [-]: denser fog hides much of the ground itself."""
+
+_LEAST_ROWS, _UNSURE_ROW = 1.0, 0.15
+"""Least rows of a front below the horizon [px], and most of the horizon's standard deviation over them [-]."""
+
+_DENSER = 2.5
+"""Least extinction at the front over that of the near fog [-]."""
+
+
+def airlight_edge(
+    image: LinearPixels, geometry: StripGeometry, camera: Camera, sky: Sky, uneven: UnevenFit, horizon_deviation: float
+) -> tuple[float, float, float] | None:
+    """Find the front of a bank as the row from which on ground is airlight.
+
+    A crest whose far side falls away looks the same where nothing stands out beyond it; one that the lane marks show is
+    in `geometry`.
+
+    Returns where it begins [m], the standard deviation of that [m], and the least extinction there [1/m]. Takes
+    `horizon_deviation` [px].
+    """
+    if sky.is_clipped:
+        return None
+    below = geometry.below - uneven.fit.shift
+    whole = (geometry.first == geometry.last) & (below > max(_LEAST_ROWS, horizon_deviation / _UNSURE_ROW))
+    # Behind a crest no row is farther than the one below it.
+    farther = np.diff(below, prepend=math.inf) < 0.0
+    far = np.flatnonzero(whole & farther & (geometry.distance > _NEAR_FOG))
+    reach = _ASIDE * camera.focal_length
+    columns = (
+        max(round(camera.principal_point[0] - reach), 0),
+        min(round(camera.principal_point[0] + reach), camera.width),
+    )
+    alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
+    shares = airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
+    front = _front(shares)
+    if front is None:
+        return None
+    distance = camera.row_distance / below[far]
+    before, behind = float(distance[front - 2]), float(distance[front])
+    depth, near = _depth(uneven, before), _depth(uneven, _NEAR_FOG)
+    if depth > _MOST_DEPTH:
+        return None
+    # What is left of the ground's contrast two rows below it is gone.
+    contrast = max(1.0 - uneven.fit.road / uneven.fit.airlight, alike) * math.exp(-depth)
+    extinction = math.log(max(contrast / alike, 1.0)) / (behind - before)
+    if extinction < _DENSER * near / _NEAR_FOG:
+        return None
+    edge = float(below[far[front]]) + 0.5
+    place = camera.row_distance / edge
+    return place, place / edge * math.hypot(0.5, horizon_deviation), extinction
+
+
+def _depth(uneven: UnevenFit, distance: float) -> float:
+    """Optical depth up to a distance, beyond the road that was seen with the mean extinction up to its end [-]."""
+    beyond = max(distance / float(uneven.distance[-1]), 1.0)
+    return max(float(np.interp(distance, uneven.distance, uneven.depth)), 0.0) * beyond
+
+
+def _front(shares: np.ndarray) -> int | None:
+    """Nearest row, of those from near to far, from which on airlight is seen; None if there is no such step."""
+    for row in range(2, shares.size):
+        if shares[row] >= _LEAST_SHARE:
+            step = shares[row - 2] <= STEP * shares[row]
+            return row if step and shares[row:].min() >= _KEPT * shares[row] else None
+    return None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.vision.light.clipped_sky import darker_by
+from fogsim.vision.light.luminance import darker_by
 from fogsim.vision.light.medians import quantile
 from fogsim.vision.vehicle.patch import INDEPENDENT, Patch, Placement, downsample_to, pixel_grid
 

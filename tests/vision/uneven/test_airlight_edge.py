@@ -10,8 +10,7 @@ from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.sky import Sky
 from fogsim.vision.strips.strip_geometry import strip_geometry
-from fogsim.vision.uneven.airlight_edge import airlight_edge
-from fogsim.vision.uneven.uneven_fit import even_fog
+from fogsim.vision.uneven.uneven_fit import airlight_edge, even_fog
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, math.radians(2.0))
 GEOMETRY = strip_geometry(CAMERA, 1.0)

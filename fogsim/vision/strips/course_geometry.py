@@ -13,7 +13,7 @@ from fogsim.vision.lines.road_course import RoadCourse
 from fogsim.vision.lines.road_course_kernels import PIECES, row_on_plane, turned
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
-from fogsim.vision.strips.strip_geometry import LANES, StripGeometry, View, lay, view_of
+from fogsim.vision.strips.strip_geometry import SIDES, StripGeometry, View, lay, view_of
 
 Floats = NDArray[np.float64]
 
@@ -22,9 +22,6 @@ _GRAIN, _GRAIN_LENGTH = 0.02, 3.0
 
 _MOST_ASIDE = 0.6
 """Deviation of a bent road's place up to which strips are on the road [m]."""
-
-SIDES = np.array(LANES)
-"""(strips, 2): sides of the strips to the right of the vehicle's axis [m]."""
 
 _ROUNDING = 0.1
 """Deviation of a bin's mean that quantisation leaves [linear grey levels]."""

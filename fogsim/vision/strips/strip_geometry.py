@@ -11,7 +11,7 @@ from fogsim.values.camera import Camera
 
 Floats = NDArray[np.float64]
 
-LANES = ((-1.4, 1.4), (-4.9, -2.1), (2.1, 4.9))
+SIDES = np.array([[-1.4, 1.4], [-4.9, -2.1], [2.1, 4.9]])
 """Sides of the strips to the right of the vehicle's axis [m]: the own lane's middle, and those of its neighbours."""
 
 WHOLE_ROWS = 28.0
@@ -67,15 +67,15 @@ def view_of(camera: Camera) -> View:
     return View(float(camera.width), *map(float, place), *map(float, lens))
 
 
-def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, float], ...] = LANES) -> StripGeometry:
-    """Lay strips over the image of a camera (`nearest` [px], `lanes` (float, float) [m])."""
+def strip_geometry(camera: Camera, nearest: float) -> StripGeometry:
+    """Lay strips over the image of a camera (`nearest` [px])."""
     top = max(math.ceil(camera.horizon_row + nearest), 0)
     first, last = _row_bins(camera.horizon_row, top, camera.height - 1, WHOLE_ROWS)
     below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
     half: Floats = 0.5 * (last - first + 1).astype(np.float64)
     # A lateral offset x at depth z, seen from a camera that looks down, is α x / z columns off the axis.
     across = camera.focal_length / camera.row_distance * below
-    sides = camera.principal_point[0] + np.array(lanes)[:, :, None] * across
+    sides = camera.principal_point[0] + SIDES[:, :, None] * across
     return StripGeometry(
         first,
         last,

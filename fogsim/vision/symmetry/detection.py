@@ -284,12 +284,13 @@ class SignDetection:
     strength: float  # Share of its outline that stands out of the picture's noise, 0 … 1 [-]
 
 
+_RADII = (4.0, 32.0)
+"""Least and greatest radius of signs of which no region is known [px]."""
+
+
 def detect_signs(
     image: Picture,
     regions: Iterable[SearchRegion] | None = None,
-    *,
-    least_strength: float | None = None,
-    radii: tuple[float, float] = (4.0, 32.0),
 ) -> tuple[SignDetection, ...]:
     """Find signs by the symmetry of their outlines.
 
@@ -301,18 +302,17 @@ def detect_signs(
     Edges count from four times the gradient's noise, which is that of the region itself: signs faint in fog are found
     where the picture is as even.
 
-    Returns the surest first; of those in the same place one. Takes `image` (rows, cols), `radii` [px].
+    Returns the surest first; of those in the same place one. Takes `image` (rows, cols).
     """
     # numba would compile all again for an array that cannot be written.
     pixels: NDArray[Any] = np.require(image if image.ndim == 3 else image[:, :, None], requirements=["C", "W"])
     if regions is None:
-        searches = list(_tiles(pixels.shape[:2], radii))
+        searches = list(_tiles(pixels.shape[:2], _RADII))
         # So many tiles give chance as many occasions.
         surprise, share = _UNWARNED_SURPRISE + math.log(len(searches)), _UNWARNED_SHARE
     else:
         searches = [(region, SMALLER, LARGER) for region in regions]
         surprise, share = _SURPRISE, _LEAST_SHARE
-    share = share if least_strength is None else least_strength
     found: list[_Found] = []
     for region, smaller, larger in searches:
         found += _search(pixels, region, region.radius * smaller, region.radius * larger, share)

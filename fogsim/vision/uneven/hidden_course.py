@@ -21,11 +21,11 @@ from fogsim.vision.lines.road_course import (
     sag_precision,
 )
 from fogsim.vision.lines.road_course_kernels import PIECES
-from fogsim.vision.strips.course_geometry import SIDES, Bend, lay_along
+from fogsim.vision.strips.course_geometry import Bend, lay_along
 from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import StripGeometry, view_of
+from fogsim.vision.strips.strip_geometry import SIDES, StripGeometry, view_of
 from fogsim.vision.uneven.fog_evidence import CHANCES_OF_EVEN, EvenFog, even_fog_over, thinned_bins
 
 Floats = NDArray[np.float64]

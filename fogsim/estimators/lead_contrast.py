@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.core.linear_algebra import straight_line
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.lead_contrast_track import DENSEST, SPACING, ContrastTrack, RearDetection
@@ -50,14 +49,24 @@ def fit_decay(distance: Floats, contrast: Floats, noise: Floats, relative: float
 
     Returns None if there are fewer than three ranges or no contrast. Takes `distance`, `contrast`, `noise` (n,) [m].
     """
-    if distance.size < 3 or float(np.abs(contrast).max()) <= 0:
+    if distance.size < 3:
         return None
-    near = float(distance.mean())
+    k, deviation, size, misfit = _decay(distance, contrast, noise, relative, offset)
+    return None if size == 0.0 else DecayFit(k, deviation, size, misfit)
+
+
+@kernel
+def _decay(
+    distance: Floats, contrast: Floats, noise: Floats, relative: float, offset: float
+) -> tuple[float, float, float, float]:
+    """The fields of `DecayFit`; all 0 without contrast."""
+    if np.abs(contrast).max() <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    near = distance.mean()
     size, k = _first_guess(distance - near, contrast, noise)
     size, k, variance, misfit = _descended(distance - near, contrast, noise, relative, offset, size, k)
     misfit /= max(distance.size - 2, 1)
-    deviation = math.sqrt(max(variance, 0.0) * max(misfit, 1.0))
-    return DecayFit(k, deviation, size * math.exp(min(k * near, 50.0)), misfit)
+    return k, math.sqrt(max(variance, 0.0) * max(misfit, 1.0)), size * math.exp(min(k * near, 50.0)), misfit
 
 
 @kernel
@@ -94,14 +103,17 @@ def _descended(
     return size, k, variance, misfit
 
 
+@kernel
 def _first_guess(distance: Floats, contrast: Floats, noise: Floats) -> tuple[float, float]:
     """Straight line through the logarithms of what stands out of the noise."""
-    sign = 1.0 if float(contrast[int(np.argmax(np.abs(contrast)))]) > 0 else -1.0
+    sign = 1.0 if contrast[np.argmax(np.abs(contrast))] > 0 else -1.0
     clear = sign * contrast > 3.0 * noise
-    if clear.sum() < 2 or float(np.ptp(distance[clear])) <= 0:
+    if clear.sum() < 2 or distance[clear].max() <= distance[clear].min():
         return float(contrast.mean()), 0.0
-    slope, height = straight_line(distance[clear], np.log(sign * contrast[clear]))
-    return sign * math.exp(min(height, 5.0)), -slope
+    x, y = distance[clear], np.log(sign * contrast[clear])
+    middle, level = x.mean(), y.mean()
+    slope = ((x - middle) * (y - level)).sum() / ((x - middle) ** 2).sum()
+    return sign * math.exp(min(level - slope * middle, 5.0)), -slope
 
 
 _MIN_SAMPLES = 4
@@ -291,14 +303,13 @@ class LeadContrast:
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
     def _fit(self, distance: Floats) -> DecayFit | None:
-        if len(self._track.detections) < _MIN_SAMPLES or sum(one.alike for one in self._track.detections) < _MIN_ALIKE:
+        track = self._track.detections
+        if len(track) < _MIN_SAMPLES or [one.alike for one in track].count(True) < _MIN_ALIKE:
             return None
-        contrast, noise, lever = (
-            np.array([getattr(s.contrast, name) for s in self._track.detections])
-            for name in ("ratio", "deviation", "lever")
-        )
-        clipped = any(s.clipped for s in self._track.detections)
-        uneven = max(s.airlight_deviation for s in self._track.detections)
+        looks = [(one.contrast.ratio, one.contrast.deviation, one.contrast.lever) for one in track]
+        contrast, noise, lever = np.array(looks).T.copy()
+        clipped = True in [one.clipped for one in track]
+        uneven = max([one.airlight_deviation for one in track])
         level = math.hypot(_AIRLIGHT_DEVIATION, _RECKONED_LEVEL * uneven)
         airlight = _CLIPPED_AIRLIGHT_DEVIATION if clipped else level
         usual = median(lever)
@@ -319,7 +330,7 @@ class LeadContrast:
 
     def _shape(self, extinction: float, lever: float) -> float:
         """By how much size and aspect may change the farthest contrast, relative [-]."""
-        depth = min(one.depth for one in self._track.detections)
+        depth = min([one.depth for one in self._track.detections])
         # What the lever would be without fog is over 1 by luminance over contrast.
         bright = max(lever * math.exp(-max(extinction, 0.0) * depth) - 1.0, 0.0)
         large = self._track.detections[0].picture.width >= LARGE

@@ -13,6 +13,7 @@ from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.medians import quantile
 from fogsim.vision.lines.horizon import Horizon
 
 _BLOCKS = 80
@@ -67,7 +68,7 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     blocks = light[:, : count * per_block].reshape(light.shape[0], count, per_block).mean(axis=2)
     aside = np.abs((np.arange(count) + 0.5) * per_block - camera.principal_point[0]) > _OWN_LANE * camera.width
     blocks = blocks[:, aside]
-    airlight = float(np.quantile(blocks[: last - top], _BRIGHTEST)) if aside.any() else 0.0
+    airlight = quantile(blocks[: last - top], _BRIGHTEST) if aside.any() else 0.0
     if not airlight > 0.0:
         return 0.0
     blocks = blocks / airlight

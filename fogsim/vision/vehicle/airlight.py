@@ -1,5 +1,6 @@
 """Airlight next to the vehicle ahead, and whether the sky or lamps light the road before it."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -126,7 +127,8 @@ def road_fall(
     if farthest < _FARTHER * nearest:
         return _NOWHERE
     at = np.linspace(nearest, farthest, _ROWS)
-    contrast = np.array([1.0 - _median(luminance_of(*_row(camera, d)), sky) / sky for d in at])
+    rows = _rows(camera, nearest, farthest)
+    contrast = np.array([1.0 - _median(luminance_of(*where), sky) / sky for where in rows])
     seen = contrast > _LEAST_CONTRAST
     if int(seen.sum()) < _ROWS // 2:
         return _NOWHERE
@@ -134,15 +136,21 @@ def road_fall(
     return RoadFall(at[seen], contrast[seen], np.ones(rows.size) if share is None else share[rows])
 
 
-def _row(camera: Camera, distance: float) -> tuple[slice, slice]:
-    row = min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1)
-    middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
-    cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
-    return slice(max(row, 0), max(row, 0) + 1), cols
+@functools.lru_cache(maxsize=64)
+def _rows(camera: Camera, nearest: float, farthest: float) -> list[tuple[slice, slice]]:
+    """Single rows, and columns, of the road between two distances [m]; the list is shared."""
+    found = []
+    for distance in np.linspace(nearest, farthest, _ROWS).tolist():
+        row = max(min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1), 0)
+        middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
+        cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
+        found.append((slice(row, row + 1), cols))
+    return found
 
 
+@kernel
 def _median(pixels: Floats, otherwise: float) -> float:
-    return float(np.float32(median(pixels))) if pixels.size else otherwise
+    return float(np.float32(np.median(pixels))) if pixels.size else otherwise
 
 
 _BLOCKS, _BRIGHT_SHARE = 12, 0.8

@@ -1,8 +1,7 @@
 """The vanishing point of straight lines: where they cross, which crossing most of them support, which point fits all.
 
-How lines are found, and which of them count, is what the methods differ in: `lane_lines` (zhu2015, huang2015),
-`gradient_lines` (negru2013), `road_lines` (near an assumed calibration) and `segments` (an unknown camera)
-each have a function ``…_vanishing_point``.
+Methods differ in how lines are found and which of them count: those of zhu2015, huang2015 and negru2013 as published
+are here; `road_lines` looks near an assumed calibration, and `segments` needs none.
 """
 
 import functools

@@ -13,7 +13,7 @@ from fogsim.vision.lines.road_course import RoadCourse
 from fogsim.vision.lines.road_course_kernels import PIECES, row_on_plane, turned
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
-from fogsim.vision.strips.strip_geometry import SIDES, StripGeometry, View, lay, view_of
+from fogsim.vision.strips.strip_geometry import SIDES, RoadView, StripGeometry, lay, view_of
 
 Floats = NDArray[np.float64]
 
@@ -143,7 +143,7 @@ class Bend(NamedTuple):
 
 @kernel
 def lay_along(
-    straight: StripGeometry, view: View, shift: float, sag: Floats, bend: Bend, sides: Floats
+    straight: StripGeometry, view: RoadView, shift: float, sag: Floats, bend: Bend, sides: Floats
 ) -> StripGeometry:
     """Strips between sides (strips, 2) [m] of a course whose horizon lies some rows (`shift`) below the calibrated one.
 

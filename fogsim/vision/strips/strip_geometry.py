@@ -48,7 +48,7 @@ class StripGeometry(NamedTuple):
         return StripGeometry(*self[:7], *(values[strips] for values in self[7:]))
 
 
-class View(NamedTuple):
+class RoadView(NamedTuple):
     """What a camera looks at a road with."""
 
     width: float  # Of the image [px]
@@ -60,11 +60,11 @@ class View(NamedTuple):
     height: float  # Above the road [m]
 
 
-def view_of(camera: Camera) -> View:
-    """View of a camera, for kernels."""
+def view_of(camera: Camera) -> RoadView:
+    """RoadView of a camera, for kernels."""
     place = (*camera.principal_point, camera.horizon_row)
     lens = (camera.focal_length, camera.row_distance, camera.mount_height)
-    return View(float(camera.width), *map(float, place), *map(float, lens))
+    return RoadView(float(camera.width), *map(float, place), *map(float, lens))
 
 
 def strip_geometry(camera: Camera, nearest: float) -> StripGeometry:
@@ -89,7 +89,7 @@ def strip_geometry(camera: Camera, nearest: float) -> StripGeometry:
 
 
 @kernel
-def lay(left: Floats, right: Floats, below: Floats, view: View) -> tuple[Floats, Floats, Floats, Floats]:
+def lay(left: Floats, right: Floats, below: Floats, view: RoadView) -> tuple[Floats, Floats, Floats, Floats]:
     """Cut strips to the image, which leaves nothing of what is mostly outside: columns, path and what a lens takes.
 
     Takes `left`, `right` (strips, n) [px], `below` (n,) [px].

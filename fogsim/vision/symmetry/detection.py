@@ -285,7 +285,7 @@ class SignDetection:
 
 
 _RADII = (4.0, 32.0)
-"""Least and greatest radius of signs of which no region is known [px]."""
+"""Least and greatest radius of signs that are searched all over an image [px]."""
 
 
 def detect_signs(

@@ -16,8 +16,7 @@ from fogsim.calibration.halo_calibration import measure_halo_threshold, random_s
 from fogsim.calibration.staged_night import NightRoad
 from fogsim.estimators.night.halos import largest_sharpness, mean_steepness
 from fogsim.values import Camera, Response
-from fogsim.vision.sources.halo_profile import halos_of
-from fogsim.vision.sources.source_tree import source_tree
+from fogsim.vision.sources.halo_profile import halos_of, source_tree
 
 PAPERS_CAMERA = Camera(1280, 800, 1150.0, (639.5, 399.5), 1.38, pitch=0.035, response=Response.SRGB)
 SMALL_CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, pitch=0.035, response=Response.SRGB)

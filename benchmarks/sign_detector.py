@@ -38,8 +38,7 @@ from sign_pictures import (
     painted_shot,
 )
 
-from fogsim.estimators.signs.regions import project_sightings
-from fogsim.estimators.signs.registration import register_signs
+from fogsim.estimators.signs.regions import project_sightings, register_signs
 from fogsim.values import SignSighting
 from fogsim.vision.symmetry.detection import detect_signs
 

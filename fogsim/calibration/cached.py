@@ -24,7 +24,7 @@ from fogsim.calibration.veil_references import usual_references
 from fogsim.core.files.user_cache import cache_directory, keep_newest, read_entry, write_entry
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.night.own_light import KNOWN_HEAD_LAMPS, OwnLight
-from fogsim.estimators.night.references import VeilReferences
+from fogsim.estimators.night.veil_correlation import VeilReferences
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.lighting import LampMount
 from fogsim.values import Camera, Lamp

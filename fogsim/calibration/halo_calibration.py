@@ -9,8 +9,7 @@ from fogsim.calibration.staged_night import GLARE, NightRoad, NightScene, NightV
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import NEAREST, HaloThreshold, largest_sharpness, mean_steepness
 from fogsim.values import Camera, Lamp
-from fogsim.vision.sources.halo_profile import halos_of
-from fogsim.vision.sources.source_tree import source_tree
+from fogsim.vision.sources.halo_profile import halos_of, source_tree
 
 _FOGS = (200.0, 100.0, 50.0)
 """Visibilities of the fogs that must be distinguished from clear nights [m]."""

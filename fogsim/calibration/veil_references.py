@@ -13,8 +13,7 @@ from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import UnknownNameError
-from fogsim.estimators.night.cells import camera_of_cells
-from fogsim.estimators.night.references import VeilReferences
+from fogsim.estimators.night.veil_correlation import VeilReferences, camera_of_cells
 from fogsim.lighting import own_head_lamps
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, CameraPose

@@ -114,10 +114,10 @@ def _estimate_visibility() -> None:
 
     from fogsim.core.parameters import accepted_parameters
     from fogsim.estimators import ESTIMATORS
+    from fogsim.estimators.lead_contrast import fit_decay
     from fogsim.fusion import FUSIONS
     from fogsim.values import Camera
-    from fogsim.vision.uneven.uneven_kernels import extinction_at
-    from fogsim.vision.vehicle.decay_fit import fit_decay
+    from fogsim.vision.uneven.uneven_kernels import denser_part, path_depths
 
     estimates: list[list[Estimate]] = []
     for width, height in _SIZES:
@@ -130,7 +130,9 @@ def _estimate_visibility() -> None:
     _follow_a_bend(camera)
     # Cases that need more than these images: a vehicle ahead that leaves far enough, and fog that varies for certain.
     fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
-    extinction_at(np.array([10.0, 100.0]), np.full(2, math.log(0.03)), 50.0)
+    solved = (np.array([10.0, 100.0]), np.full(5, math.log(0.03)), np.eye(5))
+    path_depths(*solved, np.array([20.0, 40.0]), 50.0)
+    denser_part(*solved, 50.0)
 
 
 def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":

@@ -24,7 +24,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "negru2013": "fogsim.estimators.negru2013:Negru2013",
         "zhu2015": "fogsim.estimators.zhu2015:Zhu2015",
         "huang2015": "fogsim.estimators.huang2015:Huang2015",
-        "huang2015_rough": "fogsim.estimators.huang2015_rough:Huang2015Rough",
+        "huang2015_rough": "fogsim.estimators.huang2015:Huang2015Rough",
         "huang2015_lead": "fogsim.estimators.huang2015_lead:Huang2015Lead",
         "belaroussi2015": "fogsim.estimators.signs.belaroussi2015:Belaroussi2015",
         "joint_road": "fogsim.estimators.joint_road:JointRoad",

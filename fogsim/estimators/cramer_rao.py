@@ -25,7 +25,7 @@ _DARKEST = 1e-9
 _PITCH = 3
 """Place of the pitch among k, airlight, road and pitch."""
 
-GreyLevels = Annotated[float, Range(0.0, 1e6, "grey levels")]
+_GreyLevels = Annotated[float, Range(0.0, 1e6, "grey levels")]
 
 
 @checked_parameters
@@ -54,8 +54,8 @@ class FoggyRoad:
     """
 
     extinction: Annotated[float, Range(0.0, 10.0, "1/m")]
-    airlight: GreyLevels
-    road: GreyLevels
+    airlight: _GreyLevels
+    road: _GreyLevels
     noise: Annotated[float, Range(1e-3, 1e6, "grey levels")]
     lane_width: Annotated[float, Range(0.1, 100.0, "m")] = 2.8
     lanes: Annotated[int, Range(1, 20)] = 1

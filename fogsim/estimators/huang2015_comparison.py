@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
 from fogsim.values.camera import Camera
-from fogsim.vision.light.clipped_sky import clipping, darker_by
-from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.luminance import clipping, darker_by, linear_luminance
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError

@@ -66,7 +66,7 @@ def image_confidence(extinction: float, distance: Floats | float, reference: flo
 
 
 @dataclass(frozen=True, slots=True)
-class RatioTable:
+class _RatioTable:
     """Mean ratios of variances by difference of range (huang2015 table 4.2, after the ± 50 % rule)."""
 
     difference: Floats  # (n,): Far less near range [m], ascending: means of rows that are a spacing apart
@@ -74,7 +74,7 @@ class RatioTable:
     count: NDArray[np.int64]  # (n,) int64: Ratios in each mean
 
 
-def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTable:
+def ratio_table(distances: Floats, variances: Floats, spacing: float) -> _RatioTable:
     """Ratios of every two variances, by their difference of range.
 
     Takes `distances` (n,) [m], `variances` (n,), `spacing` [m].
@@ -89,10 +89,10 @@ def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTa
         if kept.size:
             found.append((float(apart[row == step].mean()), float(kept.mean()), kept.size))
     difference, mean, count = (np.array(column) for column in zip(*found, strict=True)) if found else (np.zeros(0),) * 3
-    return RatioTable(difference.astype(np.float64), mean.astype(np.float64), count.astype(np.int64))
+    return _RatioTable(difference.astype(np.float64), mean.astype(np.float64), count.astype(np.int64))
 
 
-def published_extinction(table: RatioTable) -> tuple[float, float]:
+def published_extinction(table: _RatioTable) -> tuple[float, float]:
     """Extinction of least squared error between mean and theoretical ratios, of k from 0 to 0.09 (section 4.3.3).
 
     Returns k and the standard deviation that the ratios' misfit makes of it [1/m].
@@ -123,7 +123,7 @@ class Regressions:
 
 
 @dataclass(frozen=True, slots=True)
-class ContrastFit:
+class _ContrastFit:
     """Koschmieder's law fitted to regressions."""
 
     # extinction, deviation: k, which may come out negative, and its standard deviation [1/m]
@@ -132,7 +132,7 @@ class ContrastFit:
     misfit: float  # Mean square of the standardised residuals; about 1 where the model holds
 
 
-def fitted_extinction(data: Regressions) -> ContrastFit | None:
+def fitted_extinction(data: Regressions) -> _ContrastFit | None:
     """Fit slope = B (1 + f) t and mean = (1 + e) − (1 + e − near mean) B t (1 + g ln d/d₀), t = e^(−k d), robustly.
 
     Slopes need detail and no knowledge of the airlight; means need no detail, but the sky's luminance for the
@@ -167,7 +167,7 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
     finite = np.isfinite(spread)
     misfit = float(np.mean(standardised[finite] ** 2))
     deviation = math.hypot(math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), _SIZE_SHARE / float(np.ptp(apart)))
-    return ContrastFit(float(state[0]), deviation, misfit)
+    return _ContrastFit(float(state[0]), deviation, misfit)
 
 
 def _first_guess(data: Regressions, apart: Floats) -> float | None:

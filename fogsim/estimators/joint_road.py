@@ -30,13 +30,10 @@ from fogsim.vision.lines.horizon import (
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
-from fogsim.vision.strips.airlight_slopes import darkening_priors
+from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
-from fogsim.vision.strips.droplet_memory import DropletMemory
-from fogsim.vision.strips.full_looks import Left, left_by
-from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road
 from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
-from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.shade import divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
@@ -48,9 +45,8 @@ from fogsim.vision.strips.strip_curves import (
     without_rows_below,
 )
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
-from fogsim.vision.uneven.airlight_edge import airlight_edge
 from fogsim.vision.uneven.hidden_course import HiddenCourse
-from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
+from fogsim.vision.uneven.uneven_fit import UnevenFit, airlight_edge, even_fog, fit_uneven
 
 _MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""

@@ -1,12 +1,13 @@
 """Fog from how the contrast of the tracked vehicle ahead falls with its range."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.lead_contrast_track import DENSEST, SPACING, ContrastTrack, RearDetection
@@ -16,13 +17,104 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import without_far_objects
+from fogsim.vision.light.medians import median
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE
-from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
 from fogsim.vision.vehicle.vehicle_crop import daytime_crop
+
+Floats = NDArray[np.float64]
+
+_STEPS, _HUBER = 12, 2.5
+"""Gauss–Newton steps, and residual beyond which a range counts linearly, in standard deviations [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DecayFit:
+    """Decay c = C e^(−kd) + o."""
+
+    # extinction, deviation: k and its standard deviation [1/m]
+    extinction: float
+    deviation: float
+    contrast: float  # C [-]
+    misfit: float  # Mean square of the standardised residuals [-]
+
+
+def fit_decay(distance: Floats, contrast: Floats, noise: Floats, relative: float, offset: float) -> DecayFit | None:
+    """Fit Duntley's law to contrasts at several ranges (Gauss–Newton, weights by the model's own values).
+
+    Fitted in the contrasts themselves and not in their logarithms, which noise would bias and make undefined.
+
+    Returns None if there are fewer than three ranges or no contrast. Takes `distance`, `contrast`, `noise` (n,) [m].
+    """
+    if distance.size < 3:
+        return None
+    k, deviation, size, misfit = _decay(distance, contrast, noise, relative, offset)
+    return None if size == 0.0 else DecayFit(k, deviation, size, misfit)
+
+
+@kernel
+def _decay(
+    distance: Floats, contrast: Floats, noise: Floats, relative: float, offset: float
+) -> tuple[float, float, float, float]:
+    """The fields of `DecayFit`; all 0 without contrast."""
+    if np.abs(contrast).max() <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    near = distance.mean()
+    size, k = _first_guess(distance - near, contrast, noise)
+    size, k, variance, misfit = _descended(distance - near, contrast, noise, relative, offset, size, k)
+    misfit /= max(distance.size - 2, 1)
+    return k, math.sqrt(max(variance, 0.0) * max(misfit, 1.0)), size * math.exp(min(k * near, 50.0)), misfit
+
+
+@kernel
+def _descended(
+    distance: Floats, contrast: Floats, noise: Floats, relative: float, offset: float, size: float, k: float
+) -> tuple[float, float, float, float]:
+    """Size, extinction, the variance of the latter, and the sum of squared standardised residuals."""
+    o, variance, misfit = 0.0, 0.0, 0.0
+    for _ in range(_STEPS):
+        # Normal equations in the order of size, offset and extinction; the diagonal keeps them regular.
+        aa, ab, ac, bb, bc, cc = 1e-9, 0.0, 0.0, 1.0 / offset**2, 0.0, 1e-3
+        ra, rb, rc, misfit = 0.0, -o / offset**2, 0.0, 0.0
+        for i in range(distance.size):
+            fall = math.exp(-k * distance[i])
+            residual = contrast[i] - size * fall - o
+            weight = 1.0 / (noise[i] ** 2 + (relative * size * fall) ** 2)
+            # Ranges at which something else was seen count less (Huber).
+            weight *= min(1.0, _HUBER / max(abs(residual) * math.sqrt(weight), 1e-9))
+            slope = -size * distance[i] * fall
+            aa, ab, ac = aa + weight * fall * fall, ab + weight * fall, ac + weight * fall * slope
+            bb, bc, cc = bb + weight, bc + weight * slope, cc + weight * slope * slope
+            ra, rb, rc = ra + weight * fall * residual, rb + weight * residual, rc + weight * slope * residual
+            misfit += weight * residual * residual
+        # Elimination in that order leaves what is known of the extinction last.
+        by_a, by_c = ab / aa, ac / aa
+        bb, bc, rb = bb - by_a * ab, bc - by_a * ac, rb - by_a * ra
+        cc, rc = cc - by_c * ac - bc * bc / bb, rc - by_c * ra - bc * rb / bb
+        variance = 1.0 / cc
+        step = rc * variance
+        lifted = (rb - bc * step) / bb
+        size, o = size + (ra - ab * lifted - ac * step) / aa, o + lifted
+        most = 0.5 * abs(k) + 2e-3
+        k += min(max(step, -most), most)
+    return size, k, variance, misfit
+
+
+@kernel
+def _first_guess(distance: Floats, contrast: Floats, noise: Floats) -> tuple[float, float]:
+    """Straight line through the logarithms of what stands out of the noise."""
+    sign = 1.0 if contrast[np.argmax(np.abs(contrast))] > 0 else -1.0
+    clear = sign * contrast > 3.0 * noise
+    if clear.sum() < 2 or distance[clear].max() <= distance[clear].min():
+        return float(contrast.mean()), 0.0
+    x, y = distance[clear], np.log(sign * contrast[clear])
+    middle, level = x.mean(), y.mean()
+    slope = ((x - middle) * (y - level)).sum() / ((x - middle) ** 2).sum()
+    return sign * math.exp(min(level - slope * middle, 5.0)), -slope
+
 
 _MIN_SAMPLES = 4
 """Fewest ranges for a fit."""
@@ -167,7 +259,7 @@ class LeadContrast:
         try:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
-            fit = self._fit()
+            fit = self._fit(self._track.likely_distances())
             about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, _LEAST_EXTINCTION), DENSEST)
             self._track.relevel(about)
             crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
@@ -198,33 +290,30 @@ class LeadContrast:
         return min(jump, surprise)
 
     def _estimate(self, reason: str, road: RoadFall | None, found: dict[str, object]) -> Estimate:
-        found |= {
-            "distance": self._track.likely_distances(),
-            "contrast": np.array([s.contrast.ratio for s in self._track.detections]),
-        }
-        fit = self._fit()
+        distance = self._track.likely_distances()
+        found |= {"distance": distance, "contrast": np.array([s.contrast.ratio for s in self._track.detections])}
+        fit = self._fit(distance)
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
         reason = _rejection_reason(fit, road)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
-        reach = float(self._track.likely_distances().max()) + self._setback
+        reach = float(distance.max()) + self._setback
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
-    def _fit(self) -> DecayFit | None:
-        if len(self._track.detections) < _MIN_SAMPLES or sum(one.alike for one in self._track.detections) < _MIN_ALIKE:
+    def _fit(self, distance: Floats) -> DecayFit | None:
+        track = self._track.detections
+        if len(track) < _MIN_SAMPLES or [one.alike for one in track].count(True) < _MIN_ALIKE:
             return None
-        distance = self._track.likely_distances()
-        contrast, noise, lever = (
-            np.array([getattr(s.contrast, name) for s in self._track.detections])
-            for name in ("ratio", "deviation", "lever")
-        )
-        clipped = any(s.clipped for s in self._track.detections)
-        uneven = max(s.airlight_deviation for s in self._track.detections)
+        looks = [(one.contrast.ratio, one.contrast.deviation, one.contrast.lever) for one in track]
+        contrast, noise, lever = np.array(looks).T.copy()
+        clipped = True in [one.clipped for one in track]
+        uneven = max([one.airlight_deviation for one in track])
         level = math.hypot(_AIRLIGHT_DEVIATION, _RECKONED_LEVEL * uneven)
         airlight = _CLIPPED_AIRLIGHT_DEVIATION if clipped else level
-        offset = max(airlight * float(np.median(lever)), 1e-6)
+        usual = median(lever)
+        offset = max(airlight * usual, 1e-6)
         fit = fit_decay(distance, contrast, noise, _REGISTRATION, offset)
         if fit is None:
             return None
@@ -235,13 +324,13 @@ class LeadContrast:
             return None
         certain = contrast**2 / (noise**2 + (relative * contrast) ** 2 + offset**2)
         # What is wrong of an uneven airlight's shape is so at the nearest range, and nearly nothing far away.
-        shape = math.hypot(self._shape(fit.extinction, float(np.median(lever))), uneven * float(np.median(lever)))
+        shape = math.hypot(self._shape(fit.extinction, usual), uneven * usual)
         by_shape = shape / max(_span(distance, certain), SPACING)
         return replace(fit, deviation=math.hypot(fit.deviation, by_shape, _SMOOTHED * fit.extinction))
 
     def _shape(self, extinction: float, lever: float) -> float:
         """By how much size and aspect may change the farthest contrast, relative [-]."""
-        depth = min(one.depth for one in self._track.detections)
+        depth = min([one.depth for one in self._track.detections])
         # What the lever would be without fog is over 1 by luminance over contrast.
         bright = max(lever * math.exp(-max(extinction, 0.0) * depth) - 1.0, 0.0)
         large = self._track.detections[0].picture.width >= LARGE

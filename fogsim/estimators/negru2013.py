@@ -21,9 +21,7 @@ from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.deriche import CannyDeriche
-from fogsim.vision.lines.edges import Edges
-from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
+from fogsim.vision.lines.edges import CannyDeriche, Edges
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
@@ -33,22 +31,17 @@ from fogsim.vision.lines.horizon import (
     calibrated_horizon,
 )
 from fogsim.vision.lines.road_lines import seen_horizon
-from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, seen_up_to
+from fogsim.vision.lines.vanishing_point import VanishingPoint, consensus_vanishing_point
 from fogsim.vision.region.inflection import (
     FogModel,
-    Parameters,
     best_inflection,
-    inflection_parameters,
     printed_inflection,
-    printed_parameters,
+    subpixel_inflections,
 )
-from fogsim.vision.region.law import extinction_deviation
+from fogsim.vision.region.law import check_law, detection_limit, extinction_deviation, fog_or_clear, seen_up_to
 from fogsim.vision.region.profile import RoadCurve, band_profile
-from fogsim.vision.region.region_kernels import GrowthLimits
 from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
-from fogsim.vision.region.road_region import constant_limits
-from fogsim.vision.region.subpixel_inflection import subpixel_inflections
+from fogsim.vision.region.road_region import GrowthLimits, constant_limits
 from fogsim.vision.strips.strip_curves import lowest_road_row
 
 _GROWTH_SHARE = 0.8
@@ -312,7 +305,8 @@ class Negru2013:
         """
         apart = np.abs(curve.below_horizon) > _BETWEEN
         curve = replace(curve, weight=curve.weight * apart)
-        extinction = float(self._extinctions(curve, curve.luminance[:, None])[0])
+        rows, square = subpixel_inflections(curve, curve.luminance[:, None], printed=self._is_printed)
+        extinction = 2.0 / curve.row_distance * float(rows[0])
         if not extinction > 0.0:
             return None
         deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
@@ -326,16 +320,15 @@ class Negru2013:
             # What hides the road is the better reason.
             seen_up_to(curve)
             raise
-        _, square = subpixel_inflections(curve, curve.luminance[:, None], self._parameters)
         per_row = -2.0 / curve.row_distance
         return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(float(square[0])))
 
     @property
-    def _parameters(self) -> Parameters:
-        return inflection_parameters if Negru2013Repair.SIGNS in self._repairs else printed_parameters
+    def _is_printed(self) -> bool:
+        return Negru2013Repair.SIGNS not in self._repairs
 
     def _extinctions(self, curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows, _ = subpixel_inflections(curve, luminance, self._parameters)
+        rows, _ = subpixel_inflections(curve, luminance, printed=self._is_printed)
         return np.asarray(2.0 / curve.row_distance * rows)
 
     def _edges(self, road: RoadImage, slope: NDArray[np.float32]) -> Edges:

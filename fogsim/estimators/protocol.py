@@ -10,7 +10,7 @@ from fogsim.values.observation import Observation
 if TYPE_CHECKING:
     from fogsim.estimators.night.halos import HaloThreshold
     from fogsim.estimators.night.own_light import OwnLight
-    from fogsim.estimators.night.references import VeilReferences
+    from fogsim.estimators.night.veil_correlation import VeilReferences
     from fogsim.estimators.signs.operating_range import OperatingRange
 
 

@@ -156,15 +156,22 @@ class SmoothedRanges:
             return measured
         time, distance, speed = np.array(self._measured).T.copy()
         likely = _smoothed(time, distance, speed, self._deviation)
-        change = np.abs(likely - distance) / self._deviation
-        if max(_root_mean_square(change), _root_mean_square(change[-_LATEST:])) > _CONTRADICTED:
+        if _is_contradicted((likely - distance) / self._deviation):
             return measured
         at = np.array(numbers, np.int64) - (self._count - time.size)
         return np.asarray(np.where(at >= 0, likely[np.maximum(at, 0)], measured))
 
 
-def _root_mean_square(values: Floats) -> float:
-    return math.sqrt(float(np.mean(values**2)))
+@kernel
+def _is_contradicted(change: Floats) -> bool:
+    """Whether smoothing changes all ranges, or the last ones, by too many of their deviations."""
+    for count in (change.size, min(_LATEST, change.size)):
+        square = 0.0
+        for i in range(change.size - count, change.size):
+            square += change[i] ** 2
+        if math.sqrt(square / count) > _CONTRADICTED:
+            return True
+    return False
 
 
 @kernel

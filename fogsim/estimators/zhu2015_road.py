@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
@@ -15,16 +16,154 @@ from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
-from fogsim.vision.lines.lane_lines import LaneLine, hough_lines, longest_pair, published_vanishing_point
 from fogsim.vision.lines.road_lines import seen_horizon
-from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
-from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, is_clear, seen_up_to
-from fogsim.vision.region.law import extinction_deviation
-from fogsim.vision.region.profile import RoadCurve
-from fogsim.vision.region.region_kernels import GrowthLimits, region_tops
+from fogsim.vision.lines.vanishing_point import LaneLine, hough_lines, longest_pair, published_vanishing_point
+from fogsim.vision.region.law import (
+    check_law,
+    detection_limit,
+    extinction_deviation,
+    fog_or_clear,
+    is_clear,
+    seen_up_to,
+    slants,
+    transmittance,
+)
+from fogsim.vision.region.profile import RoadCurve, corridor_curve, hide_vehicle
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
-from fogsim.vision.region.road_region import constant_limits, grow_region
-from fogsim.vision.region.steepest import fog_of_steepest_rows, highest_place, steepest_rows
+from fogsim.vision.region.road_region import GrowthLimits, constant_limits, grow_region, region_tops
+
+Floats = NDArray[np.float64]
+
+_LEAST_REACH = 1.5
+"""Rows to either side over which a slope is taken at least [px]."""
+
+_PLACES, _HIGHEST = 96, 0.6
+"""Places at which the slope is looked at, evenly in ln(v − v_h), and the first of them below the horizon [px]."""
+
+_SEEN = 0.7
+"""Share of the rows of a window that must be seen [-]."""
+
+_PEAK = 0.85
+"""Share of the steepest slope from which on places count for that of the peak [-]."""
+
+_NEAREST_OF_RISE, _FARTHEST_OF_RISE = 1.2, 0.2
+"""Rows between which the steepest is sought, over the row about which the luminance changes most in ln(v − v_h), which
+by Koschmieder's law is twice the inflection's [-]."""
+
+_STEPS = 4
+"""How often the law's own steepest row is compared with the one that is seen."""
+
+
+def places(curve: RoadCurve) -> Floats:
+    """Heights below the horizon at which slopes are looked at.
+
+    Returns v − v_h, ascending [px].
+    """
+    return np.asarray(np.geomspace(_HIGHEST, max(float(curve.below_horizon[-1]), 2.0 * _HIGHEST), _PLACES))
+
+
+def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
+    """Brightening upward about `places`, the slope of least squares over rows in proportion to their height.
+
+    In the logarithm of v − v_h all fogs have one curve, shifted; a window in proportion to v − v_h keeps that.
+
+    Returns slopes, positive where it brightens upward [linear grey levels per px]; −inf where too little is seen. Takes
+    `luminance` (n, m).
+    """
+    at, rows = places(curve), curve.below_horizon[:, None]
+    half = np.maximum(reach * at, _LEAST_REACH)
+    weight = curve.weight[:, None]
+    columns = np.concatenate(
+        (weight, weight * rows, weight * rows**2, weight * luminance, weight * rows * luminance), axis=1
+    )
+    sums = np.concatenate((np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)))
+    within = _sums_up_to(sums, at + half - rows[0, 0] + 0.5) - _sums_up_to(sums, at - half - rows[0, 0] + 0.5)
+    count, by_row, by_square = within[:, :1], within[:, 1:2], within[:, 2:3]
+    by_light, by_both = np.split(within[:, 3:], 2, axis=1)
+    spread = count * by_square - by_row**2
+    seen = (count[:, 0] >= _SEEN * 2.0 * half) & (at + half <= rows[-1, 0] + 0.5)
+    slope = -(count * by_both - by_row * by_light) / np.maximum(spread, 1e-9)
+    return np.asarray(np.where(seen[:, None], slope, -np.inf))
+
+
+def _sums_up_to(sums: Floats, place: Floats) -> Floats:
+    """Sums up to places between rows; a part of the row after each place counts."""
+    place = np.clip(place, 0.0, len(sums) - 1.0)
+    row = np.minimum(place.astype(np.int64), len(sums) - 2)
+    part = (place - row)[:, None]
+    return np.asarray(sums[row] * (1.0 - part) + sums[row + 1] * part)
+
+
+def _steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
+    """Steepest row of each of some curves, by a parabola over the logarithm of v − v_h about the peak.
+
+    Returns v − v_h [px]; NaN where it never brightens upward (m,).
+    """
+    at = places(curve)
+    slope = slopes(curve, luminance, reach)
+    # A step of noise near the horizon may be steeper than dense fog, but is no large one.
+    rise = at[np.argmax(slope * at[:, None], axis=0)]
+    near = (at[:, None] <= _NEAREST_OF_RISE * rise) & (at[:, None] >= _FARTHEST_OF_RISE * rise)
+    return _peaks(at, np.ascontiguousarray(np.where(near, slope, -np.inf)))
+
+
+@kernel
+def _peaks(at: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of the greatest slopes: `at` (p,) even in its logarithm, `slope` (p, m); NaN where none is positive."""
+    count, step = at.size, np.log(at[1] / at[0])
+    out = np.full(slope.shape[1], np.nan)
+    for column in range(slope.shape[1]):
+        best = 0
+        for place in range(1, count):
+            if slope[place, column] > slope[best, column]:
+                best = place
+        most = slope[best, column]
+        if not most > 0.0:
+            continue
+        first, last = best, best
+        while first > 0 and slope[first - 1, column] >= _PEAK * most:
+            first -= 1
+        while last + 1 < count and slope[last + 1, column] >= _PEAK * most:
+            last += 1
+        middle, reach = 0.5 * (first + last), 0.5 * (last - first)
+        # A parabola of least squares: x and x² − mean are independent over places evenly about the middle.
+        tilt, bend, squares, fourths = 0.0, 0.0, 0.0, 0.0
+        mean = reach * (reach + 1.0) / 3.0
+        for place in range(first, last + 1):
+            x = place - middle
+            curved = x * x - mean
+            tilt += x * slope[place, column]
+            bend += curved * slope[place, column]
+            squares += x * x
+            fourths += curved * curved
+        offset = best - middle
+        if last - first >= 2 and bend < 0.0:
+            offset = min(max(-0.5 * (tilt / squares) / (bend / fourths), -reach), reach)
+        out[column] = at[0] * np.exp(step * (middle + offset))
+    return out
+
+
+def _highest_place(curve: RoadCurve, reach: float) -> float:
+    """Place nearest to the horizon about which enough rows are seen for a slope [px below it]; infinite without any."""
+    seen = np.isfinite(slopes(curve, curve.luminance[:, None], reach)[:, 0])
+    return float(places(curve)[seen][0]) if seen.any() else np.inf
+
+
+def _fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
+    """Extinctions whose laws are steepest, over the same rows and windows, where some curves are.
+
+    At the inflection itself that is k = 2 (v_i − v_h) / λ (zhu2015 eq. 21); a window of some width, and rows of one,
+    shift the steepest row by a share of v − v_h that follows from the law itself.
+
+    Returns k [1/m]; NaN where a curve never brightens upward (m,).
+    """
+    seen = _steepest_rows(curve, luminance, reach)
+    optical = 2.0 * seen
+    for _ in range(_STEPS):
+        law = -transmittance(optical * slants(curve)[:, None], curve.below_horizon[:, None])
+        optical = optical * np.clip(seen / _steepest_rows(curve, law, reach), 0.5, 2.0)
+    return np.asarray(optical / curve.row_distance)
+
 
 _LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
@@ -197,8 +336,8 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
             return _of_last_row(curve, road)
         return Inflection(0.0, detection_limit(seen_up_to(curve), apart, camera.row_distance))
     extinction = float(_read(curve, curve.luminance[:, None])[0])
-    resolved = _RESOLVED * highest_place(curve, REACH)
-    if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
+    resolved = _RESOLVED * _highest_place(curve, REACH)
+    if extinction > 0.0 and _steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
         airlight, dark = check_law(curve, extinction, road.image)
         deviation = extinction_deviation(curve, extinction, _read, apart)
         return Inflection(*fog_or_clear(extinction, deviation), airlight, dark)
@@ -238,7 +377,7 @@ def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
 
 
 def _read(curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
-    return fog_of_steepest_rows(curve, luminance, REACH)
+    return _fog_of_steepest_rows(curve, luminance, REACH)
 
 
 def _curve(road: SeenRoad, camera: Camera, *, own_lane: bool) -> RoadCurve:

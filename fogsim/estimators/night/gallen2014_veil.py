@@ -9,10 +9,16 @@ from numpy.typing import NDArray
 
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.night.own_light import HeadLamps, lit_head_lamps, setback_of, without_noise
-from fogsim.estimators.night.veil_correlation import VeilScores, VeilTemplates, visibility_by_parabola
+from fogsim.estimators.night.veil_correlation import (
+    CellMeans,
+    VeilScores,
+    VeilTemplates,
+    cell_means,
+    cell_size,
+    visibility_by_parabola,
+)
 from fogsim.estimators.protocol import Calibrations
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, Response

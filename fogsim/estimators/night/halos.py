@@ -15,8 +15,7 @@ from fogsim.core.files.readers import number_within, read_json
 from fogsim.errors import InputError, shown
 from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.sources.halo_profile import Halo, halos_of
-from fogsim.vision.sources.source_tree import SourceTree, source_tree
+from fogsim.vision.sources.halo_profile import Halo, SourceTree, halos_of, source_tree
 
 PUBLISHED = 9.0
 """The paper's threshold of the mean Br50, of its camera [levels of 255 a pixel]."""

@@ -13,8 +13,7 @@ from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.protocol import Calibrations
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
-from fogsim.estimators.signs.track import SignTrack
-from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
+from fogsim.estimators.signs.watch import SignTrack, SignWatch, Watched, sign_looks
 from fogsim.units import extinction_from_visibility, visibility_from_extinction
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds

@@ -1,15 +1,120 @@
 """How bright the face of a sign is in a picture: the light that all of it sends, and what its reflectance adds."""
 
+import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.linear_algebra import inverse_of, matrix_product, times
-from fogsim.estimators.signs.layout import Layout, face_maps
 
 Floats = NDArray[np.float64]
+
+_WHITE, RED, _DARK, YELLOW, _BLUE = 0.66, 0.107, 0.022, 0.42, 0.076
+"""Luminous reflectance of the sheeting of signs by day [-]."""
+
+
+class Outline(Enum):
+    """Shape of a face, as the directions of its sides' normals, to the right and down [rad]; a disc has none."""
+
+    DISC = ()
+    OCTAGON = tuple(math.pi / 4 * i for i in range(8))
+    SQUARE = (0.0, math.pi / 2, math.pi, -math.pi / 2)
+    DIAMOND = tuple(math.pi / 4 + math.pi / 2 * i for i in range(4))
+    TIP_UP = (math.pi / 2, -math.pi / 6, -5 * math.pi / 6)
+    TIP_DOWN = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A face: areas one within the other, and where a symbol may be that the layout does not know."""
+
+    outline: Outline  # Shape of all areas
+    # (float, float): Size relative to the face's and reflectance of each [-], the largest first
+    areas: tuple[tuple[float, float], ...]
+    # Width and height of the box around the symbol, relative to the face's diameter, and the mean reflectance there
+    # beyond that of what it is printed on [-]; about so, for what is printed differs
+    symbol: tuple[float, float, float] | None = None
+
+
+def _disc(
+    symbol: tuple[float, float, float], *, field: float = _WHITE, frame: float = RED, ring: float = 0.78
+) -> Layout:
+    return Layout(Outline.DISC, ((1.0, _WHITE), (0.965, frame), (ring, field)), symbol)
+
+
+def _warning(symbol: tuple[float, float, float]) -> Layout:
+    return Layout(Outline.TIP_UP, ((1.0, _WHITE), (0.965, RED), (0.72, _WHITE)), symbol)
+
+
+LAYOUTS = {
+    "speed_limit": _disc((0.62, 0.46, -0.28)),
+    "end_of_speed_limit": _disc((0.64, 0.64, -0.3), frame=_DARK, ring=0.93),
+    "end_of_limits": _disc((0.64, 0.64, -0.25), frame=_DARK, ring=0.93),
+    "no_overtaking": _disc((0.57, 0.22, -0.45)),
+    "no_entry": _disc((0.74, 0.16, _WHITE - RED), field=RED, ring=0.93),
+    "variable_speed_limit": Layout(Outline.SQUARE, ((1.0, _DARK),), (0.92, 0.92, 0.3)),
+    "stop": Layout(Outline.OCTAGON, ((1.0, _WHITE), (0.94, RED)), (0.8, 0.34, 0.22)),
+    "yield": Layout(Outline.TIP_DOWN, ((1.0, _WHITE), (0.965, RED), (0.6, _WHITE))),
+    "priority_road": Layout(Outline.DIAMOND, ((1.0, _DARK), (0.97, _WHITE), (0.72, YELLOW))),
+    "motorway": Layout(Outline.SQUARE, ((1.0, _WHITE), (0.92, _BLUE)), (0.7, 0.7, 0.15)),
+    "warning": _warning((0.09, 0.41, -0.5)),
+    **dict.fromkeys(("fog_warning", "slippery", "curve_left", "curve_right", "queue"), _warning((0.4, 0.4, -0.2))),
+}
+"""Faces by the kind of the sign; an unknown kind is taken for a plain disc."""
+
+UNKNOWN_SIGN = Layout(Outline.DISC, ((1.0, _WHITE),), (0.8, 0.8, 0.0))
+
+
+def layout_of(kind: str) -> Layout:
+    """Face of a kind of sign."""
+    return LAYOUTS.get(kind.removeprefix("xodr."), UNKNOWN_SIGN)
+
+
+_SHARE_STEPS = 0.05
+_SHARE_TABLE = np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in np.arange(-5.0, 5.0 + 1e-9, _SHARE_STEPS)])
+
+
+def _inside(edge_distance: Floats, blur: float) -> Floats:
+    """Share of each pixel within an edge that is blurred [-]."""
+    return np.asarray(np.interp(edge_distance / blur, np.arange(-5.0, 5.0 + 1e-9, _SHARE_STEPS), _SHARE_TABLE))
+
+
+def _reach(layout: Layout, right: Floats, down: Floats) -> Floats:
+    """Size of the outline through each point over that of the face [-], times the face's radius."""
+    directions = layout.outline.value
+    if not directions:
+        return np.hypot(right, down)
+    sides = [right * math.cos(angle) + down * math.sin(angle) for angle in directions]
+    # The map's diameter of a triangle is its side, of which the distance of a side from the middle is 1/√12; that of a
+    # diamond its diagonal.
+    per_radius = {Outline.TIP_UP: math.sqrt(3.0), Outline.TIP_DOWN: math.sqrt(3.0), Outline.DIAMOND: math.sqrt(2.0)}
+    return np.asarray(np.max(sides, axis=0) * per_radius.get(layout.outline, 1.0))
+
+
+def face_maps(
+    layout: Layout, right: Floats, down: Floats, radius: float, blur: float, narrowed: float
+) -> tuple[Floats, Floats, Floats | None]:
+    """Share of each pixel that a face covers, its reflectance there times that, and the share of its symbol's box.
+
+    Takes `right`, `down` (n,) [px], `radius` [px], `blur` [px].
+    """
+    if layout.outline in (Outline.TIP_UP, Outline.TIP_DOWN):
+        # The map's height is that of the middle between tip and base, a quarter of the inscribed circle off its middle.
+        down = down + radius * (1.0 if layout.outline is Outline.TIP_DOWN else -1.0) / math.sqrt(12.0)
+    reach = _reach(layout, right / narrowed, down)
+    covered = _inside(radius - reach, blur)
+    light = np.zeros_like(reach)
+    for (size, reflectance), (_, outer) in zip(layout.areas, ((0.0, 0.0), *layout.areas), strict=False):
+        light += (reflectance - outer) * _inside(size * radius - reach, blur)
+    if layout.symbol is None:
+        return covered, light, None
+    width, height, difference = layout.symbol
+    box = _inside(width * radius - np.abs(right) / narrowed, blur) * _inside(height * radius - np.abs(down), blur)
+    return covered, light + difference * box, box
+
 
 _ROUNDS, MARGIN = 2, 1.35
 """Rounds in which the place is refined, and how far around the face the background is seen, over its radius [-]."""
@@ -35,7 +140,7 @@ UNKNOWN = 1e6
 
 # Place [px], relative size and blur [px].
 _LEAST, _MOST = np.array([-1.5, -1.5, 0.9, 0.3]), np.array([1.5, 1.5, 1.1, 2.0])
-LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
+_LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
 """Place [px], relative size and blur [px] by detection, map and distance, and their standard deviations. The blur has
 the pixels' own size in it."""
 
@@ -63,7 +168,7 @@ class Face:
         return len(self.layout.areas) == 1
 
     def columns(self, right: Floats, down: Floats, state: Floats) -> Floats:
-        """What the picture is a sum of: face, background and its slopes, reflectance, symbol; state as in `LOOSE`."""
+        """What the picture is a sum of: face, background and its slopes, reflectance, symbol; state as in `_LOOSE`."""
         u, v, size, blur = state.tolist()
         radius, blur = size * self.radius, max(blur, 0.2)
         covered, shine, box = face_maps(self.layout, right - u, down - v, radius, blur, self.narrowed)
@@ -113,10 +218,10 @@ def face_light(
     if picked.size < 20:
         return None
     right, down, seen = right[picked], down[picked], light.ravel()[picked].astype(np.float64)
-    state, weight = LOOSE[0], np.full(picked.size, _FIRST_NOISE**-2.0)
+    state, weight = _LOOSE[0], np.full(picked.size, _FIRST_NOISE**-2.0)
     face = Face(layout, radius, narrowed)
     for _ in range(_ROUNDS):
-        fit = _placed(seen, right, down, face, state, weight, LOOSE)
+        fit = _placed(seen, right, down, face, state, weight, _LOOSE)
         weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep), fit.state
     weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep)
     fit = _placed(seen, right, down, face, state, weight, (state, _PLACED))

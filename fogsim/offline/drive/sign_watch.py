@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.estimators.signs.regions import PoseDeviation
-from fogsim.estimators.signs.track import SignTrack
+from fogsim.estimators.signs.watch import SignTrack, sign_looks
 from fogsim.estimators.signs.watch import SignWatch as Watch
-from fogsim.estimators.signs.watch import sign_looks
 from fogsim.offline.drive.sign_file import SignFile, load_sign_file
 from fogsim.offline.drive.track_file import GeographicPose, Track, load_track, metres_per_radian
 from fogsim.offline.image_files import Pixels

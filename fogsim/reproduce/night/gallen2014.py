@@ -13,12 +13,16 @@ from fogsim.calibration.halo_calibration import measure_halo_threshold
 from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
 from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references
 from fogsim.estimators import make
-from fogsim.estimators.night.cells import cell_means, cell_size
 from fogsim.estimators.night.gallen2014 import DENSE, LIGHT
 from fogsim.estimators.night.gallen2014_veil import BANDS
 from fogsim.estimators.night.halos import PUBLISHED, HaloThreshold, HaloWatch, largest_sharpness, mean_steepness
-from fogsim.estimators.night.references import VeilReferences
-from fogsim.estimators.night.veil_correlation import VeilTemplates, visibility_by_parabola
+from fogsim.estimators.night.veil_correlation import (
+    VeilReferences,
+    VeilTemplates,
+    cell_means,
+    cell_size,
+    visibility_by_parabola,
+)
 from fogsim.lighting.beams import low_beam
 from fogsim.reproduce.night.gallen2014_picture import picture
 from fogsim.reproduce.night.limits import limits

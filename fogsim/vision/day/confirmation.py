@@ -11,9 +11,17 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
-from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
-from fogsim.vision.day.second_opinion import refused
-from fogsim.vision.day.verdict import CLEAR, DISAGREE, WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.day.second_opinion import (
+    CLEAR,
+    DISAGREE,
+    STANDS_OUT,
+    WIDEST,
+    DayVerdict,
+    agree,
+    refused,
+    stands_out,
+    verdict_of,
+)
 from fogsim.vision.lines.horizon import Horizon, levelled
 
 PERIOD, SOON = 10.0, 1.0

@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.day.bin_kernels import RowBins
 from fogsim.vision.day.evidence_kernels import evidence_grid
-from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
-from fogsim.vision.day.response_curves import curves_of
-from fogsim.vision.day.row_bins import row_bins
-from fogsim.vision.day.row_data import read_rows
-from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, fill_columns
+from fogsim.vision.day.row_data import RowBins, curves_of, read_rows, row_bins
+from fogsim.vision.day.row_kernels import (
+    AIRLIGHT,
+    COLUMNS,
+    CUT_CHANCE,
+    LIGHTS,
+    SURFACES,
+    RowData,
+    contrast_across,
+    fill_columns,
+    lights_chances,
+)
 from fogsim.vision.lines.horizon import Horizon
 
 Floats = NDArray[np.float64]

@@ -1,18 +1,182 @@
-"""What rows of an image show, under each response that the camera may have."""
+"""Bins of rows of an image, and what they show under each response that the camera may have."""
 
 import math
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.camera import Camera
-from fogsim.vision.day.bin_kernels import RowBins, bin_medians
-from fogsim.vision.day.response_curves import POINTS, curves_of
-from fogsim.vision.day.row_bins import SKY_WIDTH
+from fogsim.core.jit import kernel
+from fogsim.values.camera import Camera, Response
+from fogsim.values.camera_response import exposure_of, respond
 from fogsim.vision.day.row_kernels import RowData
+from fogsim.vision.light.pixel_kernels import even_column
 
 Floats = NDArray[np.float64]
+
+_POINTS = 1025
+"""Signals, evenly from 0 to 1, at which a curve is tabulated."""
+
+MOST_SLOPE = 12.0
+"""Most light per signal that a curve is taken to have [-]: the ends of S-curves are flat."""
+
+STATED = 0.45
+"""Chance that a camera has the response that its description states [-]."""
+
+_OTHERS = {
+    "srgb": 0.12,
+    "s .5": 0.15,
+    "s 1": 0.07,
+    "knee .8": 0.1,
+    "knee 2.2": 0.06,
+    "film 1": 0.06,
+    "film": 0.1,
+    "2.5": 0.08,
+    "1.8": 0.05,
+}
+"""How likely the other curves are, before they are scaled to the rest of 1 [-]: sRGB, S-curves over it, soft
+shoulders, a film curve and powers."""
+
+_OTHER_LINEAR = 0.02
+"""The same for light itself [-]."""
+
+
+class Curves(NamedTuple):
+    """Inverse response curves."""
+
+    light: Floats  # Light behind evenly spaced signals, relative to full scale
+    slope: Floats  # Its derivative by the signal
+    chance: Floats  # (curves,): How likely each is; their sum is 1
+
+
+@lru_cache(maxsize=8)
+def curves_of(camera: Camera) -> Curves:
+    """Curves that a camera may have, the stated one first."""
+    signal = np.linspace(0.0, 1.0, _POINTS)
+    others = (
+        dict(_OTHERS) if camera.response is not Response.SRGB else {n: c for n, c in _OTHERS.items() if n != "srgb"}
+    )
+    if camera.response is not Response.LINEAR:
+        others["linear"] = _OTHER_LINEAR
+    light = [exposure_of(signal, camera.response, camera.black_level)]
+    light += [_inverse(name, signal) for name in others]
+    weights = np.array(list(others.values()))
+    slope = np.clip(np.gradient(np.array(light), signal, axis=1), 1.0 / MOST_SLOPE, MOST_SLOPE)
+    return Curves(np.array(light), slope, np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum()]))
+
+
+_WHITE, BRIGHT = 7.3, 0.95
+"""Light at which a film curve reaches full scale that is not scaled to do so at 1, and signal from which on its light
+counts as full scale [-]."""
+
+
+def _inverse(name: str, signal: Floats) -> Floats:
+    light = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 4000)])
+    srgb = respond(light, Response.SRGB)
+    kind, _, number = name.partition(" ")
+    if kind == "s":
+        out = srgb + float(number) * (srgb * srgb * (3.0 - 2.0 * srgb) - srgb)
+    elif kind == "knee":
+        # The eye's and many sensors' saturation: 1 − exp(−a light).
+        bent = (1.0 - np.exp(-float(number) * light)) / (1.0 - np.exp(-float(number)))
+        out = respond(bent, Response.SRGB)
+    elif kind == "film":
+        # Scaled to full scale at its end, or as cameras use it: there hardly anything is so bright.
+        light = light if number else _WHITE * light
+        bent = light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)
+        out = respond(bent / bent[-1], Response.SRGB)
+        light = np.minimum(light / np.interp(BRIGHT, out, light), 1.0)
+    elif kind == "linear":
+        out = light
+    elif kind == "srgb":
+        out = srgb
+    else:
+        out = light ** (1.0 / float(kind))
+    return np.asarray(np.interp(signal, out, light))
+
+
+Ints = NDArray[np.int64]
+
+_SKY_SHARE, _SKY_REACH = 7, 0.012
+"""Part of a row of sky (one in so many) that is at least seen, and half the width of its pixel values, relative [-]."""
+
+_MOST_COLUMNS, _MOST_ROWS = 80, 4
+"""Most pixels of a row, and rows of a bin, that are read."""
+
+_TAIL = 0.04
+"""Share of the pixels of a strip beyond either level whose difference is its contrast [-]."""
+
+
+class RowBins(NamedTuple):
+    """Bins of rows, the highest first."""
+
+    # first, last (n,) int64: rows
+    first: Ints
+    last: Ints
+    # left, right (n,) int64: first and last columns
+    left: Ints
+    right: Ints
+    # outer_left, outer_right (n,) int64: the same of a wider strip of road, over which contrast is looked for
+    outer_left: Ints
+    outer_right: Ints
+
+
+@kernel
+def _bright_part(seen: Floats) -> tuple[float, float]:
+    """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it (`seen` (n,))."""
+    count = seen.size
+    centre = seen[count - 1 - count // _SKY_SHARE]
+    spread = seen[count - 1 - count // 20] - seen[count - 1 - count // 3]
+    reach = max(_SKY_REACH * centre, min(1.5 * spread, 3.0 * _SKY_REACH * centre))
+    apart = 0.0
+    for _ in range(4):
+        total, kept, apart = 0.0, 0, 0.0
+        for value in seen:
+            if abs(value - centre) <= reach:
+                total += value
+                apart += abs(value - centre)
+                kept += 1
+        centre, apart = total / max(kept, 1), apart / max(kept, 1)
+    return centre, apart
+
+
+@kernel
+def _bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, out: Floats) -> None:
+    """Median of each bin, and the median distance from it [pixel values].
+
+    Takes `image` (rows, cols, channels) uint8, `out` (3, n).
+    """
+    values = np.empty(_MOST_COLUMNS * _MOST_ROWS)
+    for i in range(bins.first.size):
+        rows = min(bins.last[i] - bins.first[i] + 1, _MOST_ROWS)
+        columns = min(bins.right[i] - bins.left[i] + 1, _MOST_COLUMNS)
+        count = 0
+        for a in range(rows):
+            row = bins.first[i] + (2 * a + 1) * (bins.last[i] - bins.first[i] + 1) // (2 * rows)
+            for b in range(columns):
+                column = even_column(b, columns, bins.left[i] - 0.5, bins.right[i] + 0.5)
+                values[count] = image[row, column, channel]
+                count += 1
+        seen = np.sort(values[:count])
+        middle = 0.5 * (seen[(count - 1) // 2] + seen[count // 2])
+        apart = np.sort(np.abs(seen - middle))
+        # Of values in whole levels the median jumps: the mean of the middle half stands for it.
+        quarter = count // 4
+        out[0, i] = seen[quarter : count - quarter].mean()
+        out[1, i] = apart[count // 2]
+        if bins.last[i] < sky_end:
+            # Trees and houses hide sky on both sides: what is alike near the brightest counts.
+            out[0, i], out[1, i] = _bright_part(seen)
+        row = (bins.first[i] + bins.last[i]) // 2
+        count = min(bins.outer_right[i] - bins.outer_left[i] + 1, _MOST_COLUMNS)
+        for b in range(count):
+            column = even_column(b, count, bins.outer_left[i] - 0.5, bins.outer_right[i] + 0.5)
+            values[b] = image[row, column, channel]
+        seen = np.sort(values[:count])
+        tail = int(_TAIL * count)
+        out[2, i] = seen[count - 1 - tail] - seen[tail]
+
 
 _NOISE, _OF_SCATTER, _OF_SLOPE = 0.45 / 255.0, 0.25, 0.15
 """Noise of a bin's signal: of full scale, of its pixels' scatter, and of its change by row [-]."""
@@ -36,16 +200,16 @@ _WALKS = np.array([[0.015], [0.04], [0.1]])
 def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float) -> RowData:
     """Read the bins of an image (`image` (rows, cols, channels) uint8)."""
     found = np.empty((3, bins.first.size))
-    wide = np.flatnonzero(bins.right - bins.left < 0.5 * SKY_WIDTH * camera.width)
+    wide = np.flatnonzero(bins.right - bins.left < 0.5 * _SKY_WIDTH * camera.width)
     sky_end = int(bins.first[wide[0]]) if wide.size else 0
-    bin_medians(image, bins, image.shape[2] // 2, sky_end, found)
+    _bin_medians(image, bins, image.shape[2] // 2, sky_end, found)
     signal, scatter, across = found / (2**camera.bits - 1)
     middle = 0.5 * (bins.first + bins.last)
     by_row = np.zeros(signal.size)
     by_row[1:-1] = (signal[2:] - signal[:-2]) / (middle[2:] - middle[:-2])
     curves = curves_of(camera)
-    place = np.clip(signal, 0.0, 1.0) * (POINTS - 1)
-    low = np.minimum(place.astype(np.int64), POINTS - 2)
+    place = np.clip(signal, 0.0, 1.0) * (_POINTS - 1)
+    low = np.minimum(place.astype(np.int64), _POINTS - 2)
     share = place - low
     light, slope = (table[:, low] * (1.0 - share) + table[:, low + 1] * share for table in (curves.light, curves.slope))
     noise = np.sqrt(_NOISE**2 + (_OF_SCATTER * scatter) ** 2 + (_OF_SLOPE * by_row) ** 2)
@@ -86,3 +250,51 @@ def _free(signal: Floats, noise: Floats, clipped: NDArray[np.bool_]) -> Floats:
     to_end = np.cumsum(steps[:, ::-1], axis=1)[:, ::-1]
     ends = np.concatenate([to_end[:, :1], to_end, np.zeros((len(_WALKS), 1))], axis=1)
     return np.asarray(np.logaddexp.reduce(ends, axis=0) - math.log(len(_WALKS)))
+
+
+_SKY_HEIGHT, _SKY_BINS, _SKY_WIDTH = 0.25, 8, 0.56
+"""How far above the horizon sky is read [rad], in how many bins, over what share of the columns."""
+
+_HALF_LANE = 1.15
+"""Half the width of the road's strip [m]."""
+
+_OUTER = 2.4
+"""Half the width of the strip in which contrast is looked for [m]."""
+
+_NEAR_HORIZON, _SINGLE, STEP = 3.2, 6, 0.12
+"""Deviations of the horizon within which rows are read one by one, how many more of them, and the relative height of
+the bins below [-]."""
+
+
+@lru_cache(maxsize=64)
+def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
+    """Lay bins over the image of a camera (`deviation` [px])."""
+    bottom = camera.height - 1
+    around = _NEAR_HORIZON * deviation + 1.0
+    step = max(round(deviation / 2.5), 1)
+    edges = [math.floor(horizon - around)]
+    top = max(math.floor(horizon - _SKY_HEIGHT * camera.focal_length), 0)
+    for edge in horizon - np.geomspace(around, max(horizon - top, around + 2.0), _SKY_BINS + 1)[1:]:
+        if edges[-1] - math.floor(edge) >= 1 and edge >= 0.0:
+            edges.append(math.floor(edge))
+    edges = edges[::-1]
+    while edges[-1] < horizon + around + _SINGLE * step:
+        edges.append(edges[-1] + step)
+    while edges[-1] < bottom:
+        edges.append(edges[-1] + max(math.ceil(STEP * (edges[-1] - horizon)), step))
+    first, last = np.array(edges[:-1]), np.minimum(np.array(edges[1:]) - 1, bottom)
+    kept = (first <= last) & (first >= 0)
+    first, last = first[kept], last[kept]
+    middle, u0 = 0.5 * (first + last), camera.principal_point[0]
+    half = np.where(
+        last < horizon - around,
+        0.5 * _SKY_WIDTH * camera.width,
+        np.maximum(_HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
+    )
+    wider = np.maximum(half, _OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)
+    sides = []
+    for reach in (half, wider):
+        # Of a mirrored camera these are the mirrored columns.
+        sides.append(np.clip(np.ceil(u0 - reach - 1e-6), 0, camera.width - 1).astype(np.int64))
+        sides.append(np.clip(np.floor(u0 + reach + 1e-6), 0, camera.width - 1).astype(np.int64))
+    return RowBins(first.astype(np.int64), last.astype(np.int64), *sides)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_luminance
-from fogsim.vision.light.medians import columns_apart, median, quantile, span_medians
 from fogsim.vision.light.pixel_kernels import Pixels
 
 _BRIGHT_SHARE = 0.75
@@ -40,19 +40,15 @@ _BEAM = 1.15
 _OVERHEAD = 0.08
 """Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
-Strip = tuple[NDArray[np.int64], NDArray[np.int64]]
-
 
 @dataclass(frozen=True, slots=True)
 class _View:
     """Where a camera sees the sky and the near road."""
 
     rows: NDArray[np.int64]  # Rows of the sky, from the top down, and of the road, from near to far
-    # lane, left, right (rows of the road,) int64: first and last column of a strip of the road, the last before the
-    # first where the strip is not seen
-    lane: Strip
-    left: Strip
-    right: Strip
+    # (3, 2, rows of the road) int64: first and last column of the lane and of the strips to its left and right, the
+    # last before the first where one is not seen
+    strips: NDArray[np.int64]
 
 
 def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = None) -> str:
@@ -69,19 +65,61 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     """
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)
-    sky, road = columns_apart(luminance[:-_ROAD_ROWS], _SKY_STEP), luminance[-_ROAD_ROWS:]
-    lane = _row_medians(road, view.lane)
     middle, aside = camera.principal_point[0], _OVERHEAD * camera.focal_length
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
-    overhead = np.ascontiguousarray(luminance[:-_ROAD_ROWS, first:last])
-    hidden = overhead.size == 0 or (lead is not None and lead.distance < _HIDES_ABOVE)
-    above = quantile(sky if hidden else overhead, _BRIGHT_SHARE)
-    if median(lane) > min(above, quantile(sky, _BRIGHT_SHARE)):
-        return "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog"
-    shining = float(np.count_nonzero(sky >= _LAMP)) >= _LAMPS_SHARE * sky.size and median(sky) < _DARK_SKY
-    if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):
-        return "lamps light the sky and the road: this is a daytime method"
-    return ""
+    hidden = first >= min(last, camera.width) or (lead is not None and lead.distance < _HIDES_ABOVE)
+    return _SHOWN[_lit(luminance, view.strips, 0 if hidden else first, 0 if hidden else last)]
+
+
+_SHOWN = (
+    "",
+    "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog",
+    "lamps light the sky and the road: this is a daytime method",
+)
+"""What may show that lamps light the road."""
+
+
+@kernel
+def _lit(luminance: NDArray[np.float32], strips: NDArray[np.int64], first: int, last: int) -> int:
+    """Which of `_SHOWN` the luminance of a view's rows (n, cols) shows, with columns of what is overhead, if any."""
+    sky, lane = _pixels_apart(luminance[:-_ROAD_ROWS]), _row_medians(luminance, strips[0])
+    above = _sorted_quantile(sky, _BRIGHT_SHARE)
+    if last > first:
+        overhead = np.sort(luminance[:-_ROAD_ROWS, first:last].copy().ravel())
+        above = min(above, _sorted_quantile(overhead, _BRIGHT_SHARE))
+    seen = np.sort(lane[~np.isnan(lane)])
+    if seen.size > lane.size // 2 and seen[lane.size // 2] > above:
+        return 1
+    shining = 0
+    while shining < sky.size and sky[sky.size - 1 - shining] >= _LAMP:
+        shining += 1
+    if shining < _LAMPS_SHARE * sky.size or _sorted_quantile(sky, 0.5) >= _DARK_SKY:
+        return 0
+    return 2 if _has_beam(lane, _row_medians(luminance, strips[1]), _row_medians(luminance, strips[2])) else 0
+
+
+@kernel
+def _pixels_apart(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Pixels in every which column from both sides inward, in ascending order: of a mirrored image the same."""
+    cols = rows.shape[1]
+    out, count = np.empty(rows.size, np.float32), 0
+    for row in range(rows.shape[0]):
+        for col in range(0, (cols + 1) // 2, _SKY_STEP):
+            out[count] = rows[row, col]
+            count += 1
+        for col in range(0, cols // 2, _SKY_STEP):
+            out[count] = rows[row, cols - 1 - col]
+            count += 1
+    return np.sort(out[:count])
+
+
+@kernel
+def _sorted_quantile(values: NDArray[np.float32], share: float) -> float:
+    """What a share of ascending numbers lie below, linear between neighbours."""
+    place = share * (values.size - 1)
+    below = int(place)
+    lower, upper = float(values[below]), float(values[min(below + 1, values.size - 1)])
+    return lower + (place - below) * (upper - lower)
 
 
 @functools.lru_cache(maxsize=8)
@@ -92,7 +130,7 @@ def _view_of(camera: Camera) -> _View:
     rows = np.minimum(np.rint(camera.horizon_row + camera.row_distance / distance).astype(np.int64), last)
     sides = ((-_HALF_LANE, _HALF_LANE), (-_ASIDE[1], -_ASIDE[0]), _ASIDE)
     seen = np.concatenate((_sky_rows(camera), np.maximum(rows, 0)))
-    return _View(seen, *(_strip(distance, camera, *side) for side in sides))
+    return _View(seen, np.array([_strip(distance, camera, *side) for side in sides]))
 
 
 def _sky_rows(camera: Camera) -> NDArray[np.int64]:
@@ -103,7 +141,9 @@ def _sky_rows(camera: Camera) -> NDArray[np.int64]:
     return np.unique(np.linspace(top, max(bottom, top), _SKY_ROWS).astype(np.int64))
 
 
-def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: float) -> Strip:
+def _strip(
+    distance: NDArray[np.float64], camera: Camera, left: float, right: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Columns of a strip between two sides [m, positive to the right], at least half of them seen."""
     middle, scale = camera.principal_point[0], camera.focal_length / distance
     first = np.maximum(np.ceil(middle + left * scale), 0.0)
@@ -112,14 +152,24 @@ def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: fl
     return first.astype(np.int64), np.where(seen, last, first - 1.0).astype(np.int64)
 
 
-def _row_medians(road: NDArray[np.float32], strip: Strip) -> NDArray[np.float64]:
-    """Median of each row (rows, cols) of a strip, NaN where it is not seen."""
-    found = span_medians(road, np.ones(road.shape, np.uint8), *strip, road.shape[1], 1)
-    return np.where(found.number > 0, found.luminance, np.nan)
+@kernel
+def _row_medians(luminance: NDArray[np.float32], strip: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Median of each row of a strip of road, NaN where it is not seen (`strip` (2, rows))."""
+    road, out = luminance[-_ROAD_ROWS:], np.full(_ROAD_ROWS, np.nan)
+    for row in range(_ROAD_ROWS):
+        if strip[1, row] >= strip[0, row]:
+            out[row] = np.median(road[row, strip[0, row] : strip[1, row] + 1])
+    return out
 
 
+@kernel
 def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArray[np.float64]) -> bool:
     """Whether the own lane is brighter than both of its sides."""
-    beside = np.maximum(left, right)
-    seen = np.isfinite(lane / np.maximum(beside, 1e-3))
-    return bool(seen.any() and median(lane[seen] / np.maximum(beside[seen], 1e-3)) > _BEAM)
+    ratio, count = np.empty(lane.size), 0
+    for row in range(lane.size):
+        beside = max(left[row], right[row]) if not np.isnan(left[row] + right[row]) else np.nan
+        share = lane[row] / max(beside, 1e-3)
+        if np.isfinite(share) and np.isfinite(beside):
+            ratio[count] = share
+            count += 1
+    return bool(count > 0 and np.median(ratio[:count]) > _BEAM)

@@ -44,7 +44,8 @@ def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
     ordered = np.partition(flat, below)
     lower = float(ordered[below])
     upper = float(ordered[below + 1 :].min()) if below + 1 < flat.size else lower
-    return lower + (place - below) * (upper - lower)
+    share = place - below
+    return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)
 
 
 def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

@@ -64,6 +64,17 @@ def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
 
 
 @kernel
+def part_luminance(image: LinearPixels, first: int, end: int, step: int, left: int, right: int) -> NDArray[np.float32]:
+    """Luminance of every so many rows, and of columns up to the right one [linear grey levels]."""
+    rows, cols = max((end - first + step - 1) // step, 0), max(right - left, 0)
+    out = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            out[row, col] = pixel_luminance(image, first + row * step, left + col)
+    return out
+
+
+@kernel
 def row_luminance(pixels: Pixels, tables: NDArray[np.float32], row: int, line: NDArray[np.float32]) -> None:
     """Luminance of all pixels of a row (`line` (cols,) [linear grey levels])."""
     seen = pixels[row]

@@ -1,5 +1,5 @@
-"""Edges, lines along the road, their vanishing point and the horizon.
+"""Edges, lines along the road, and the horizon.
 
-`edges` (Canny; with Deriche's derivatives in `deriche`) and `row_edges` find edges; `lane_lines`, `gradient_lines`,
-`road_lines` and `segments` are four methods' ways from an image to the `VanishingPoint` of `vanishing_point`.
+`edges` (Canny) and `road_line_kernels` (along single rows) find edges; `vanishing_point`, `road_lines` and `segments`
+find lines and where they meet; `road_course` bends, sags and crests.
 """

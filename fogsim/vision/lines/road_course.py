@@ -3,17 +3,20 @@
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.linear_algebra import inverse_of, matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_course_kernels import (
     BEND,
     COLUMN,
+    KNOTS,
     LIMITS,
     PIECES,
     ROW,
@@ -23,12 +26,110 @@ from fogsim.vision.lines.road_course_kernels import (
     fit_course,
     stripe_middles,
 )
-from fogsim.vision.lines.road_line_kernels import LEAST_TURN, Points, RoadLines
+from fogsim.vision.lines.road_line_kernels import LEAST_TURN, RIDGE, Points, RoadLines, may_lie_on_road, row_points
 from fogsim.vision.lines.road_lines import AGREES, SeenLines, straight_lines
-from fogsim.vision.lines.row_edges import RIDGE, may_lie_on_road, row_points
-from fogsim.vision.lines.sags_ahead import SagsAhead, curvature_covariance, sag_covariance, unseen_sags
 
 Floats = NDArray[np.float64]
+
+SAG_DEVIATION, SAG_LENGTH = 1.0 / 8000.0, 150.0
+"""Standard deviation of vertical curvature where a road is curved [1/m], and the length over which it changes [m].
+Least radii of crests and sags are 5000 … 13 000 m and 2600 … 8800 m on motorways, 3000 … 8000 m and 2000 … 4000 m on
+roads outside towns (RAA 2008, RAL 2012; from memory)."""
+
+BEGINS = 0.05
+"""How likely it is that the road is straight up to a piece, and sags or crests from there on [-]: of a road's length a
+third does, in stretches of 200 to 400 m."""
+
+
+class SagsAhead(NamedTuple):
+    """What is known of vertical curvature ahead, if each piece of road may have some."""
+
+    # (1 + pieces,): Row in which the road's tangent under the camera vanishes [px], and vertical curvature by piece,
+    # positive in a sag [1/m]
+    mean: Floats
+    covariance: Floats  # (1 + pieces, 1 + pieces): Theirs [px², px/m, 1/m²]
+
+
+@kernel
+def row_given(ahead: SagsAhead, sag: Floats) -> tuple[float, float]:
+    """Row in which the tangent vanishes given curvatures, and its variance [px, px²] (`sag` (pieces,) [1/m])."""
+    precision = inverse_of(ahead.covariance[1:, 1:].copy())
+    gain = np.zeros(sag.size)
+    for k in range(sag.size):
+        for j in range(sag.size):
+            gain[j] += ahead.covariance[0, 1 + k] * precision[k, j]
+    apart, shared = 0.0, 0.0
+    for j in range(sag.size):
+        apart += gain[j] * (sag[j] - ahead.mean[1 + j])
+        shared += gain[j] * ahead.covariance[1 + j, 0]
+    return ahead.mean[0] + apart, max(ahead.covariance[0, 0] - shared, 0.0)
+
+
+@kernel
+def cost_given(ahead: SagsAhead, sag: Floats, before: Floats) -> float:
+    """Minus twice the logarithm of how much likelier the lines are if the road is curved so, up to a constant [-].
+
+    What is known of curvature before any lines are seen is not in it: its precision is taken away.
+
+    Takes `sag` (pieces,) [1/m], `before` (pieces, pieces), see `sag_precision`.
+    """
+    precision = inverse_of(ahead.covariance[1:, 1:].copy())
+    return _square(sag - ahead.mean[1:], precision) - _square(sag, before)
+
+
+@kernel
+def _square(values: Floats, precision: Floats) -> float:
+    """Square of a vector's length in standard deviations [-]."""
+    through, total = times(precision, values), 0.0
+    for j in range(values.size):
+        total += values[j] * through[j]
+    return total
+
+
+@kernel
+def sag_from(piece: int, curvature: float) -> Floats:
+    """(pieces,) float64: vertical curvature of a road that is straight up to a piece [1/m] (`curvature` [1/m])."""
+    sag = np.zeros(PIECES)
+    sag[piece:] = curvature
+    return sag
+
+
+@functools.cache
+def sag_precision() -> Floats:
+    """(pieces, pieces) float64: inverse covariance of the curvatures of a curved road [m²]; it is shared."""
+    return inverse_of(sag_covariance())
+
+
+@functools.cache
+def sag_covariance() -> Floats:
+    """(pieces, pieces) float64: covariance of the curvatures of a curved road [1/m²]; it belongs to all who ask."""
+    return _curvature_covariance(SAG_DEVIATION, SAG_LENGTH)
+
+
+def _curvature_covariance(deviation: float, length: float) -> Floats:
+    """(pieces, pieces) float64: covariance of curvatures that change over a length [1/m²].
+
+    Takes `deviation` [1/m], `length` [m].
+    """
+    knots = np.array(KNOTS[:-1])
+    return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / length))
+
+
+def unseen_sags(row: float, deviation: float) -> SagsAhead:
+    """What is known of vertical curvature where no lines are seen (`row`, `deviation` [px])."""
+    covariance = np.zeros((1 + PIECES, 1 + PIECES))
+    covariance[0, 0], covariance[1:, 1:] = deviation**2, sag_covariance()
+    return SagsAhead(np.array([row, *np.zeros(PIECES)]), covariance)
+
+
+@kernel
+def beginning_cost(curvature: float) -> float:
+    """Minus twice the logarithm of how likely a curvature from some piece on is beforehand, but for its density [-].
+
+    Takes `curvature` [1/m].
+    """
+    return (curvature / SAG_DEVIATION) ** 2 - 2.0 * math.log(BEGINS)
+
 
 _BEND_DEVIATION, _BEND_LENGTH = 1.0 / 500.0, 400.0
 """Standard deviation of horizontal curvature where a road is curved [1/m], and the length over which it changes [m]."""
@@ -161,54 +262,85 @@ def _middle(lines: RoadLines) -> float:
 
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
-    unknown, covariance = fit.unknown, fit.covariance
-    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
-    if bent < _SHOWN:
-        unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
-    kept = np.array([ROW, *range(SAG, BEND)])
-    ahead = SagsAhead(unknown[kept] + horizon.row * (kept == ROW), covariance[np.ix_(kept, kept)])
-    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], sag_covariance())
-    flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
-    apart = (unknown - flat)[kept]
-    within = sagging * ahead.covariance + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
-    if sagging < _SHOWN:
-        unknown, share = flat, sagging
-    else:
-        share = 1.0 - sagging
+    bends = _curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH)
+    found = _weighed(fit.unknown, fit.covariance, horizon.row, bends, sag_covariance())
     return RoadCourse(
-        column=camera.principal_point[0] + float(unknown[COLUMN]),
-        row=horizon.row + float(unknown[ROW]),
-        sag=unknown[SAG:BEND].copy(),
-        bend=unknown[BEND:].copy(),
-        covariance=within + share * apart[:, None] * apart[None, :],
-        bend_covariance=covariance[BEND:, BEND:].copy(),
+        column=camera.principal_point[0] + float(found.unknown[COLUMN]),
+        row=horizon.row + float(found.unknown[ROW]),
+        sag=found.unknown[SAG:BEND],
+        bend=found.unknown[BEND:],
+        covariance=found.covariance,
+        bend_covariance=found.bend_covariance,
         lines=fit.lines,
-        ahead=ahead,
+        ahead=found.ahead,
     )
 
 
-def _share(mean: Floats, covariance: Floats, prior: Floats) -> float:
-    """Probability that curvatures are not all 0 (Savage and Dickey's ratio)."""
-    exponent = 0.5 * float(matrix_product(mean, matrix_product(inverse_of(covariance), mean)))
-    logarithm = min(exponent + 0.5 * (_log_determinant(covariance) - _log_determinant(prior)), 50.0)
+class _Weighed(NamedTuple):
+    """A course, straight where it is more likely so, with covariances of `RoadCourse`."""
+
+    unknown: Floats  # See `CourseFit`
+    covariance: Floats
+    bend_covariance: Floats
+    ahead: SagsAhead
+
+
+@kernel
+def _weighed(unknown: Floats, covariance: Floats, row: float, bends: Floats, sags: Floats) -> _Weighed:
+    """Bends, then sags and crests, weighed with none, by what is known of them beforehand (pieces, pieces)."""
+    if _share(unknown, covariance, BEND, bends) < _SHOWN:
+        unknown, covariance = _without(unknown, covariance, BEND)
+    own = covariance[ROW:BEND, ROW:BEND].copy()
+    mean = unknown[ROW:BEND].copy()
+    mean[0] += row
+    sagging = _share(unknown, covariance, SAG, sags)
+    flat, flat_covariance = _without(unknown, covariance, SAG)
+    apart = (unknown - flat)[ROW:BEND]
+    within = sagging * own + (1.0 - sagging) * flat_covariance[ROW:BEND, ROW:BEND]
+    share = 1.0 - sagging
+    if sagging < _SHOWN:
+        unknown, share = flat, sagging
+    within += share * apart.reshape(-1, 1) * apart
+    return _Weighed(unknown.copy(), within, covariance[BEND:, BEND:].copy(), SagsAhead(mean, own))
+
+
+@kernel
+def _share(unknown: Floats, covariance: Floats, first: int, prior: Floats) -> float:
+    """Probability that curvatures, from an unknown on, are not all 0 (Savage and Dickey's ratio)."""
+    mean, own = unknown[first : first + PIECES], covariance[first : first + PIECES, first : first + PIECES].copy()
+    exponent = 0.5 * _square(mean, inverse_of(own))
+    logarithm = min(exponent + 0.5 * (_log_determinant(own) - _log_determinant(prior)), 50.0)
     odds = _CURVED_SHARE / (1.0 - _CURVED_SHARE) * math.exp(logarithm)
     return odds / (1.0 + odds)
 
 
+@kernel
 def _log_determinant(matrix: Floats) -> float:
     """Logarithm of the determinant of a positive definite matrix, by elimination."""
     left, total = matrix.copy(), 0.0
     for i in range(len(left)):
         total += math.log(max(left[i, i], 1e-300))
-        left[i + 1 :, i + 1 :] -= left[i + 1 :, i, None] * (left[i, None, i + 1 :] / left[i, i])
+        for a in range(i + 1, len(left)):
+            for b in range(i + 1, len(left)):
+                left[a, b] -= left[a, i] * (left[i, b] / left[i, i])
     return total
 
 
-def _without(unknown: Floats, covariance: Floats, which: slice) -> tuple[Floats, Floats]:
-    """Condition a normal distribution on some unknowns' being 0."""
-    gain = matrix_product(covariance[:, which], inverse_of(np.ascontiguousarray(covariance[which, which])))
-    rest, spread = unknown - matrix_product(gain, unknown[which]), covariance - matrix_product(gain, covariance[which])
-    rest[which], spread[which], spread[:, which] = 0.0, 0.0, 0.0
+@kernel
+def _without(unknown: Floats, covariance: Floats, first: int) -> tuple[Floats, Floats]:
+    """Condition a normal distribution on curvatures' being 0, from an unknown on."""
+    end = first + PIECES
+    inverse = inverse_of(covariance[first:end, first:end].copy())
+    rest, spread = unknown.copy(), covariance.copy()
+    for a in range(unknown.size):
+        for k in range(PIECES):
+            gain = 0.0
+            for j in range(PIECES):
+                gain += covariance[a, first + j] * inverse[j, k]
+            rest[a] -= gain * unknown[first + k]
+            for b in range(unknown.size):
+                spread[a, b] -= gain * covariance[first + k, b]
+    rest[first:end], spread[first:end], spread[:, first:end] = 0.0, 0.0, 0.0
     return rest, spread
 
 
@@ -230,6 +362,6 @@ def _precision(camera: Camera, row_deviation: float) -> Floats:
     """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
     out = np.zeros((SLOPE, SLOPE))
     out[COLUMN, COLUMN], out[ROW, ROW] = (_TANGENT * camera.focal_length) ** -2, row_deviation**-2
-    out[SAG:BEND, SAG:BEND] = inverse_of(sag_covariance())
-    out[BEND:, BEND:] = inverse_of(curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
+    out[SAG:BEND, SAG:BEND] = sag_precision()
+    out[BEND:, BEND:] = inverse_of(_curvature_covariance(_BEND_DEVIATION, _BEND_LENGTH))
     return out

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, times
-from fogsim.vision.lines.road_line_kernels import LEAST_POINTS, LEAST_SCATTER, Points, RoadLines
-from fogsim.vision.lines.row_edges import FALLING, RIDGE, RISING
+from fogsim.vision.lines.road_line_kernels import FALLING, LEAST_POINTS, LEAST_SCATTER, RIDGE, RISING, Points, RoadLines
 
 Floats = NDArray[np.float64]
 

@@ -17,9 +17,10 @@ from fogsim.vision.lines.road_line_kernels import (
     RoadLines,
     fit_road_lines,
     hough_road_lines,
+    may_lie_on_road,
     refitted_lines,
+    row_points,
 )
-from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
 from fogsim.vision.lines.vanishing_point import VanishingPoint, all_pairs, crossings, sloped_lines, supports
 
 Floats = NDArray[np.float64]
@@ -27,7 +28,7 @@ Floats = NDArray[np.float64]
 _MOST_ROWS = 100
 """Rows that are looked at, evenly from below the horizon to the image's bottom."""
 
-CLEAR_OF_HORIZON = 0.025
+_CLEAR_OF_HORIZON = 0.025
 """Angle below the horizon from which lines are looked at: 50 to 60 m ahead [rad]."""
 
 _YAW, _YAW_STEP = math.radians(4.0), 0.006
@@ -57,7 +58,7 @@ class SeenLines(NamedTuple):
     """Lines along a road, before it is asked where they meet."""
 
     points: Points  # Points of edges, from the horizon downward
-    lines: RoadLines  # Straight lines through those from `CLEAR_OF_HORIZON` downward
+    lines: RoadLines  # Straight lines through those from `_CLEAR_OF_HORIZON` downward
 
 
 def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLines | None:
@@ -172,4 +173,4 @@ def _rows(camera: Camera, horizon: Horizon) -> NDArray[np.int64]:
 
 
 def _first_row(camera: Camera, horizon: Horizon) -> int:
-    return math.ceil(horizon.row + max(CLEAR_OF_HORIZON * camera.focal_length, 8.0))
+    return math.ceil(horizon.row + max(_CLEAR_OF_HORIZON * camera.focal_length, 8.0))

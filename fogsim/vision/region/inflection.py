@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import matrix_product
+from fogsim.vision.region.law import row_transmittance
 from fogsim.vision.region.profile import RoadCurve, decreasing
 
 Floats = NDArray[np.float64]
@@ -63,7 +65,7 @@ def inflection_parameters(
     return 2.0 * below_horizon / row_distance, luminance + (math.e**2 - 1.0) * change, luminance - change
 
 
-def printed_parameters(
+def _printed_parameters(
     below_horizon: Floats, luminance: Floats, gradient: Floats, row_distance: float
 ) -> tuple[Floats, Floats, Floats]:
     """Fog from the row of the inflection with negru2013's eqs. 17 and 18 as printed, whose signs are wrong.
@@ -80,7 +82,7 @@ def printed_parameters(
 
 def printed_inflection(curve: RoadCurve) -> FogModel | None:
     """As `best_inflection`, with the equations as the paper prints them."""
-    return best_inflection(curve, printed_parameters)
+    return best_inflection(curve, _printed_parameters)
 
 
 def best_inflection(curve: RoadCurve, parameters: Parameters = inflection_parameters) -> FogModel | None:
@@ -127,3 +129,121 @@ def _bandwidth(slope: Floats, row: int) -> int:
     while last + 1 < slope.size and steep[last + 1]:
         last += 1
     return last - first + 1
+
+
+_CANDIDATES, _HIGHEST = 120, 0.7
+"""Candidates between rows, evenly in ln(v − v_h), and the first of them below the horizon [px]."""
+
+_ABOUT = 3.5
+"""Ratio of v − v_h, either way, to the candidate's, of the rows that its level and slope are taken from [-]."""
+
+_FEWEST_ROWS = 4.0
+"""Rows that a level and a slope need at least."""
+
+
+def subpixel_inflections(curve: RoadCurve, luminance: Floats, *, printed: bool = False) -> tuple[Floats, Floats]:
+    """Inflections of some curves to a fraction of a row.
+
+    As negru2013 section IV.B.c, but for candidates between rows as well: for each of them level and slope are those of
+    least squares of Koschmieder's law over the rows about it, R and A follow by eqs. 17 and 18 (`printed`: as printed),
+    and the candidate whose model leaves the least of the whole curve is the inflection.
+
+    Returns v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none
+    (m,). Takes `luminance` (n, m) [linear grey levels].
+    """
+    light = np.ascontiguousarray(luminance)
+    return _inflections(curve.below_horizon, curve.distance, curve.weight, light, curve.row_distance, printed)
+
+
+@kernel
+def _inflections(
+    below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, printed: bool
+) -> tuple[Floats, Floats]:
+    """`subpixel_inflections` of curves over the same rows (n,)."""
+    top = max(below[-1], 2.0 * _HIGHEST)
+    step = math.log(top / _HIGHEST) / (_CANDIDATES - 1)
+    at, error = _HIGHEST * np.exp(step * np.arange(_CANDIDATES)), np.empty((_CANDIDATES, luminance.shape[1]))
+    squares, light = np.zeros(luminance.shape[1]), np.zeros(luminance.shape[1])
+    for i in range(below.size):
+        for m in range(light.size):
+            light[m] += weight[i] * luminance[i, m]
+            squares[m] += weight[i] * luminance[i, m] ** 2
+    shape = np.zeros(below.size)
+    for candidate in range(_CANDIDATES):
+        for i in range(below.size):
+            if weight[i] > 0.0:
+                slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
+                shape[i] = row_transmittance(2.0 * at[candidate] * slant, below[i])
+        if at[candidate] <= below[-1] / 1.2:
+            seen = (below, weight, shape, luminance, light, squares)
+            _add_errors(*seen, at[candidate], printed, error[candidate])
+        else:
+            error[candidate] = np.inf
+    return _least(at, error, weight.sum())
+
+
+@kernel
+def _add_errors(
+    below: Floats,
+    weight: Floats,
+    shape: Floats,
+    luminance: Floats,
+    light: Floats,
+    squares: Floats,
+    at: float,
+    printed: bool,
+    error: Floats,
+) -> None:
+    """What the models of one candidate leave of each curve; infinite where they cannot be fog's."""
+    curves = luminance.shape[1]
+    near_light, near_both, both = np.zeros(curves), np.zeros(curves), np.zeros(curves)
+    count, by_shape, by_square, total, shapes, shape_squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(below.size):
+        if weight[i] == 0.0:
+            continue
+        about = weight[i] if at / _ABOUT - 1.0 <= below[i] <= _ABOUT * at + 1.0 else 0.0
+        count, by_shape, by_square = count + about, by_shape + about * shape[i], by_square + about * shape[i] ** 2
+        total, shapes = total + weight[i], shapes + shape[i] * weight[i]
+        shape_squares += shape[i] ** 2 * weight[i]
+        for m in range(curves):
+            near_light[m] += about * luminance[i, m]
+            near_both[m] += about * shape[i] * luminance[i, m]
+            both[m] += shape[i] * weight[i] * luminance[i, m]
+    turn = count * by_square - by_shape**2
+    for m in range(curves):
+        rise = (count * near_both[m] - by_shape * near_light[m]) / max(turn, 1e-12)
+        start = (near_light[m] - by_shape * rise) / max(count, 1.0)
+        # At the inflection itself kd = 2: the level is A + (R − A) e⁻², the slope (R − A) e⁻² 2 / (v_i − v_h).
+        part = math.exp(-2.0) * rise
+        road, airlight = _road_and_airlight(start + part, part, printed)
+        drop = airlight - road
+        left = squares[m] - 2.0 * airlight * light[m] + 2.0 * drop * both[m]
+        left += airlight**2 * total - 2.0 * airlight * drop * shapes + drop**2 * shape_squares
+        error[m] = left if count >= _FEWEST_ROWS and turn > 1e-9 and drop > 0.0 else np.inf
+
+
+@kernel
+def _road_and_airlight(level: float, change: float, printed: bool) -> tuple[float, float]:
+    """R and A of `inflection_parameters`, or of `_printed_parameters`, for a change X."""
+    square = math.e**2
+    if printed:
+        return level - (1.0 - square) * square * change, level + change
+    return level + (square - 1.0) * change, level - change
+
+
+@kernel
+def _least(at: Floats, error: Floats, total: float) -> tuple[Floats, Floats]:
+    """Places of the least errors, by a parabola through three candidates."""
+    place, square = np.full(error.shape[1], np.nan), np.full(error.shape[1], np.nan)
+    for m in range(error.shape[1]):
+        best, offset = int(np.argmin(error[:, m])), 0.0
+        if not np.isfinite(error[best, m]):
+            continue
+        if 0 < best < at.size - 1:
+            before, here, behind = error[best - 1, m], error[best, m], error[best + 1, m]
+            bend = before - 2.0 * here + behind
+            if np.isfinite(before) and np.isfinite(behind) and bend > 0.0:
+                offset = 0.5 * (before - behind) / bend
+        place[m] = at[best] * (at[1] / at[0]) ** min(max(offset, -0.5), 0.5)
+        square[m] = max(error[best, m], 0.0) / max(total, 1.0)
+    return place, square

@@ -1,14 +1,20 @@
-"""How Koschmieder's law looks over the rows of a flat road, and how far a curve of luminance is from it."""
+"""Koschmieder's law over the rows of a flat road, and whether a curve of luminance follows it."""
 
+import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.linear_algebra import matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import straight_line
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.light.medians import median, quantile
 from fogsim.vision.region.profile import RoadCurve, path_lengths
+from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +34,7 @@ _SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
-@dataclass(frozen=True, slots=True)
-class LawFit:
+class _LawFit(NamedTuple):
     """Road and airlight of an extinction, by least squares over a curve."""
 
     # airlight, road: A and R [linear grey levels]
@@ -56,20 +61,45 @@ def slants(curve: RoadCurve) -> Floats:
     return np.asarray(distance * below / curve.row_distance)
 
 
-def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
+def law_fit(curve: RoadCurve, extinction: float) -> _LawFit:
     """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
-    optical = extinction * curve.row_distance * slants(curve)
-    shape, weight = transmittance(optical, curve.below_horizon), curve.weight
-    total = max(float(weight.sum()), 1e-9)
-    mean_shape = float(matrix_product(weight, shape)) / total
-    mean = float(matrix_product(weight, curve.luminance)) / total
-    centred = shape - mean_shape
-    square = float(matrix_product(weight, centred**2))
-    drop = -float(matrix_product(weight * centred, curve.luminance)) / max(square, 1e-12)
+    return _law_fit(curve.below_horizon, curve.distance, curve.weight, curve.luminance, curve.row_distance, extinction)
+
+
+@kernel
+def _law_fit(
+    below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, extinction: float
+) -> _LawFit:
+    shape, total = np.empty(below.size), max(weight.sum(), 1e-9)
+    mean, mean_shape = 0.0, 0.0
+    for i in range(below.size):
+        slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
+        shape[i] = row_transmittance(extinction * row_distance * slant, below[i])
+        mean_shape += weight[i] * shape[i] / total
+        mean += weight[i] * luminance[i] / total
+    square, both = 0.0, 0.0
+    for i in range(below.size):
+        centred = shape[i] - mean_shape
+        square += weight[i] * centred * centred
+        both += weight[i] * centred * luminance[i]
+    drop = -both / max(square, 1e-12)
     airlight = mean + drop * mean_shape
-    model = airlight - drop * shape
-    left = math.sqrt(float(matrix_product(weight, (curve.luminance - model) ** 2)) / total)
-    return LawFit(airlight, airlight - drop, model, left / drop if drop > 0.0 else math.inf)
+    model, left = airlight - drop * shape, 0.0
+    for i in range(below.size):
+        left += weight[i] * (luminance[i] - model[i]) ** 2
+    misfit = math.sqrt(left / total) / drop if drop > 0.0 else np.inf
+    return _LawFit(airlight, airlight - drop, model, misfit)
+
+
+@kernel
+def row_transmittance(optical: float, below: float) -> float:
+    """`transmittance` of one row."""
+    total = 0.0
+    for j in range(3):
+        end = below + 0.5 * (j - 1)
+        if end > _SMALLEST:
+            total += (4.0 if j == 1 else 1.0) * math.exp(-optical / end)
+    return total / 6.0
 
 
 def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
@@ -88,7 +118,9 @@ def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
     return np.asarray(model[:, None] + residual[:, None] * _signs()[block])
 
 
+@functools.cache
 def _signs() -> Floats:
+    """(blocks, patterns); it is shared."""
     return np.random.default_rng(2015).choice([-1.0, 1.0], (_BLOCKS, _PATTERNS))
 
 
@@ -119,4 +151,87 @@ def spread(values: Floats, about: float) -> float:
     apart = np.abs(values[np.isfinite(values)] - about)
     if apart.size < 2:
         return math.inf
-    return float(max(1.4826 * np.median(apart), 0.6 * np.quantile(apart, 0.9)))
+    return max(1.4826 * median(apart), 0.6 * quantile(apart, 0.9))
+
+
+_NEAR_HORIZON = 4.0
+"""A region that ends this close below the horizon has seen the whole road [px]."""
+
+_RISE = 0.5
+"""Share of the contrast of road and airlight that a road in clear air does not brighten by [-]."""
+
+_MAX_MISFIT = 0.12
+"""What Koschmieder's law may leave of a curve, over the contrast of road and airlight [-]."""
+
+_AIRLIGHT_OFF = 0.3
+"""By how much the law's airlight may differ from the sky, over their contrast to the road [-]."""
+
+_STRAIGHT = 0.018
+"""Deviation from a straight line, over its rise, below which a curve is a painted ramp [-]; fog leaves 0.028."""
+
+_AS_STRAIGHT = 1.05
+"""Deviation from a straight line, over that from the law, up to which a curve may as well be a ramp [-]."""
+
+_SURE_OF_FOG = 1.0
+"""Least k in its standard deviations that is reported as fog [-]."""
+
+_CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
+"""Extinction that an estimate which may as well be none must surely be below to say "little fog" [1/m]."""
+
+
+def seen_up_to(curve: RoadCurve) -> float:
+    """Topmost row that is seen, below the horizon [px]."""
+    seen = np.flatnonzero((curve.weight > 0.0) | (curve.luminance >= SATURATED))
+    if seen.size < MIN_ROWS // 2:
+        raise CannotTellError("no road is seen")
+    top = float(curve.below_horizon[seen[0]])
+    if top > _NEAR_HORIZON:
+        raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
+    return top
+
+
+def is_clear(curve: RoadCurve, road: RoadImage) -> bool:
+    """Whether a road hardly brightens as far as it is seen."""
+    seen = curve.luminance[(curve.weight > 0.0) & (curve.below_horizon >= 1.0)]
+    return seen.size >= MIN_ROWS // 2 and bool(np.median(seen[:3]) <= road.road + _RISE * road.contrast)
+
+
+def check_law(curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[float, float]:
+    """Airlight and luminance of the road that an extinction makes of a curve, if Koschmieder's law is what it follows.
+
+    Returns A and R [linear grey levels] (float, float). Takes `extinction` [1/m].
+    """
+    fit = law_fit(curve, extinction)
+    if fit.airlight - fit.road < max(MIN_CONTRAST, 0.05 * fit.airlight):
+        raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
+    excess = fit.airlight - road.airlight
+    bright = excess > _AIRLIGHT_OFF * road.contrast and road.airlight < SATURATED
+    if fit.misfit > _MAX_MISFIT or excess < -_AIRLIGHT_OFF * road.contrast or bright:
+        raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
+    seen = (curve.weight > 0.0) & (curve.below_horizon > 0.0)
+    if int(seen.sum()) >= MIN_ROWS:
+        rows, light = curve.below_horizon[seen], curve.luminance[seen]
+        slope, start = straight_line(rows, light)
+        rise = abs(slope) * float(np.ptp(rows))
+        left = float(np.sqrt(np.mean((light - start - slope * rows) ** 2)))
+        by_law = float(np.sqrt(np.mean((light - fit.model[seen]) ** 2)))
+        if slope < 0.0 and left < max(_STRAIGHT * rise, _AS_STRAIGHT * by_law):
+            raise CannotTellError("it brightens evenly from row to row, as no fog does")
+    return fit.airlight, fit.road
+
+
+def fog_or_clear(extinction: float, deviation: float) -> tuple[float, float]:
+    """Extinction and standard deviation [1/m], 0 where it may be clear air; CannotTellError if that may also be fog."""
+    if extinction >= _SURE_OF_FOG * deviation:
+        return extinction, deviation
+    if extinction + _SURE_OF_FOG * deviation > _CLEAR:
+        raise CannotTellError("the extinction is not observable: too little road is seen")
+    return 0.0, math.hypot(extinction, deviation)
+
+
+def detection_limit(top: float, horizon_deviation: float, row_distance: float) -> float:
+    """Standard deviation of "no fog" where no inflection was seen: one needs a row on either side [1/m].
+
+    Takes `top` [px], `horizon_deviation` [px], `row_distance` [px·m].
+    """
+    return 2.0 / row_distance * math.hypot(max(top, 1.0) + 1.0, horizon_deviation)

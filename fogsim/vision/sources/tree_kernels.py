@@ -106,7 +106,7 @@ def find_components(
     return label, measures[: count if pixels < most_pixels else 0]
 
 
-class Flood(NamedTuple):
+class _Flood(NamedTuple):
     """What flooding from sources finds, level by level."""
 
     # What is known of each source's component at each level; of merged ones, that of the component it is part of
@@ -251,7 +251,7 @@ def flood(
     sources: NDArray[np.float64],
     of_level: NDArray[np.int64],
     limits: Limits,
-) -> Flood:
+) -> _Flood:
     """Let components grow from sources while the threshold falls, until they merge, leak, or have all been followed.
 
     Takes `level` (rows, cols) uint8, `label` (rows, cols) int32, `of_level` (256,) int64.
@@ -288,4 +288,4 @@ def flood(
             last[:] = np.minimum(last, at - 1)
         if front.used[0] == limits.budget or ended.all():
             break
-    return Flood(nodes, last, parent, leaked)
+    return _Flood(nodes, last, parent, leaked)

@@ -10,14 +10,66 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
+from fogsim.vision.light.luminance import linear_table
+from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.joint_start_kernels import darkness_of_slope
-from fogsim.vision.strips.sky import Sky
+from fogsim.vision.strips.sky import SATURATED_SHARE, Sky
+
+SKY_DEVIATION = 0.005
+"""Relative deviation of the airlight at the horizon from the sky above it [-]."""
+
+OVEREXPOSURE = 0.15
+"""How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
+
+_HALF, _MOSTLY = 0.5, 0.98
+"""Shares of saturated pixels beyond which a sky may be brighter, and beyond which it gives only a lower bound [-]."""
+
+_EVEN_SKY, _CLOUD, MOST_CLOUD = 0.02, 1.5, 0.015
+"""Unevenness of a sky that trees before it and rounding make, how much of more of it the airlight before the road has,
+and the most of that [-]: clouds and dirt on the glass go on below the horizon."""
+
+
+def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
+    """Prior of airlight, horizon and lens for `fogsim.vision.strips.joint_fit.fit_jointly`."""
+    airlight, below, above = _airlight(sky, camera)
+    return JointPrior(
+        airlight=airlight,
+        below=below,
+        above=above,
+        shift=horizon.row - camera.horizon_row,
+        shift_deviation=horizon.standard_deviation,
+        vignetting=sky.vignetting,
+        vignetting_deviation=sky.vignetting_deviation,
+        cloud=min(_CLOUD * max(sky.unevenness - _EVEN_SKY, 0.0), MOST_CLOUD),
+    )
+
+
+def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
+    """Brightness of the airlight, and its deviations downward and upward [linear grey levels]."""
+    deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
+    if not sky.is_clipped:
+        return sky.luminance, deviation, upward
+    table = linear_table(camera.response, camera.bits, camera.black_level)
+    level = float(table[-1] - table[-2]) * (2**camera.bits / 256.0)
+    if sky.saturated > _MOSTLY:
+        return 255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0
+    if sky.saturated < SATURATED_SHARE:
+        # One of the colours is clipped: there is more light than the others show.
+        return sky.luminance + level, deviation + level, deviation + 4.0 * level
+    # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
+    airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
+    # Noise that is added after clipping tells nothing of what was clipped.
+    above = OVEREXPOSURE * 255.0 if sky.saturated > _HALF else deviation + level
+    return airlight, deviation + level, above
+
 
 Floats = NDArray[np.float64]
 
@@ -107,24 +159,31 @@ def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats
     return slope + bend * (lowest + highest), level
 
 
-def darkening_of_bins(grazing: Floats, below: Floats, prior: JointPrior) -> tuple[Floats, Floats]:
+@kernel
+def darkening_of_bins(
+    grazing: Floats, below: Floats, prior: JointPrior, angle: Floats, table: Floats
+) -> tuple[Floats, Floats]:
     """How the airlight darkens toward bins, for `fogsim.vision.strips.joint_kernels.Bins`.
 
-    Returns ``darker`` and ``darker_by_row``. Takes `grazing` (n,) [rad], `below` (n,) [px].
+    Returns ``darker`` and ``darker_by_row``. Takes `grazing` (n,) [rad], `below` (n,) [px], and ``angle`` and ``below``
+    of a `SlopeTable`.
     """
-    if prior.rise.size == 0:
-        nothing = np.zeros((0, below.size))
-        return nothing, nothing
-    table = slope_table()
-    at = np.clip(np.searchsorted(table.angle, grazing, side="right") - 1, 0, table.angle.size - 2)
-    step = table.angle[at + 1] - table.angle[at]
-    of_droplets = table.below[prior.droplets]
-    slope = (of_droplets[:, at + 1] - of_droplets[:, at]) / step
-    darker = of_droplets[:, at] + slope * (grazing - table.angle[at])
-    # Where the horizon is lower by a row, a bin is seen at a smaller angle.
-    return np.ascontiguousarray(darker), np.ascontiguousarray(-slope * grazing / below)
+    levels = 0 if prior.rise.size == 0 else table.shape[1]
+    darker, by_row = np.empty((levels, below.size)), np.empty((levels, below.size))
+    for i in range(below.size if levels else 0):
+        at = 0
+        while at < angle.size - 2 and angle[at + 1] <= grazing[i]:
+            at += 1
+        for level in range(levels):
+            low, high = table[prior.droplets, level, at], table[prior.droplets, level, at + 1]
+            slope = (high - low) / (angle[at + 1] - angle[at])
+            darker[level, i] = low + slope * (grazing[i] - angle[at])
+            # Where the horizon is lower by a row, a bin is seen at a smaller angle.
+            by_row[level, i] = -slope * grazing[i] / below[i]
+    return darker, by_row
 
 
+@kernel
 def slope_cost(prior: JointPrior) -> float:
     """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky."""
     if prior.rise.size == 0:
@@ -174,3 +233,41 @@ def _between_depths(depth: float) -> Callable[[Floats], Floats]:
     at = float(np.interp(math.log(depth), np.log(slope_table().depth), np.arange(slope_table().depth.size)))
     low = min(int(at), slope_table().depth.size - 2)
     return lambda rows: np.asarray(rows[low] + (at - low) * (rows[low + 1] - rows[low]), np.float64)
+
+
+OTHER_ROAD = 30.0
+"""Way after which an image shows so much other road that its evidence counts again [m]."""
+
+LASTS = 1000.0
+"""Way over which droplets stay the same [m]."""
+
+MOST = 2.5
+"""Most that the logarithm of a likelihood counts, in one picture: some roads fit the wrong droplets by far more [-]."""
+
+
+class DropletMemory:
+    """Chances of the kinds of droplets, learnt over the way.
+
+    A single image hardly separates them, for a road whose albedo wanders may look like either. Its evidence is
+    counted by the share of the road in it that is new.
+    """
+
+    def __init__(self) -> None:
+        self._logarithms = np.log(DROPLET_CHANCES)
+        self._time: float | None = None
+
+    @property
+    def chances(self) -> tuple[float, ...]:
+        """How likely each kind is [-]."""
+        weight = np.exp(self._logarithms - self._logarithms.max())
+        return tuple((weight / weight.sum()).tolist())
+
+    def learn(self, logarithms: tuple[float, ...], time: float, speed: float) -> None:
+        """Learn from a picture (`time`, `speed` [s], [m/s])."""
+        if not logarithms:
+            return
+        moved = 0.0 if self._time is None else max(speed * (time - self._time), 0.0)
+        self._time = time
+        beforehand, kept = np.log(DROPLET_CHANCES), math.exp(-moved / LASTS)
+        learnt = min(moved / OTHER_ROAD, 1.0) * np.maximum(logarithms, -MOST)
+        self._logarithms = beforehand + kept * (self._logarithms - beforehand) + learnt

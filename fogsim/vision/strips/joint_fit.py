@@ -3,20 +3,25 @@
 `fit_jointly` fits given strips, `fit_own` the own lane, and `with_neighbours` those strips that agree with it.
 """
 
+import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.strips import albedo_filter, joint_kernels, joint_start_kernels
-from fogsim.vision.strips.airlight_slopes import darkening_of_bins, slope_cost
+from fogsim.core.jit import kernel
+from fogsim.vision.strips import albedo_filter
+from fogsim.vision.strips.airlight_slopes import darkening_of_bins, slope_cost, slope_table
 from fogsim.vision.strips.albedo_filter import Albedo
-from fogsim.vision.strips.joint_kernels import PARAMETERS, Bins, JointPrior, Solution
+from fogsim.vision.strips.joint_kernels import PARAMETERS, Bins, JointPrior, Solution, gauss_newton
+from fogsim.vision.strips.joint_start_kernels import darkness_by_sky, fit_constant_albedo
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _PATCH_LENGTH, _DRIFT_LENGTH = 3.0, 30.0
 """Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
@@ -103,19 +108,32 @@ class JointFit:
 Priors = tuple[JointPrior, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Answer:
-    """A solution, its cost with what is likely beforehand, under which prior, and for which albedo."""
+class _Answers(NamedTuple):
+    """Solutions under one prior by albedo, and what comes of the likeliest."""
 
-    cost: float
-    solution: Solution
-    prior: JointPrior
-    albedo: int
+    # (m, 7): Minus twice the logarithm of the evidence with how likely the albedo is, the four parameters of
+    # `fogsim.vision.strips.joint_kernels.Solution`, the variance of k [1/m²], and which of `ALBEDOS`
+    table: Floats
+    road: float
+    misfit: float
+    used: NDArray[np.uint8]
 
-    @property
-    def is_even(self) -> bool:
-        """Whether its airlight is."""
-        return self.prior.rise.size == 0
+
+class _Mixture(NamedTuple):
+    """Solutions averaged by their evidence."""
+
+    theta: Floats  # (4,): Their mean
+    deviation: float  # Of k [1/m]
+    uneven: float  # Share of those whose airlight is not even [-]
+    albedo: Floats  # (albedos,): Share of each albedo [-]
+
+
+class _Tried(NamedTuple):
+    """Albedos that are tried."""
+
+    albedos: Floats  # (m, 6): Theirs, before airlight that is as uneven as the sky
+    chances: Floats  # (m,): How likely each is beforehand [-]
+    number: Ints  # (m,): Which of `ALBEDOS`
 
 
 def fit_jointly(
@@ -134,126 +152,164 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    return _average([answer for prior in priors for answer in _answers(curves, geometry, prior, near, albedos)])
+    table, tried = slope_table(), _tried(albedos)
+    begin = (math.nan, 0.0, 0.0) if near is None else (near.extinction, near.airlight, near.shift)
+    found = [_answers(curves, geometry, prior, table.angle, table.below, begin, tried) for prior in priors]
+    return _average(priors, found)
 
 
+@functools.cache
+def _tried(albedos: tuple[int, ...]) -> _Tried:
+    which = [0, *(albedo for albedo in albedos if albedo)]
+    every = np.array([one[:6] for one in ALBEDOS])
+    return _Tried(every[which], np.array(ALBEDO_CHANCES)[which], np.array(which, np.int64))
+
+
+@kernel
 def _answers(
-    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None, albedos: tuple[int, ...]
-) -> list[_Answer]:
-    """Answers under one prior, each with its cost, in which how likely the albedo is beforehand is counted."""
-    bins = strip_bins(curves, geometry, prior)
-    best = _from_near(bins, near, prior)
+    curves: StripCurves,
+    geometry: StripGeometry,
+    prior: JointPrior,
+    angle: Floats,
+    below: Floats,
+    near: tuple[float, float, float],
+    tried: _Tried,
+) -> _Answers:
+    """Answers under one prior; `angle` and `below` of a `SlopeTable`, `near` as in `_from_near`."""
+    bins = bins_of(curves, geometry, prior, angle, below)
+    best = likeliest = _from_near(bins, near, prior, _albedo(tried, 0))
     most = len(ALBEDOS) if best.misfit > _EXPLAINED else _SMOOTH
-    found = [(0, best)]
-    found += [(a, _refined(bins, ALBEDOS[a], prior, best.theta, MORE_STEPS)) for a in albedos if 0 < a < most]
-    cost = slope_cost(prior) + prior.cost
-    return [_Answer(f.cost + cost - 2.0 * math.log(ALBEDO_CHANCES[a]), f, prior, a) for a, f in found]
+    table, before, least, count = np.empty((tried.number.size, 7)), slope_cost(prior) + prior.cost, np.inf, 0
+    for a in range(tried.number.size):
+        if tried.number[a] >= most:
+            continue
+        one = best if a == 0 else gauss_newton(bins, _albedo(tried, a), prior, best.theta, MORE_STEPS)
+        table[count, 0] = one.cost + before - 2.0 * math.log(tried.chances[a])
+        table[count, 1:5], table[count, 5], table[count, 6] = one.theta[:4], one.covariance[0, 0], tried.number[a]
+        if table[count, 0] < least:
+            least, likeliest = table[count, 0], one
+        count += 1
+    return _Answers(table[:count], likeliest.road, likeliest.misfit, likeliest.used)
+
+
+@kernel
+def _albedo(tried: _Tried, a: int) -> Albedo:
+    one = tried.albedos[a]
+    return Albedo(one[0], one[1], one[2], one[3], one[4], one[5], 0.0)
 
 
 def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
     """Strips as the kernels take them, the lens's vignetting undone."""
-    luminance, variance, vignetting = curves.luminance, curves.variance, prior.vignetting
-    if vignetting != 0.0:
-        gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, _MOST_VIGNETTING))
-        luminance, variance = gain * luminance, gain**2 * variance
-    darker, by_row = darkening_of_bins(geometry.grazing, geometry.below, prior)
+    table = slope_table()
+    return bins_of(curves, geometry, prior, table.angle, table.below)
+
+
+@kernel
+def bins_of(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, angle: Floats, below: Floats) -> Bins:
+    """`strip_bins` with a `SlopeTable`'s angles (m,) [rad] and airlight below the horizon (droplets, n, m)."""
+    luminance, variance = curves.luminance.copy(), curves.variance.copy()
+    if prior.vignetting != 0.0:
+        for s in range(luminance.shape[0]):
+            for i in range(luminance.shape[1]):
+                gain = 1.0 / (1.0 - min(prior.vignetting * geometry.off_axis[s, i], _MOST_VIGNETTING))
+                luminance[s, i] *= gain
+                variance[s, i] *= gain * gain
+    darker, by_row = darkening_of_bins(geometry.grazing, geometry.below, prior, angle, below)
     return Bins(
-        luminance=np.ascontiguousarray(luminance),
-        noise=np.ascontiguousarray(variance),
-        path=geometry.path,
-        off_axis=geometry.off_axis,
-        below=geometry.below,
-        half=geometry.half,
-        distance=geometry.distance,
-        extent=geometry.extent,
-        grazing=geometry.grazing,
-        darker=darker,
-        darker_by_row=by_row,
-        eye=float(geometry.distance[0] * math.tan(geometry.grazing[0])),
+        luminance,
+        variance,
+        geometry.path,
+        geometry.off_axis,
+        geometry.below,
+        geometry.half,
+        geometry.distance,
+        geometry.extent,
+        geometry.grazing,
+        darker,
+        by_row,
+        geometry.distance[0] * math.tan(geometry.grazing[0]),
     )
 
 
-def _from_near(bins: Bins, near: JointFit | None, prior: JointPrior) -> Solution:
-    """Best answer from that with a constant albedo, and from one for some of the strips, if there is another."""
-    simple = _constant_albedo(bins, prior)
-    if near is None:
-        return _refined_from(bins, prior, simple, prior.shift)
-    found = [_refined_from(bins, prior, (near.extinction, near.airlight), near.shift)]
-    if abs(math.log(simple[0] / max(near.extinction, _span(bins)[0]))) > ALIKE:
-        found.append(_refined_from(bins, prior, simple, prior.shift))
-    return min(found, key=lambda f: f.cost)
+@kernel
+def _from_near(bins: Bins, near: tuple[float, float, float], prior: JointPrior, albedo: Albedo) -> Solution:
+    """Best answer from that with a constant albedo, and from one for some of the strips, if there is another.
+
+    `near` has its extinction, NaN for none, airlight and shift.
+    """
+    k, airlight = fit_constant_albedo(bins, extinction_grid(bins, _EXTINCTIONS), prior)
+    if math.isnan(near[0]):
+        return _refined_from(bins, prior, k, airlight, prior.shift, albedo)
+    best = _refined_from(bins, prior, near[0], near[1], near[2], albedo)
+    if abs(math.log(k / max(near[0], _span(bins)[0]))) > ALIKE:
+        other = _refined_from(bins, prior, k, airlight, prior.shift, albedo)
+        if other.cost < best.cost:
+            best = other
+    return best
 
 
-def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
-    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, _EXTINCTIONS), prior)
-
-
+@kernel
 def extinction_grid(bins: Bins, count: int) -> Floats:
     """Extinctions that show, evenly in ln k [1/m]."""
     least, most = _span(bins)
     return np.exp(np.linspace(math.log(least), math.log(most), count))
 
 
+@kernel
 def _span(bins: Bins) -> tuple[float, float]:
     """Least and greatest extinction that show [1/m]."""
-    unit = 1.0 / float(bins.path[0, 0])
-    return 0.2 * unit, 2.0 * unit * float(bins.below[0])
+    unit = 1.0 / bins.path[0, 0]
+    return 0.2 * unit, 2.0 * unit * bins.below[0]
 
 
-def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shift: float) -> Solution:
-    theta = [*start, shift, 0.0]
+@kernel
+def _refined_from(bins: Bins, prior: JointPrior, k: float, airlight: float, shift: float, albedo: Albedo) -> Solution:
+    theta = np.zeros(PARAMETERS + (prior.rise.size > 0))
+    theta[0], theta[1], theta[2] = k, airlight, shift
     if prior.rise.size:
-        theta.append(joint_start_kernels.darkness_by_sky(prior, start[0], bins.eye)[0])
-    return _refined(bins, ALBEDOS[0], prior, np.array(theta), _STEPS)
+        theta[PARAMETERS] = darkness_by_sky(prior, k, bins.eye)[0]
+    return gauss_newton(bins, albedo, prior, theta, _STEPS)
 
 
-def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps: int) -> Solution:
-    return joint_kernels.gauss_newton(bins, under_sky(albedo, prior), prior, start, steps)
-
-
-def under_sky(albedo: Albedo, prior: JointPrior) -> Albedo:
-    """Albedo seen through an airlight that is as uneven as is known beforehand."""
-    return albedo._replace(cloud_deviation=prior.cloud)
-
-
-def _average(answers: list[_Answer]) -> JointFit:
-    costs = np.array([answer.cost for answer in answers])
-    weight = np.exp(-0.5 * (costs - costs.min()))
-    weight /= weight.sum()
-    found = [answer.solution for answer in answers]
-    thetas = np.array([f.theta[:PARAMETERS] for f in found])
-    mean = (weight[:, None] * thetas).sum(axis=0)
-    variances = np.array([f.covariance[0, 0] for f in found]) + (thetas[:, 0] - mean[0]) ** 2
-    best = found[int(np.argmax(weight))]
+def _average(priors: Priors, found: list[_Answers]) -> JointFit:
+    # Priors of even airlight come first.
+    uneven = [(prior, one) for prior, one in zip(priors, found, strict=True) if prior.rise.size]
+    table = found[0].table if len(found) == 1 else np.concatenate([one.table for one in found])
+    mixture = _mixed(table, len(table) - sum(len(one.table) for _, one in uneven))
+    best = min(found, key=lambda one: float(one.table[:, 0].min()))
     return JointFit(
-        extinction=float(mean[0]),
-        extinction_deviation=math.sqrt((weight * variances).sum()),
-        airlight=float(mean[1]),
-        shift=float(mean[2]),
+        extinction=float(mixture.theta[0]),
+        extinction_deviation=mixture.deviation,
+        airlight=float(mixture.theta[1]),
+        shift=float(mixture.theta[2]),
         road=best.road,
         misfit=best.misfit,
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
-        darkening_chance=float(weight[[not answer.is_even for answer in answers]].sum()),
-        droplets=_droplets(answers),
-        albedos=_of_weight(answers, weight),
+        darkening_chance=mixture.uneven,
+        droplets=_droplets([np.logaddexp.reduce(-0.5 * (one.table[:, 0] - prior.cost)) for prior, one in uneven]),
+        albedos=tuple(albedo for albedo, share in enumerate(mixture.albedo.tolist()) if share > _NEGLIGIBLE),
     )
 
 
-def _of_weight(answers: list[_Answer], weight: Floats) -> tuple[int, ...]:
-    """Albedos that are not negligible under all priors together."""
-    share = np.bincount([answer.albedo for answer in answers], weight)
-    return tuple(np.flatnonzero(share > _NEGLIGIBLE).tolist())
+@kernel
+def _mixed(table: Floats, even: int) -> _Mixture:
+    """Answers, of `_Answers`, averaged; the first ones (`even`) are of even airlight."""
+    weight = np.exp(-0.5 * (table[:, 0] - table[:, 0].min()))
+    weight /= weight.sum()
+    theta, albedo, uneven, variance = np.zeros(PARAMETERS), np.zeros(len(ALBEDOS)), 0.0, 0.0
+    for a in range(weight.size):
+        theta += weight[a] * table[a, 1:5]
+        albedo[int(table[a, 6])] += weight[a]
+        uneven += weight[a] if a >= even else 0.0
+    for a in range(weight.size):
+        variance += weight[a] * (table[a, 5] + (table[a, 1] - theta[0]) ** 2)
+    return _Mixture(theta, math.sqrt(variance), uneven, albedo)
 
 
-def _droplets(answers: list[_Answer]) -> tuple[float, ...]:
+def _droplets(logarithms: list[float]) -> tuple[float, ...]:
     """Log likelihoods of the kinds of droplets, over the likeliest."""
-    uneven = [one for one in answers if not one.is_even]
-    found = []
-    for kind in sorted({one.prior.droplets for one in uneven}):
-        costs = [one.cost - one.prior.cost for one in uneven if one.prior.droplets == kind]
-        found.append(float(np.logaddexp.reduce([-0.5 * cost for cost in costs])))
-    return tuple(one - max(found) for one in found)
+    return tuple(float(one - max(logarithms)) for one in logarithms)
 
 
 def fit_own(

@@ -113,6 +113,27 @@ class Solution(NamedTuple):
 
 
 @kernel
+def with_horizon(prior: JointPrior, shift: float, deviation: float) -> JointPrior:
+    """Prior with another horizon (`shift`, `deviation` [px])."""
+    return JointPrior(
+        prior.airlight,
+        prior.below,
+        prior.above,
+        shift,
+        deviation,
+        prior.vignetting,
+        prior.vignetting_deviation,
+        prior.cloud,
+        prior.slope,
+        prior.slope_deviation,
+        prior.rise,
+        prior.level,
+        prior.droplets,
+        prior.cost,
+    )
+
+
+@kernel
 def mean_transmittance(below: float, half: float, path: float, k: float) -> tuple[float, float, float]:
     """Mean transmittance over a bin's height, with its derivatives by extinction and by the horizon's row.
 
@@ -337,10 +358,18 @@ def allocated(strips: int, count: int, width: int, noise: NDArray[np.float64]) -
 
 
 @kernel
+def under_sky(albedo: Albedo, prior: JointPrior) -> Albedo:
+    """Albedo seen through an airlight that is as uneven as is known beforehand."""
+    patches, drift = (albedo.patch_deviation, albedo.patch_length), (albedo.drift_deviation, albedo.drift_length)
+    return Albedo(*patches, *drift, albedo.sheen, albedo.sheen_deviation, prior.cloud)
+
+
+@kernel
 def gauss_newton(
-    bins: Bins, albedo: Albedo, prior: JointPrior, start: NDArray[np.float64], iterations: int
+    bins: Bins, on_road: Albedo, prior: JointPrior, start: NDArray[np.float64], iterations: int
 ) -> Solution:
     """Gauss–Newton from a start (`start` (4 or 5,))."""
+    albedo = under_sky(on_road, prior)
     strips, count = bins.luminance.shape
     theta, road, size = start.copy(), np.empty(strips), start.size
     darker = theta[4] if size > PARAMETERS else 0.0

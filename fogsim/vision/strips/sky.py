@@ -2,15 +2,252 @@
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
-from fogsim.vision.light.medians import median
-from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.strips import sky_kernels
+from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
+from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
+
+_SKY_SHARE, _SKY_WIDTH = 7, 0.012
+"""Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
+
+_LEAST_SKY_ROWS = 4
+"""Rows of sky before it can end downward."""
+
+_LEAST_SKY_HEIGHT, _STEEPEST_SKY = 0.04, 0.8
+"""Height that rows must span to show how the sky brightens upward [rad], and most that it does [1/rad]."""
+
+
+@kernel
+def sky_rows(
+    image: LinearPixels,
+    rows: NDArray[np.int64],
+    left: int,
+    right: int,
+    floor: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
+
+    Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
+    the row.
+
+    Returns brightness [linear grey levels], and the share of each row that is as bright (n,). Takes `rows` (n,) int64,
+    `floor` [linear grey levels].
+    """
+    bright, share = np.zeros(rows.size), np.zeros(rows.size)
+    count = min(MOST_SAMPLES, right - left)
+    samples, ordered = np.empty(count, np.float32), np.empty(count, np.float32)
+    for i in range(rows.size):
+        for j in range(count):
+            samples[j] = pixel_luminance(image, rows[i], even_column(j, count, left - 0.5, right - 0.5))
+        sort_few(samples, ordered)
+        centre, kept = float(ordered[count - 1 - count // _SKY_SHARE]), 0
+        reach = max(2.5 * floor, _SKY_WIDTH * centre)
+        for _ in range(4):
+            total, kept = 0.0, 0
+            for value in ordered:
+                if abs(float(value) - centre) <= reach:
+                    total += float(value)
+                    kept += 1
+            centre = total / kept
+        bright[i], share[i] = centre, kept / count
+    return bright, share
+
+
+@kernel
+def level_at_horizon(
+    bright: NDArray[np.float64], height: NDArray[np.float64], step: float
+) -> tuple[float, float, float, float]:
+    """Brightness of the sky at the horizon, from that of rows above it (Theil and Sen's robust straight line).
+
+    Where rows darken downward by more than `step` from one to the next, something stands before the sky, and the rows
+    below say nothing.
+
+    Returns brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
+    Takes `bright` (n,), `height` (n,).
+    """
+    drops = np.zeros(bright.size)
+    count = 1
+    for i in range(1, bright.size):
+        usual = max(float(np.median(drops[1:i])), 0.0) if i > 1 else 0.0
+        drops[i] = bright[i - 1] - bright[i]
+        twice = bright[max(i - 2, 0)] - bright[i]
+        least = step * bright[i - 1]
+        if count >= _LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
+            break
+        count = i + 1
+    slopes = np.zeros(count * (count - 1) // 2 + 1)
+    number = 0
+    for i in range(count):
+        for j in range(i):
+            slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
+            number += 1
+    middle, slope = float(np.median(bright[:count])), 0.0
+    if height[0] - height[count - 1] > _LEAST_SKY_HEIGHT:
+        slope = min(max(float(np.median(slopes[:number])), -_STEEPEST_SKY * middle), _STEEPEST_SKY * middle)
+    rest = bright[:count] - slope * height[:count]
+    level = float(np.median(rest))
+    return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
+
+
+@kernel
+def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
+    """Robust deviation of single pixels, from the differences of neighbours [linear grey levels].
+
+    Takes `rows` (n,) int64.
+    """
+    cols = image.pixels.shape[1]
+    per_row = max((cols - 1) // 2, 1)
+    step = max(per_row // 32, 1)
+    apart = np.empty(rows.size * (per_row // step + 1))
+    count = 0
+    for row in rows:
+        for col in range(((cols - 2) % (2 * step)) // 2, cols - 1, 2 * step):
+            if count < apart.size:
+                apart[count] = abs(pixel_luminance(image, row, col) - pixel_luminance(image, row, col + 1))
+                count += 1
+    # The root of the mean square of the lower three quarters stands for all: medians of whole numbers jump.
+    ordered = np.sort(apart[:count])
+    kept = max((3 * count) // 4, 1)
+    square = 0.0
+    for i in range(kept):
+        square += ordered[i] * ordered[i]
+    # For a normal difference of deviation √2 σ, the lower three quarters have a mean square of 0.3692 · 2 σ².
+    return math.sqrt(square / kept / (2.0 * 0.3692))
+
+
+@kernel
+def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
+    """Shares of pixels with all, and with some channels saturated (`rows` (n,) int64)."""
+    pixels, largest = image.pixels, image.tables.shape[1] - 1
+    cols, channels = pixels.shape[1], pixels.shape[2]
+    every, some = 0, 0
+    for row in rows:
+        for col in range(side, cols - side):
+            count = 0
+            for channel in range(channels):
+                count += pixels[row, col, channel] == largest
+            every += count == channels
+            some += count > 0
+    total = max(rows.size * (cols - 2 * side), 1)
+    return every / total, some / total
+
+
+_SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
+"""Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
+
+_TILT, _BRIGHTENING, _VIGNETTING = 0.3, 1.5, 0.5
+"""Standard deviations of a sky's slopes sideways and upward [1/rad], and of its fall toward the corners [-], before it
+is looked at, relative to it."""
+
+_LEAST_BEND, _BENDING = 0.1, 2.5
+"""Standard deviation of the bend of a sky's slope upward where there is none, relative to the sky [1/rad²], and that of
+the bend over a slope [1/rad]."""
+
+_SHADING_COLS = 32
+"""Pixels of each row that are looked at."""
+
+_ALIKE = 4.0
+"""How many of those pixels err together, since a sky is not quite even [-]."""
+
+
+@kernel
+def sky_shading(
+    image: LinearPixels, rows: NDArray[np.int64], axis: NDArray[np.float64], bright: NDArray[np.float64], noise: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
+    """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), in Cauchy's norm.
+
+    Returns a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them
+    next to their noise [linear grey levels] (5, 5). Takes `rows` (n,) int64, `axis` (4,) [px], `bright` (n,) [linear
+    grey levels], `noise` [linear grey levels].
+    """
+    cols, count = image.pixels.shape[1], _SHADING_COLS
+    level = float(np.median(bright))
+    height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
+    found = np.array([level, 0.0, 0.0, 0.0, 0.0])
+    covariance: NDArray[np.float64] = np.eye(5)
+    seen, aside = np.empty((rows.size, count)), np.empty(count)
+    for j in range(count):
+        col = even_column(j, count, -0.5, cols - 0.5)
+        aside[j] = (col - axis[0]) / axis[3]
+        for i in range(rows.size):
+            seen[i, j] = pixel_luminance(image, rows[i], col)
+    number = 0
+    for relative in _SHADING_SCALES:
+        spread = (relative * level) ** 2 + (2.0 * noise) ** 2
+        normal, right = np.zeros((5, 5)), np.zeros(5)
+        normal[0, 0] = 1e-6
+        bend = _LEAST_BEND + _BENDING * abs(found[2]) / level
+        for a, deviation in ((1, _TILT), (2, _BRIGHTENING), (3, bend), (4, _VIGNETTING)):
+            normal[a, a] = spread / (deviation * level) ** 2
+        number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
+        inverse = inverse_of(normal)
+        found = times(inverse, right)
+        covariance = inverse * (_ALIKE * max(squares / max(number, 1), noise * noise))
+    return found, covariance, number / seen.size, _scatter(seen, aside, height, above_axis, found, noise)
+
+
+@kernel
+def _scatter(
+    seen: NDArray[np.float64],
+    aside: NDArray[np.float64],
+    height: NDArray[np.float64],
+    above_axis: NDArray[np.float64],
+    found: NDArray[np.float64],
+    noise: float,
+) -> float:
+    """Robust deviation of pixels from a sky's shading, next to that of their noise."""
+    apart = np.empty(seen.size)
+    for i in range(height.size):
+        for j in range(aside.size):
+            apart[i * aside.size + j] = abs(seen[i, j] - _shaded(aside[j], height[i], above_axis[i], found))
+    return math.sqrt(max((1.4826 * float(np.median(apart))) ** 2 - noise * noise, 0.0))
+
+
+@kernel
+def _shaded(x: float, height: float, y: float, found: NDArray[np.float64]) -> float:
+    """Luminance of a sky of some shading at a place."""
+    off = 1.0 - 1.0 / (1.0 + x * x + y * y) ** 2
+    return float(found[0] + found[1] * x + (found[2] + found[3] * height) * height - found[4] * off)
+
+
+@kernel
+def _add_sky(
+    seen: NDArray[np.float64],
+    aside: NDArray[np.float64],
+    height: NDArray[np.float64],
+    above_axis: NDArray[np.float64],
+    found: NDArray[np.float64],
+    spread: float,
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+) -> tuple[int, float]:
+    """Add pixels to the normal equations of a sky's shading; returns how many lie near, and their squares."""
+    number, squares, shapes = 0, 0.0, np.ones(5)
+    for i in range(height.size):
+        y = above_axis[i]
+        for j in range(aside.size):
+            off = 1.0 - 1.0 / (1.0 + aside[j] * aside[j] + y * y) ** 2
+            rest = seen[i, j] - _shaded(aside[j], height[i], y, found)
+            if rest * rest < 4.0 * spread:
+                number += 1
+                squares += rest * rest
+            weight = 1.0 / (1.0 + rest * rest / spread) ** 2
+            shapes[1], shapes[2], shapes[3], shapes[4] = aside[j], height[i], height[i] ** 2, -off
+            for a in range(5):
+                right[a] += weight * seen[i, j] * shapes[a]
+                for b in range(a, 5):
+                    normal[a, b] += weight * shapes[a] * shapes[b]
+    for a in range(5):
+        for b in range(a):
+            normal[a, b] = normal[b, a]
+    return number, squares
+
 
 Floats = NDArray[np.float64]
 
@@ -26,8 +263,7 @@ _UNEVEN, _LEAST_SEEN, _MOST_VIGNETTING = 0.02, 0.7, 1.5
 show it, and most that it can be [-]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sky:
+class Sky(NamedTuple):
     """The sky above the horizon."""
 
     luminance: float  # At the horizon, of its bright part [linear grey levels]
@@ -94,78 +330,82 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:
         return None
-    rows = even_rows(top, bottom, _SKY_ROWS)
-    side = camera.width // 6
-    noise = sky_kernels.pixel_noise(image, rows)
-    bright, share = sky_kernels.sky_rows(image, rows, side, camera.width - side, max(noise, 0.3))
-    height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
-    darker = max(_DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
-    level, _, scatter, lowest = sky_kernels.level_at_horizon(bright, height, darker)
+    axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
+    found = _read_sky(image, even_rows(top, bottom, _SKY_ROWS), axis, margin)
+    return None if math.isnan(found.luminance) else found
+
+
+@kernel
+def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin: float) -> Sky:
+    """`sky_above` of rows (n,), given principal point, horizon and focal length [px]; NaN where it is hidden."""
+    side, noise = image.pixels.shape[1] // 6, pixel_noise(image, rows)
+    bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3))
+    height = (axis[2] - rows.astype(np.float64)) / axis[3]
+    level, _, scatter, lowest = level_at_horizon(bright, height, max(_DARKER, 2.0 * noise / max(bright.max(), 1e-9)))
     if lowest > _MOST_HIDDEN:
-        return None
-    saturated, clipped = sky_kernels.saturation(image, rows, side)
+        level = np.nan
+    saturated, clipped = saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
-    free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
-    shading = _shading(image, camera, rows[free], bright[free], noise, _Shading(level, scatter))
-    level, scatter = shading.level, shading.deviation
-    unseen = _UNSEEN * max(float(lowest) - margin / camera.focal_length - _CLOSE, 0.0) * level
-    deviation = math.hypot(scatter, unseen)
+    seen, last = 0, rows.size - 1
+    while last >= 0 and height[last] < lowest:
+        last -= 1
+    free = np.empty(rows.size, np.int64)
+    for row in range(last, -1, -2):
+        if clipped <= SATURATED_SHARE:
+            free[seen] = row
+            seen += 1
+    shading = _shading(image, rows[free[:seen]], axis, bright[free[:seen]], noise, level, scatter)
+    unseen = _UNSEEN * max(lowest - margin / axis[3] - _CLOSE, 0.0) * shading.level
+    deviation = math.hypot(shading.deviation, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
-    covered = median(share) < _PATCHY and scatter > _SCATTERED * level
-    upward = _BRIGHTER * level if covered else deviation
-    seen = height[free] if free.size else np.zeros(1)
-    return Sky(
-        luminance=level,
-        deviation=deviation,
-        upward=upward,
-        noise=noise,
-        saturated=saturated,
-        clipped=clipped,
-        vignetting=shading.vignetting,
-        vignetting_deviation=shading.vignetting_deviation,
-        unevenness=shading.unevenness,
-        slope=shading.slope,
-        slope_deviation=shading.slope_deviation,
-        heights=(float(seen.min()), float(seen.max())),
-    )
+    covered = np.median(share) < _PATCHY and shading.deviation > _SCATTERED * shading.level
+    upward = _BRIGHTER * shading.level if covered else deviation
+    heights = (height[free[0]], height[free[seen - 1]]) if seen else (0.0, 0.0)
+    light = (shading.level, deviation, upward, noise, saturated, clipped)
+    lens = (shading.vignetting, shading.vignetting_deviation, shading.unevenness)
+    return Sky(*light, *lens, shading.slope, shading.slope_deviation, heights)
 
 
-@dataclass(frozen=True, slots=True)
-class _Shading:
+class _Shading(NamedTuple):
     """A sky's brightness at the horizon, vignetting, their deviations, unevenness, and its slope upward."""
 
     level: float
     deviation: float
-    vignetting: float = 0.0
-    vignetting_deviation: float = UNKNOWN_VIGNETTING
-    unevenness: float = 0.0
-    slope: float = 0.0
-    slope_deviation: float = math.inf
+    vignetting: float
+    vignetting_deviation: float
+    unevenness: float
+    slope: float
+    slope_deviation: float
 
 
+@kernel
 def _shading(
-    image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float, unseen: _Shading
+    image: LinearPixels,
+    rows: NDArray[np.int64],
+    axis: Floats,
+    bright: Floats,
+    noise: float,
+    level: float,
+    deviation: float,
 ) -> _Shading:
     """Sky of even slopes behind a lens, or what is known without them where it does not fill most of its rows."""
-    if rows.size < 2 or median(bright) <= 0.0:
-        return unseen
-    height = (camera.horizon_row - rows) / camera.focal_length
-    axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
-    found, covariance, seen, scatter = sky_kernels.sky_shading(image, rows, axis, bright, noise)
-    level = float(found[0])
-    unevenness = scatter / level if level > 0.0 else 0.0
-    if seen < (_SEEN_TO_BRIGHTEN if found[2] > _BRIGHTENS * level else _LEAST_SEEN) or level <= 0.0:
-        return replace(unseen, unevenness=unevenness)
-    vignetting, deviation = 0.0, UNKNOWN_VIGNETTING
+    if rows.size < 2 or np.median(bright) <= 0.0:
+        return _Shading(level, deviation, 0.0, UNKNOWN_VIGNETTING, 0.0, 0.0, np.inf)
+    found, covariance, seen, scatter = sky_shading(image, rows, axis, bright, noise)
+    unevenness = scatter / found[0] if found[0] > 0.0 else 0.0
+    least = _SEEN_TO_BRIGHTEN if found[2] > _BRIGHTENS * found[0] else _LEAST_SEEN
+    if seen < least or found[0] <= 0.0 or np.isnan(level):
+        return _Shading(level, deviation, 0.0, UNKNOWN_VIGNETTING, unevenness, 0.0, np.inf)
+    vignetting, unsure = 0.0, UNKNOWN_VIGNETTING
     # What looks like a lens's shade under a more uneven sky are houses on both sides, which fade upward.
     if unevenness <= _LENS_UNEVENNESS:
-        vignetting = min(max(float(found[4]) / level, 0.0), _MOST_VIGNETTING)
-        deviation = min(math.hypot(_UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
+        vignetting = min(max(found[4] / found[0], 0.0), _MOST_VIGNETTING)
+        unsure = min(math.hypot(_UNEVEN, math.sqrt(covariance[4, 4]) / found[0]), UNKNOWN_VIGNETTING)
     # Mean slope over the heights that are seen.
-    ends = float(height.min() + height.max())
+    ends = (axis[2] - rows[0]) / axis[3] + (axis[2] - rows[-1]) / axis[3]
     variance = covariance[2, 2] + 2.0 * ends * covariance[2, 3] + ends**2 * covariance[3, 3]
-    slope = (float(found[2] + ends * found[3]), math.sqrt(max(variance, 0.0)))
-    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation, unevenness, *slope)
+    slope, slope_deviation = found[2] + ends * found[3], math.sqrt(max(variance, 0.0))
+    return _Shading(found[0], math.sqrt(covariance[0, 0]), vignetting, unsure, unevenness, slope, slope_deviation)
 
 
 @functools.lru_cache(maxsize=64)

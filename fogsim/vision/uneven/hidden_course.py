@@ -3,23 +3,34 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
-from fogsim.vision.lines.road_course import RoadCourse
+from fogsim.vision.lines.road_course import (
+    SAG_DEVIATION,
+    RoadCourse,
+    SagsAhead,
+    beginning_cost,
+    cost_given,
+    row_given,
+    sag_from,
+    sag_precision,
+)
 from fogsim.vision.lines.road_course_kernels import PIECES
-from fogsim.vision.lines.sags_ahead import SAG_DEVIATION, beginning_cost, sag_from
-from fogsim.vision.strips import joint_fit
-from fogsim.vision.strips.course_geometry import course_geometry
+from fogsim.vision.strips.course_geometry import Bend, lay_along
 from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
-from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.uneven.fog_evidence import EvenFog, even_fog_over, thinned_bins
+from fogsim.vision.strips.strip_geometry import SIDES, StripGeometry, view_of
+from fogsim.vision.uneven.fog_evidence import CHANCES_OF_EVEN, EvenFog, even_fog_over, thinned_bins
 
-_TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
+Floats = NDArray[np.float64]
+
+_TRIED = np.array([-2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
 """Curvatures that are tried first, over their standard deviation [-]."""
 
 _MOST, _STEPS = 3.0, 3
@@ -30,9 +41,6 @@ _LEAST_VARIANCE = 1e-4
 
 _RIVAL = 20.0
 """By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
-
-_AlongCourse = Callable[[int, float], EvenFog]
-"""Even fog by albedo and curvature."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,42 +60,62 @@ class HiddenCourse:
         self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int, gain: float
     ) -> list[EvenFog]:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
-        found: list[EvenFog] = []
-        begun: list[tuple[float, _AlongCourse, float, float]] = []
+        course, found, begun = self.course, [], []
+        view, bend = view_of(self.camera), Bend(course.column, course.bend, course.bend_covariance)
+        sides, before = SIDES[: len(curves.variance)], sag_precision()
+        costs = _costs(course.ahead, before, _TRIED).tolist()
+
+        def along(piece: int, over: int, curvature: float) -> EvenFog:
+            around, sag, cost = _around(course.ahead, before, prior, piece, curvature)
+            shift = view.horizon + around.shift - view.horizon
+            bins = thinned_bins(curves, lay_along(self.straight, view, shift, sag, bend, sides), around)
+            first = (start.extinction, start.airlight, around.shift)
+            one = even_fog_over(bins, ALBEDOS[over], around, first, CHANCES_OF_EVEN[over])
+            return EvenFog(one.cost + cost, *one[1:])
+
         for piece in range(1, PIECES):
-            tried = [value for value in _TRIED if self._cost(piece, value) < gain + _RIVAL]
+            tried = [value for value, cost in zip(_TRIED.tolist(), costs[piece], strict=True) if cost < gain + _RIVAL]
             if len(tried) < 3:
                 continue
-            along: _AlongCourse = functools.partial(self._even_fog, curves, prior, start, piece)
-            curvature, one, width = _likeliest(functools.partial(along, albedo), tried)
-            found.append(replace(one, cost=one.cost + width))
-            begun.append((found[-1].cost, along, curvature, width))
+            curvature, one, width = _likeliest(functools.partial(along, piece, albedo), tried)
+            found.append(EvenFog(one.cost + width, *one[1:]))
+            begun.append((found[-1].cost, piece, curvature, width))
         least = min((one.cost for one in found), default=math.inf)
-        for cost, along, curvature, width in begun:
+        for cost, piece, curvature, width in begun:
             if cost < least + _RIVAL:
-                others = (along(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
-                found += [replace(one, cost=one.cost + width) for one in others]
+                others = (along(piece, other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
+                found += [EvenFog(one.cost + width, *one[1:]) for one in others]
         return found
 
-    def _cost(self, piece: int, curvature: float) -> float:
-        """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
-        sag = sag_from(piece, curvature * SAG_DEVIATION)
-        return self.course.ahead.cost(sag) + beginning_cost(curvature * SAG_DEVIATION)
 
-    def _even_fog(
-        self, curves: StripCurves, prior: JointPrior, start: JointFit, piece: int, albedo: int, curvature: float
-    ) -> EvenFog:
-        """Even fog over a road that sags or crests from a piece on, with how likely that is beforehand and by lines."""
-        ahead, sag = self.course.ahead, sag_from(piece, curvature * SAG_DEVIATION)
-        row, variance = ahead.row(sag)
-        moved = row - ahead.row(np.zeros(PIECES))[0]
-        deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
-        around = prior._replace(shift=prior.shift + moved, shift_deviation=deviation)
-        course = replace(self.course, row=self.camera.horizon_row + around.shift, sag=sag)
-        geometry = course_geometry(self.straight, self.camera, course).only(list(range(len(curves.variance))))
-        bins = thinned_bins(joint_fit.strip_bins(curves, geometry, around))
-        found = even_fog_over(bins, albedo, around, replace(start, shift=around.shift))
-        return replace(found, cost=found.cost + self._cost(piece, curvature))
+@kernel
+def _cost(ahead: SagsAhead, before: Floats, sag: Floats, curvature: float) -> float:
+    """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
+    return cost_given(ahead, sag, before) + beginning_cost(curvature)
+
+
+@kernel
+def _costs(ahead: SagsAhead, before: Floats, curvatures: Floats) -> Floats:
+    """(pieces, n): `_cost` of courses that begin at each piece, by curvatures over their standard deviation [-]."""
+    out = np.empty((PIECES, curvatures.size))
+    for piece in range(PIECES):
+        for i in range(curvatures.size):
+            curvature = curvatures[i] * SAG_DEVIATION
+            out[piece, i] = _cost(ahead, before, sag_from(piece, curvature), curvature)
+    return out
+
+
+@kernel
+def _around(
+    ahead: SagsAhead, before: Floats, prior: JointPrior, piece: int, curvature: float
+) -> tuple[JointPrior, Floats, float]:
+    """Prior where the road sags or crests from a piece on, its curvatures by piece, and the cost of that."""
+    sag = sag_from(piece, curvature * SAG_DEVIATION)
+    row, variance = row_given(ahead, sag)
+    level, _ = row_given(ahead, np.zeros(PIECES))
+    deviation = min(prior.shift_deviation, math.sqrt(max(variance, _LEAST_VARIANCE)))
+    around = with_horizon(prior, prior.shift + (row - level), deviation)
+    return around, sag, _cost(ahead, before, sag, curvature * SAG_DEVIATION)
 
 
 def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple[float, EvenFog, float]:
@@ -96,13 +124,14 @@ def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple
     curve = 1.0
     for _ in range(_STEPS):
         at = sorted(tried)
-        middle = min(max(at.index(min(at, key=lambda value: tried[value].cost)), 1), len(at) - 2)
-        around = at[middle - 1 : middle + 2]
-        vertex, curve = _parabola(around, [tried[value].cost for value in around])
+        costs = [tried[value].cost for value in at]
+        middle = min(max(costs.index(min(costs)), 1), len(at) - 2)
+        vertex, curve = _parabola(at[middle - 1 : middle + 2], costs[middle - 1 : middle + 2])
         if curve <= 0.0 or vertex in tried:
             break
         tried[vertex] = fog(vertex)
-    best = min(tried, key=lambda value: tried[value].cost)
+    costs = [one.cost for one in tried.values()]
+    best = list(tried)[costs.index(min(costs))]
     return best, tried[best], math.log(max(curve, 1.0))
 
 

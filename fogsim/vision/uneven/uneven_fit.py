@@ -6,26 +6,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.core.jit import kernel
+from fogsim.values.camera import Camera
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.albedo_filter import HIDDEN, USED
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
-from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.sky import Sky
+from fogsim.vision.strips.strip_curves import StripCurves, airlight_shares
 from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.uneven import uneven_kernels
 from fogsim.vision.uneven.fog_evidence import (
+    CHANCES_OF_EVEN,
+    NODES,
     UNEVEN_CHANCES,
+    UNEVENNESS,
     EvenFog,
+    bank_nodes,
     even_fog_over,
+    fog_nodes,
     hidden_cost,
     left_out,
     of_each_bin,
     thinned_bins,
 )
-from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, bank_nodes, fog_nodes
 from fogsim.vision.uneven.hidden_course import HiddenCourse
-from fogsim.vision.uneven.uneven_kernels import FogNodes
+from fogsim.vision.uneven.uneven_kernels import OTHERS, FogNodes, denser_part, first_profile, path_depths
+from fogsim.vision.uneven.uneven_kernels import fit_uneven as fit_over_nodes
 
 Floats = NDArray[np.float64]
 
@@ -70,19 +77,12 @@ _UNSURE = -2.0 * math.log(1.0 - _SURELY_EVEN_SHARE)
 _STEPS, _MORE_STEPS = 12, 8
 """Most Gauss–Newton steps of a first fit, and from one answer to the next."""
 
-_SWALLOWED = 1.0
-"""Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
-crests and in sags road seems to fade a little."""
-
 _LEAST_ROAD = 0.3
 """Share of bins that even fog must explain for there to be a road that other fog may lie on [-]."""
 
 _EXPLAINS, _FEW = 0.5, 3
 """Share of the bins that even fog leaves out, and number of them, that uneven fog may leave out and be believed: else
 what is there is an obstacle to both [-]."""
-
-_DENSER, _SURELY_DENSER = math.log(2.5), 2.5
-"""Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,14 +153,18 @@ def _fitted(
     curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, hidden: HiddenCourse
 ) -> UnevenFit | None:
     """Fit of uneven fog, or None if even fog suffices."""
-    bins = thinned_bins(joint_fit.strip_bins(curves, geometry, prior))
+    bins = thinned_bins(curves, geometry, prior)
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
-    flat = [even_fog_over(bins, albedo, prior, even) for albedo in range(len(ALBEDOS))]
+    first = (even.extinction, even.airlight, even.shift)
+    flat = [
+        even_fog_over(bins, albedo, prior, first, chance)
+        for albedo, chance in zip(ALBEDOS, CHANCES_OF_EVEN, strict=True)
+    ]
     evens = [one.cost - _BENT * hidden.is_bent for one in flat]
     likely = int(np.argmin(evens))
-    first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
-    begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
+    guess = first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
+    begin = np.concatenate([guess, [prior.airlight, prior.shift, 0.0]])
     tried = [_uneven(bins, likely, prior, _GENTLE, begin, _STEPS)]
     tried.append(_uneven(bins, likely, prior, _FIRST_UNEVEN, begin, _STEPS))
     tried += _banks(bins, likely, prior, begin)
@@ -177,7 +181,7 @@ def _fitted(
         if albedo != likely and cost < evens[likely] + _UNLIKELY:
             tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, _MORE_STEPS))
     fogs = [
-        replace(one, cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
+        EvenFog(cost, even.extinction, even.extinction_deviation**2, one.left_out)
         for one, cost in zip(flat, evens, strict=True)
     ]
     gain = min(evens) - min(t.cost for t in tried)
@@ -185,7 +189,7 @@ def _fitted(
         courses = hidden.even_fogs(curves, prior, even, likely, gain)
         explained = min(evens) - min((one.cost for one in courses), default=math.inf)
         doubt = _HIDDEN_COURSE if explained > _MOSTLY * gain else 0.0
-        fogs += [replace(one, cost=one.cost - doubt) for one in courses]
+        fogs += [EvenFog(one.cost - doubt, *one[1:]) for one in courses]
     return _weighed(even, fogs, tried, bins, geometry)
 
 
@@ -197,33 +201,42 @@ def _is_free(even: JointFit, curves: StripCurves) -> bool:
 
 def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
     """Fog that is the same all along the way."""
-    reach = _reach(even.used, geometry.path / geometry.below)
+    reach = _reach(even.used, geometry.path, geometry.below)
     k = max(even.extinction, 0.0)
     distance = _distances(reach)
     return UnevenFit(even, reach, distance, k * distance, even.extinction_deviation * distance)
 
 
+@kernel
 def _distances(reach: float) -> Floats:
     """Distances of a curve up to a reach [m]."""
-    count = max(math.ceil(math.log(max(reach, _NEAREST) / 10.0) / math.log(1.15)), 1)
-    return np.geomspace(10.0, max(reach, _NEAREST), count + 1)
+    farthest = max(reach, _NEAREST)
+    count = max(math.ceil(math.log(farthest / 10.0) / math.log(1.15)), 1)
+    out = 10.0 * (farthest / 10.0) ** (np.arange(count + 1) / count)
+    out[count] = farthest
+    return out
 
 
-def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
+@kernel
+def _reach(used: NDArray[np.bool_], path: Floats, below: Floats) -> float:
     """Path to the farthest bin in use [m]."""
-    seen = paths[: len(used)][used]
-    return float(seen.max()) if seen.size else 0.0
+    farthest = 0.0
+    for s in range(used.shape[0]):
+        for i in range(used.shape[1]):
+            if used[s, i]:
+                farthest = max(farthest, path[s, i] / below[i])
+    return farthest
 
 
 def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:
     """Fit of fog of some unevenness."""
-    fog = fog_nodes(*UNEVENNESS[unevenness], start.size - uneven_kernels.OTHERS)
+    fog = fog_nodes(*UNEVENNESS[unevenness], start.size - OTHERS)
     return _candidate(bins, albedo, prior, fog, UNEVEN_CHANCES[unevenness], start, steps)
 
 
 def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_Candidate]:
     """Fits of banks that begin where a first fit has the fog become denser, or one node on."""
-    count = start.size - uneven_kernels.OTHERS
+    count = start.size - OTHERS
     if count <= _FIRST_BANK + 1:
         return []
     rises = np.diff(start[:count])
@@ -239,8 +252,7 @@ def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_C
 def _candidate(
     bins: Bins, albedo: int, prior: JointPrior, fog: FogNodes, chance: float, start: Floats, steps: int
 ) -> _Candidate:
-    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
-    found = uneven_kernels.fit_uneven(bins, albedos, prior, fog, start, steps)
+    found = fit_over_nodes(bins, ALBEDOS[albedo], prior, fog, start, steps)
     if int((found.used[0] == USED).sum()) < joint_fit.LEAST_BINS:
         return _Candidate(math.inf, found, fog, chance)
     likelihood = found.cost + hidden_cost(found, bins)
@@ -261,7 +273,7 @@ def _weighed(
     best = tried[int(np.argmax(of_tried))]
     used = even.used if share > 0.5 else best.solution.used == USED
     seen = geometry if share > 0.5 else bins
-    reach = _reach(used, seen.path / seen.below)
+    reach = _reach(used, seen.path, seen.below)
     if reach <= 0.0:
         return None
     distance = _distances(reach)
@@ -271,12 +283,10 @@ def _weighed(
     for weight, candidate in zip(of_tried, tried, strict=True):
         if weight < 1e-3:
             continue
-        mean, variance = _mean_extinction(candidate, reach)
-        k, k2 = k + weight * mean, k2 + weight * (mean**2 + variance)
-        for i, place in enumerate(distance):
-            value, spread = _depth(candidate, float(place))
-            depth[i] += weight * value
-            depth2[i] += weight * (value**2 + spread)
+        seen_fog = path_depths(*_solved(candidate), distance, reach)
+        k, k2 = k + weight * seen_fog.mean, k2 + weight * (seen_fog.mean**2 + seen_fog.mean_variance)
+        depth += weight * seen_fog.depth
+        depth2 += weight * (seen_fog.depth**2 + seen_fog.variance)
     sd = math.sqrt(max(k2 - k * k, 0.0))
     deviation = np.sqrt(np.maximum(depth2 - depth**2, 0.0))
     if share > 0.5:
@@ -291,58 +301,91 @@ def _weighed(
         used=of_each_bin(best.solution.used == USED, geometry.distance),
         hidden=of_each_bin(best.solution.used == HIDDEN, geometry.distance)[0],
     )
-    return UnevenFit(fit, reach, distance, depth, deviation, share, _denser(best, reach))
+    denser = denser_part(*_solved(best), reach)
+    return UnevenFit(fit, reach, distance, depth, deviation, share, None if math.isnan(denser[0]) else denser)
 
 
-def _mean_extinction(candidate: _Candidate, reach: float) -> tuple[float, float]:
-    """Mean extinction up to the meteorological visibility, or to a reach that is nearer [1/m], and its variance."""
-    nodes, solution = candidate.fog.nodes, candidate.solution
-    logs = solution.theta[: nodes.size]
-    distance = uneven_kernels.distance_at_depth(nodes, logs, OPTICAL_DEPTH_AT_VISIBILITY)
-    if distance > reach:
-        depth, variance = _depth(candidate, reach)
-        return depth / reach, variance / reach**2
-    # A depth that is greater by dτ is reached dτ / k sooner.
-    depth, variance = _depth(candidate, distance)
-    slope = depth / distance**2 / uneven_kernels.extinction_at(nodes, logs, distance)
-    return depth / distance, slope**2 * variance
+def _solved(candidate: _Candidate) -> tuple[Floats, Floats, Floats]:
+    """Nodes, parameters and their covariance."""
+    return candidate.fog.nodes, candidate.solution.theta, candidate.solution.covariance
 
 
-def _depth(candidate: _Candidate, distance: float) -> tuple[float, float]:
-    """Optical depth up to a distance, and its variance [-]."""
-    nodes = candidate.fog.nodes
-    depth, gradient = uneven_kernels.depth_at(nodes, candidate.solution.theta[: nodes.size], distance)
-    return depth, _variance(gradient, candidate.solution.covariance)
+_ASIDE = 0.3
+"""How far to either side rows are looked at [rad]."""
+
+_ALIKE, _NOISE = 0.07, 3.0
+"""Difference to the sky's luminance up to which nothing else is seen, relative to it and in its pixels' deviations."""
+
+_LEAST_SHARE, _KEPT, STEP = 0.25, 0.7, 0.35
+"""Least share of a row that is airlight beyond the front, least of that which all rows above keep, and most of it that
+the ground two rows below has [-]: trees and vehicles that stand nearer hide the rest."""
+
+_NEAR_FOG = 40.0
+"""Up to where fog counts as near, and fronts are the joint fit's [m]."""
+
+_MOST_DEPTH = 1.5
+"""Most optical depth of the fog before the front [-]: denser fog hides much of the ground itself."""
+
+_LEAST_ROWS, _UNSURE_ROW = 1.0, 0.15
+"""Least rows of a front below the horizon [px], and most of the horizon's standard deviation over them [-]."""
+
+_DENSER = 2.5
+"""Least extinction at the front over that of the near fog [-]."""
 
 
-def _variance(gradient: Floats, covariance: Floats) -> float:
-    size = gradient.size
-    return float((gradient[:, None] * covariance[:size, :size] * gradient).sum())
+def airlight_edge(
+    image: LinearPixels, geometry: StripGeometry, camera: Camera, sky: Sky, uneven: UnevenFit, horizon_deviation: float
+) -> tuple[float, float, float] | None:
+    """Find the front of a bank as the row from which on ground is airlight.
 
+    A crest whose far side falls away looks the same where nothing stands out beyond it; one that the lane marks show is
+    in `geometry`.
 
-def _denser(candidate: _Candidate, reach: float) -> tuple[float, float, float] | None:
-    """Where fog is surely much denser than near the camera, if anywhere."""
-    nodes, solution = candidate.fog.nodes, candidate.solution
-    seen = int((nodes <= reach).sum())
-    if _depth(candidate, reach)[0] < _SWALLOWED:
+    Returns where it begins [m], the standard deviation of that [m], and the least extinction there [1/m]. Takes
+    `horizon_deviation` [px].
+    """
+    if sky.is_clipped:
         return None
-    logs, covariance = solution.theta[:seen], solution.covariance[:seen, :seen]
-    for node in range(2, seen):
-        # The near road is all before the node, each stretch weighed by its length.
-        lengths = np.diff(nodes[: node + 1])
-        weight = np.zeros(seen)
-        weight[:node], weight[node] = -lengths / lengths.sum(), 1.0
-        rise = float((weight * logs).sum())
-        if rise > _DENSER and rise > _SURELY_DENSER * math.sqrt(_variance(weight, covariance)):
-            return _half_density(nodes, logs, node, node + int(np.argmax(logs[node:])))
+    below = geometry.below - uneven.fit.shift
+    whole = (geometry.first == geometry.last) & (below > max(_LEAST_ROWS, horizon_deviation / _UNSURE_ROW))
+    # Behind a crest no row is farther than the one below it.
+    farther = np.diff(below, prepend=math.inf) < 0.0
+    far = np.flatnonzero(whole & farther & (geometry.distance > _NEAR_FOG))
+    reach = _ASIDE * camera.focal_length
+    columns = (
+        max(round(camera.principal_point[0] - reach), 0),
+        min(round(camera.principal_point[0] + reach), camera.width),
+    )
+    alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
+    shares = airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
+    front = _front(shares)
+    if front is None:
+        return None
+    distance = camera.row_distance / below[far]
+    before, behind = float(distance[front - 2]), float(distance[front])
+    depth, near = _depth(uneven, before), _depth(uneven, _NEAR_FOG)
+    if depth > _MOST_DEPTH:
+        return None
+    # What is left of the ground's contrast two rows below it is gone.
+    contrast = max(1.0 - uneven.fit.road / uneven.fit.airlight, alike) * math.exp(-depth)
+    extinction = math.log(max(contrast / alike, 1.0)) / (behind - before)
+    if extinction < _DENSER * near / _NEAR_FOG:
+        return None
+    edge = float(below[far[front]]) + 0.5
+    place = camera.row_distance / edge
+    return place, place / edge * math.hypot(0.5, horizon_deviation), extinction
+
+
+def _depth(uneven: UnevenFit, distance: float) -> float:
+    """Optical depth up to a distance, beyond the road that was seen with the mean extinction up to its end [-]."""
+    beyond = max(distance / float(uneven.distance[-1]), 1.0)
+    return max(float(np.interp(distance, uneven.distance, uneven.depth)), 0.0) * beyond
+
+
+def _front(shares: np.ndarray) -> int | None:
+    """Nearest row, of those from near to far, from which on airlight is seen; None if there is no such step."""
+    for row in range(2, shares.size):
+        if shares[row] >= _LEAST_SHARE:
+            step = shares[row - 2] <= STEP * shares[row]
+            return row if step and shares[row:].min() >= _KEPT * shares[row] else None
     return None
-
-
-def _half_density(nodes: Floats, logs: Floats, node: int, densest: int) -> tuple[float, float, float]:
-    """Where extinction reaches half of that of the densest node, how surely [m], and that extinction [1/m]."""
-    half = logs[densest] - math.log(2.0)
-    while logs[node] < half:
-        node += 1
-    before, after = float(nodes[node - 1]), float(nodes[node])
-    share = (half - logs[node - 1]) / max(logs[node] - logs[node - 1], 1e-9)
-    return before + min(max(share, 0.0), 1.0) * (after - before), 0.5 * (after - before), math.exp(logs[densest])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import times
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.vision.strips.albedo_filter import (
     Albedo,
     Residuals,
@@ -26,6 +27,7 @@ from fogsim.vision.strips.joint_kernels import (
     allocated,
     invert,
     near_road,
+    under_sky,
 )
 
 OTHERS = 3
@@ -50,6 +52,13 @@ _TOLERANCE, _TOLERANT = 0.06, 4
 """Deviation of the first guess's luminance, relative to the airlight [-], and steps over which it is halved each time
 before bins count as sharp as they are: else a guess that is a little off would take far fog for an obstacle."""
 
+_SWALLOWED = 1.0
+"""Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
+crests and in sags road seems to fade a little."""
+
+_DENSER, _SURELY_DENSER = math.log(2.5), 2.5
+"""Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
+
 NEAR = 30.0
 """Path over which the first guess takes the fog for even [m]."""
 
@@ -64,7 +73,7 @@ class FogNodes(NamedTuple):
 
 
 @kernel
-def depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Optical depth up to each node [-] (`nodes` (m,) [m], `extinctions` (m,) [1/m])."""
     depths = np.zeros(nodes.size)
     for j in range(1, nodes.size):
@@ -119,7 +128,7 @@ def _linearise(
     """Residual and derivatives by cells, airlight, horizon and vignetting of one strip."""
     cells = nodes.size
     extinctions, weights = np.exp(theta[:cells]), _node_weights(nodes)
-    depths = depths_at_nodes(nodes, extinctions)
+    depths = _depths_at_nodes(nodes, extinctions)
     airlight, shift, vignetting = theta[cells], theta[cells + 1], theta[cells + 2]
     drop = road - airlight
     columns, scale, veil = out.columns[strip], out.scale[strip], out.veil[strip]
@@ -222,12 +231,13 @@ def _move(
 
 @kernel
 def fit_uneven(
-    bins: Bins, albedo: Albedo, prior: JointPrior, fog: FogNodes, start: NDArray[np.float64], iterations: int
+    bins: Bins, on_road: Albedo, prior: JointPrior, fog: FogNodes, start: NDArray[np.float64], iterations: int
 ) -> Solution:
     """Gauss–Newton from a start, a step that leads uphill halved.
 
     Returns Its ``theta`` as the start. Takes `start` (m + 3,).
     """
+    albedo = under_sky(on_road, prior)
     strips, count = bins.luminance.shape
     cells = fog.nodes.size
     size = cells + OTHERS
@@ -316,7 +326,7 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
 def distance_at_depth(nodes: NDArray[np.float64], logs: NDArray[np.float64], depth: float) -> float:
     """Distance at which an optical depth is reached [m] (`nodes` (m,) [m], `logs` (m,))."""
     extinctions = np.exp(logs)
-    depths, node = depths_at_nodes(nodes, extinctions), nodes.size - 1
+    depths, node = _depths_at_nodes(nodes, extinctions), nodes.size - 1
     while node > 0 and depths[node] > depth:
         node -= 1
     here, rest = extinctions[node], depth - depths[node]
@@ -348,3 +358,93 @@ def depth_at(
 def extinction_at(nodes: NDArray[np.float64], logs: NDArray[np.float64], distance: float) -> float:
     """Extinction at a distance [1/m] (`nodes` (m,) [m], `logs` (m,), `distance` [m])."""
     return _extinction_at(nodes, np.exp(logs), _before(nodes, distance), distance)
+
+
+class _PathDepths(NamedTuple):
+    """Optical depths along a path with the variance of each, and the mean extinction."""
+
+    depth: NDArray[np.float64]  # (n,) [-]
+    variance: NDArray[np.float64]  # (n,) [-]
+    # mean, mean_variance: extinction up to the meteorological visibility, or to a reach that is nearer [1/m]
+    mean: float
+    mean_variance: float
+
+
+@kernel
+def path_depths(
+    nodes: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    reach: float,
+) -> _PathDepths:
+    """Fog of a solution along the path (`nodes` (m,), `distance` (n,), `reach` [m])."""
+    logs, depth, variance = theta[: nodes.size], np.empty(distance.size), np.empty(distance.size)
+    for i in range(distance.size):
+        depth[i], variance[i] = _depth_with_variance(nodes, logs, covariance, distance[i])
+    visible = distance_at_depth(nodes, logs, OPTICAL_DEPTH_AT_VISIBILITY)
+    whole, unsure = _depth_with_variance(nodes, logs, covariance, min(visible, reach))
+    if visible > reach:
+        return _PathDepths(depth, variance, whole / reach, unsure / (reach * reach))
+    # A depth that is greater by dτ is reached dτ / k sooner.
+    slope = whole / (visible * visible) / extinction_at(nodes, logs, visible)
+    return _PathDepths(depth, variance, whole / visible, slope * slope * unsure)
+
+
+@kernel
+def _depth_with_variance(
+    nodes: NDArray[np.float64], logs: NDArray[np.float64], covariance: NDArray[np.float64], distance: float
+) -> tuple[float, float]:
+    depth, gradient = depth_at(nodes, logs, distance)
+    return depth, _variance(gradient, covariance)
+
+
+@kernel
+def _variance(weights: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    """Variance of a weighted sum of the first parameters."""
+    total = 0.0
+    for a in range(weights.size):
+        for b in range(weights.size):
+            total += weights[a] * covariance[a, b] * weights[b]
+    return total
+
+
+@kernel
+def denser_part(
+    nodes: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    reach: float,
+) -> tuple[float, float, float]:
+    """Where extinction reaches half of that of surely much denser fog, how surely [m], and that extinction [1/m].
+
+    NaN without any up to a reach [m].
+    """
+    logs, weight, seen = theta[: nodes.size], np.empty(nodes.size), 0
+    if depth_at(nodes, logs, reach)[0] < _SWALLOWED:
+        return np.nan, np.nan, np.nan
+    while seen < nodes.size and nodes[seen] <= reach:
+        seen += 1
+    for node in range(2, seen):
+        rise = logs[node]
+        # The near road is all before the node, each stretch weighed by its length.
+        for a in range(node):
+            weight[a] = -(nodes[a + 1] - nodes[a]) / (nodes[node] - nodes[0])
+            rise += weight[a] * logs[a]
+        weight[node] = 1.0
+        if rise > _DENSER and rise > _SURELY_DENSER * math.sqrt(_variance(weight[: node + 1], covariance)):
+            return _half_density(nodes, logs, node, node + int(np.argmax(logs[node:seen])))
+    return np.nan, np.nan, np.nan
+
+
+@kernel
+def _half_density(
+    nodes: NDArray[np.float64], logs: NDArray[np.float64], node: int, densest: int
+) -> tuple[float, float, float]:
+    """Where extinction reaches half of that of the densest node, how surely [m], and that extinction [1/m]."""
+    half = logs[densest] - math.log(2.0)
+    while logs[node] < half:
+        node += 1
+    before, after = float(nodes[node - 1]), float(nodes[node])
+    share = (half - logs[node - 1]) / max(logs[node] - logs[node - 1], 1e-9)
+    return before + min(max(share, 0.0), 1.0) * (after - before), 0.5 * (after - before), math.exp(logs[densest])

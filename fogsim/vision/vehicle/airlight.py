@@ -1,5 +1,6 @@
 """Airlight next to the vehicle ahead, and whether the sky or lamps light the road before it."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
+from fogsim.vision.light.medians import median
 from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float32]
@@ -56,7 +59,7 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
 
     Takes `road` (rows, cols).
     """
-    if road.size and float(np.median(road)) > _BRIGHT_ROAD * sky:
+    if road.size and median(road) > _BRIGHT_ROAD * sky:
         raise CannotTellError("the road is brighter than the sky: lamps or direct sun light it")
 
 
@@ -87,10 +90,19 @@ class RoadFall:
             return 0.0
         bare = 1.0 - self.share + self.share * self.contrast * np.exp(extinction * self.way)
         level = np.log(np.maximum(bare, _LEAST_CONTRAST))
-        first, second = np.triu_indices(self.way.size, 1)
         # The median of all slopes leaves out marks, a bonnet, a shadow.
-        slope = float(np.median((level[second] - level[first]) / (self.way[second] - self.way[first])))
-        return slope * float(np.ptp(self.way))
+        return _median_slope(self.way, level) * float(np.ptp(self.way))
+
+
+@kernel
+def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median of the slopes between all pairs of points."""
+    slopes, count = np.empty(x.size * (x.size - 1) // 2), 0
+    for i in range(x.size):
+        for j in range(i + 1, x.size):
+            slopes[count] = (y[j] - y[i]) / (x[j] - x[i])
+            count += 1
+    return float(np.median(slopes))
 
 
 _NOWHERE = RoadFall(*(np.zeros(0) for _ in range(3)))
@@ -115,7 +127,8 @@ def road_fall(
     if farthest < _FARTHER * nearest:
         return _NOWHERE
     at = np.linspace(nearest, farthest, _ROWS)
-    contrast = np.array([1.0 - _median(luminance_of(*_row(camera, d)), sky) / sky for d in at])
+    rows = _rows(camera, nearest, farthest)
+    contrast = np.array([1.0 - _median(luminance_of(*where), sky) / sky for where in rows])
     seen = contrast > _LEAST_CONTRAST
     if int(seen.sum()) < _ROWS // 2:
         return _NOWHERE
@@ -123,19 +136,25 @@ def road_fall(
     return RoadFall(at[seen], contrast[seen], np.ones(rows.size) if share is None else share[rows])
 
 
-def _row(camera: Camera, distance: float) -> tuple[slice, slice]:
-    row = min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1)
-    middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
-    cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
-    return slice(max(row, 0), max(row, 0) + 1), cols
+@functools.lru_cache(maxsize=64)
+def _rows(camera: Camera, nearest: float, farthest: float) -> list[tuple[slice, slice]]:
+    """Single rows, and columns, of the road between two distances [m]; the list is shared."""
+    found = []
+    for distance in np.linspace(nearest, farthest, _ROWS).tolist():
+        row = max(min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1), 0)
+        middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
+        cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
+        found.append((slice(row, row + 1), cols))
+    return found
 
 
+@kernel
 def _median(pixels: Floats, otherwise: float) -> float:
-    return float(np.median(pixels)) if pixels.size else otherwise
+    return float(np.float32(np.median(pixels))) if pixels.size else otherwise
 
 
-_BLOCKS, _BRIGHT_BLOCKS = 12, 80.0
-"""Blocks of columns of the sky, and the percentile of their brightness that is the airlight: trees hide the others."""
+_BLOCKS, _BRIGHT_SHARE = 12, 0.8
+"""Blocks of columns of the sky, and the quantile of their brightness that is the airlight: trees hide the others."""
 
 _HALF_TRUCK = 1.6
 """How much of the sky next to the axis a high vehicle ahead can hide [m]."""
@@ -155,29 +174,46 @@ def neighbouring_airlight(light: NDArray[np.float32], about: float, noise: float
 
     Returns In the unit of the luminance. Takes `light` (rows, cols), `axis`, `hidden` [px].
     """
-    columns = _blocks(light.shape[1])
-    free = [block for block in columns if abs(0.5 * (block.start + block.stop - 1) - axis) > hidden]
-    seen = free if len(free) >= _BLOCKS // 3 else columns
-    means = [_mean(light[:, block], about, noise) for block in seen]
-    bright = [mean for mean in means if mean is not None]
-    return float(np.percentile(bright, _BRIGHT_BLOCKS)) if bright else about
+    return _neighbouring(light, about, noise, axis, hidden)
 
 
-def _blocks(width: int) -> list[slice]:
-    """Blocks of columns that are the same from either side: they share a column where its middle is their border."""
-    blocks = [slice(width * i // _BLOCKS, -(-width * (i + 1) // _BLOCKS)) for i in range(_BLOCKS)]
-    return [block for block in blocks if block.stop > block.start]
+@kernel
+def _neighbouring(light: NDArray[np.float32], about: float, noise: float, axis: float, hidden: float) -> float:
+    """`neighbouring_airlight`, by blocks that are the same from either side: they share a column at their border."""
+    width, means = light.shape[1], np.empty(_BLOCKS)
+    first, last, is_free, free = np.empty(_BLOCKS, np.int64), np.empty(_BLOCKS, np.int64), np.zeros(_BLOCKS), 0
+    for i in range(_BLOCKS):
+        first[i], last[i] = width * i // _BLOCKS, -(-width * (i + 1) // _BLOCKS)
+        is_free[i] = last[i] > first[i] and abs(0.5 * (first[i] + last[i] - 1) - axis) > hidden
+        free += int(is_free[i])
+    count = 0
+    for i in range(_BLOCKS):
+        if last[i] > first[i] and (is_free[i] or free < _BLOCKS // 3):
+            means[count] = _mean(light[:, first[i] : last[i]], about, noise)
+            count += not np.isnan(means[count])
+    if count == 0:
+        return about
+    ordered, place = np.sort(means[:count]), _BRIGHT_SHARE * (count - 1)
+    below = int(place)
+    return float(ordered[below] + (place - below) * (ordered[min(below + 1, count - 1)] - ordered[below]))
 
 
-def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None:
-    """Mean of the pixels of the sky in a part; None if too few are."""
-    reach, middle = _ALIKE * about + 4.0 * noise, about
+@kernel
+def _mean(part: NDArray[np.float32], about: float, noise: float) -> float:
+    """Mean of the pixels of the sky in a part; NaN if too few are."""
+    middle, core = about, np.empty(part.size, np.float32)
     # What is cut off about a first middle is lopsided, so that it is looked for again about the next.
-    for narrow in (reach, max(4.0 * noise, 1.0), max(3.0 * noise, 1.0)):
-        core = part[np.abs(part - np.float32(middle)) <= narrow]
-        if core.size < max(_LEAST_SEEN * part.size, 1):
-            return None
-        middle = float(np.median(core)) if narrow is reach else float(core.mean(dtype=np.float64))
+    for step in range(3):
+        reach = np.float32((_ALIKE * about + 4.0 * noise, max(4.0 * noise, 1.0), max(3.0 * noise, 1.0))[step])
+        count, total = 0, 0.0
+        for value in part.flat:
+            if abs(value - np.float32(middle)) <= reach:
+                core[count] = value
+                total += float(value)
+                count += 1
+        if count < max(_LEAST_SEEN * part.size, 1.0):
+            return np.nan
+        middle = float(np.float32(np.median(core[:count]))) if step == 0 else total / count
     return middle
 
 

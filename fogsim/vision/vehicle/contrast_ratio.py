@@ -6,13 +6,62 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.light.box_means import box_means
-from fogsim.vision.light.clipped_sky import darker_by
-from fogsim.vision.light.medians import median
-from fogsim.vision.vehicle.patch import Patch, Placement, downsample_to, pixel_grid
-from fogsim.vision.vehicle.template_matching import INDEPENDENT
+from fogsim.core.jit import kernel
+from fogsim.vision.light.luminance import darker_by
+from fogsim.vision.light.medians import quantile
+from fogsim.vision.vehicle.patch import INDEPENDENT, Patch, Placement, downsample_to, pixel_grid
 
 Floats = NDArray[np.float64]
+
+
+@kernel
+def box_means(picture: Floats, rows: Floats, cols: Floats, box: float) -> tuple[Floats, float]:
+    """Means over square boxes about the crossings of rows and columns.
+
+    Takes `picture` (n, m), `rows`, `cols` (l,), `box` [px].
+    """
+    down, top, down_power = _shares(picture.shape[0], rows, box)
+    across, left, across_power = _shares(picture.shape[1], cols, box)
+    first, last = picture.shape[1], 0
+    for j in range(cols.size):
+        first, last = min(first, left[j]), max(last, left[j] + across.shape[1])
+    last = min(last, picture.shape[1])
+    means = np.zeros((rows.size, cols.size))
+    line = np.zeros(picture.shape[1])
+    for i in range(rows.size):
+        line[first:last] = 0.0
+        for r in range(min(down.shape[1], picture.shape[0] - top[i])):
+            share = down[i, r]
+            if share > 0.0:
+                for c in range(first, last):
+                    line[c] += share * picture[top[i] + r, c]
+        for j in range(cols.size):
+            total = 0.0
+            for c in range(min(across.shape[1], picture.shape[1] - left[j])):
+                total += across[j, c] * line[left[j] + c]
+            means[i, j] = total
+    return means, down_power * across_power
+
+
+@kernel
+def _shares(size: int, centres: Floats, box: float) -> tuple[Floats, NDArray[np.int64], float]:
+    """Shares of pixels in boxes along one axis, the first pixel of each, and the mean of their sums of squares."""
+    shares = np.zeros((centres.size, math.ceil(box) + 2))
+    first = np.zeros(centres.size, np.int64)
+    power = 0.0
+    for i in range(centres.size):
+        low, high = centres[i] - 0.5 * box, centres[i] + 0.5 * box
+        first[i] = min(max(math.floor(low + 0.5), 0), size - 1)
+        total = 0.0
+        for p in range(min(shares.shape[1], size - first[i])):
+            pixel = first[i] + p
+            shares[i, p] = max(min(high, pixel + 0.5) - max(low, pixel - 0.5), 0.0)
+            total += shares[i, p]
+        for p in range(shares.shape[1]):
+            shares[i, p] /= max(total, 1e-9)
+            power += shares[i, p] ** 2
+    return shares, first, power / max(centres.size, 1)
+
 
 HALF_BODY = 0.42
 """Half the width of the part of the rear that is compared, in widths of the vehicle [-]."""
@@ -141,7 +190,7 @@ def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRati
         return None
     sure = shown**2 / (seen_noise + shown_noise + own**2)
     first = _weighted_median(seen / np.where(np.abs(shown) > 1e-9, shown, 1e-9), sure)
-    weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own**2)
+    weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own**2, False)
     count = int((weight > 0).sum())
     if count < max(_LEAST_KEPT * shown.size, 6):
         return None
@@ -192,7 +241,7 @@ def mean_luminances(
 
 def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Floats]:
     """Weights of pixels by their contrasts to the sky, and the near contrasts, which the means are weighted by, too."""
-    most = float(np.percentile(near, 95))
+    most = quantile(near, 0.95)
     if most <= 2.0 * noise:
         return np.zeros_like(near), np.zeros_like(near)
     shading = _shading_deviation(near, most, 1.0)
@@ -201,14 +250,14 @@ def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Flo
     gain = np.maximum(near, 0.0)
     first = _weighted_median(far / np.maximum(gain, 1e-9), gain**2 / (noise**2 + shading**2))
     own = shading**2 + (_MISPLACED * change) ** 2
-    return _line_through_airlight(gain, far, first, noise**2, own, rescaled=True)[0], gain
+    return _line_through_airlight(gain, far, first, noise**2, own, True)[0], gain
 
 
 def _own_deviation(shown: Floats, noise: float) -> Floats | None:
     """Deviation of each cell's own contrast between two pictures; None if nothing stands out of the noise."""
-    most = float(np.percentile(shown, 95))
+    most = quantile(shown, 0.95)
     if most <= 2.0 * noise:
-        most = float(np.percentile(np.abs(shown), 95))
+        most = quantile(np.abs(shown), 0.95)
         if most <= 2.0 * noise:
             return None
     down, across = np.gradient(shown)
@@ -223,26 +272,33 @@ def _shading_deviation(contrast: Floats, most: float, brightest: float = math.in
     return np.asarray(_SHADING * through * luminance, np.float64)
 
 
+@kernel
 def _line_through_airlight(
-    shown: Floats, seen: Floats, ratio: float, noise: float, own: Floats, *, rescaled: bool = False
+    shown: Floats, seen: Floats, ratio: float, noise: float, own: Floats, rescaled: bool
 ) -> tuple[Floats, float]:
     """Weights and slope of seen = ratio · shown from a first ratio on, by variances of the noise and of what is shown.
 
     Iterated with Tukey's biweight; `rescaled` weights are by the variance that is found and not by that expected.
     """
-    weight = np.zeros_like(shown)
+    weight, residual, slope = np.zeros(shown.shape), np.empty(shown.shape), ratio
     for _ in range(_ROUNDS):
-        t = min(max(ratio, 0.0), 2.0)
-        variance = noise + t**2 * own
-        residual = np.abs(seen - ratio * shown) / np.sqrt(variance)
-        scale = max(1.4826 * median(residual), 1.0)
-        kept = np.maximum(1.0 - (residual / (_BIWEIGHT * scale)) ** 2, 0.0) ** 2
-        weight = kept / (variance * scale**2 if rescaled else variance)
-        power = float((weight * shown**2).sum())
+        t = min(max(slope, 0.0), 2.0)
+        for i in range(shown.shape[0]):
+            for j in range(shown.shape[1]):
+                residual[i, j] = abs(seen[i, j] - slope * shown[i, j]) / math.sqrt(noise + t**2 * own[i, j])
+        scale = max(1.4826 * np.median(residual), 1.0)
+        power, both = 0.0, 0.0
+        for i in range(shown.shape[0]):
+            for j in range(shown.shape[1]):
+                kept = max(1.0 - (residual[i, j] / (_BIWEIGHT * scale)) ** 2, 0.0) ** 2
+                variance = noise + t**2 * own[i, j]
+                weight[i, j] = kept / (variance * scale**2 if rescaled else variance)
+                power += weight[i, j] * shown[i, j] ** 2
+                both += weight[i, j] * shown[i, j] * seen[i, j]
         if power <= 0.0:
-            return np.zeros_like(shown), ratio
-        ratio = float((weight * shown * seen).sum()) / power
-    return weight, ratio
+            return np.zeros(shown.shape), slope
+        slope = both / power
+    return weight, slope
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.vehicle.template_matching import vertex
+from fogsim.vision.vehicle.patch import vertex
 
 Floats = NDArray[np.float64]
 

@@ -7,18 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.linear_algebra import inverse_of, matrix_product
-from fogsim.vision.light.medians import median
+from fogsim.vision.light.medians import median, row_medians
 from fogsim.vision.vehicle.contrast_ratio import RearPicture, cell_centres, common_cell, resample
 from fogsim.vision.vehicle.patch import (
+    INDEPENDENT,
     Patch,
     PixelGrid,
     Placement,
     column_weights,
     downsample_to,
+    match_cost,
     pixel_grid,
     shrunk_rows,
+    vertex,
 )
-from fogsim.vision.vehicle.template_matching import INDEPENDENT, match_cost, vertex
 
 Floats = NDArray[np.float64]
 
@@ -287,4 +289,4 @@ def _less_road_beside(contrast: Floats, lateral: Floats, reference: RearPicture)
     """Contrast less that of the road next to the vehicle at the same height: near road fades into far road upwards."""
     beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * _ASIDE
     outer = contrast[:, beside] if beside.any() else contrast[:, [0, -1]]
-    return np.asarray(contrast - np.median(outer, axis=1)[:, None], np.float64)
+    return np.asarray(contrast - row_medians(outer)[:, None], np.float64)

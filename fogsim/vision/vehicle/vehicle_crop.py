@@ -1,18 +1,19 @@
 """The part of a daytime image in which the vehicle ahead must be, as contrast to the sky."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.camera import Camera
-from fogsim.vision.light.clipped_sky import Clipping, clipping
-from fogsim.vision.light.luminance import linear_pixels, linear_table
-from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
+from fogsim.values.camera import Camera, Response
+from fogsim.vision.light.luminance import Clipping, clipping, linear_pixels, linear_table
+from fogsim.vision.light.medians import median
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
@@ -26,7 +27,7 @@ from fogsim.vision.vehicle.airlight import (
     road_fall,
 )
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
-from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
+from fogsim.vision.vehicle.rear_localisation import STANDS_OUT, WIDTHS, RearBox, localise_rear, search_window
 
 _MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
@@ -208,13 +209,9 @@ def daytime_crop(
 
 
 def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
-    part = pixels.pixels[rows, cols]
-    # Channel by channel, for a look-up of all at once is slower.
-    total = pixels.tables[0][part[:, :, 0]]
-    for channel in range(1, part.shape[2]):
-        total = total + pixels.tables[channel][part[:, :, channel]]
-    light: NDArray[Any] = total
-    return light
+    first, end, step = rows.indices(len(pixels.pixels))
+    left, right, _ = cols.indices(pixels.pixels.shape[1])
+    return part_luminance(pixels, first, end, step, left, right)
 
 
 def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
@@ -274,8 +271,133 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
 
     Takes `luminance` (rows, cols) [linear grey levels], `sky` [linear grey levels].
     """
-    table = linear_table(camera.response, camera.bits, camera.black_level)
-    slope = np.gradient(table.astype(np.float64))
-    here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
+    table, slope = _table_with_slope(camera.response, camera.bits, camera.black_level)
+    here, there = (int(np.searchsorted(table, level)) for level in (median(luminance), sky))
     most = table.size - 1
     return float(slope[min(here, most)] / slope[min(there, most)])
+
+
+@functools.lru_cache(maxsize=8)
+def _table_with_slope(
+    response: Response, bits: int, black_level: float
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    table = linear_table(response, bits, black_level)
+    return table, np.gradient(table.astype(np.float64))
+
+
+_NEAREST, STEP = 8.0, 1.1
+"""Nearest range at which an unknown vehicle is searched [m], and the ratio of each range to the next [-]."""
+
+_LEAST_RANGED = 8.0
+"""Narrowest vehicle that is searched [px]."""
+
+_USUAL_WIDTH, _WIDTH_SPREAD, _UNUSUAL = 1.8, 0.15, 0.4
+"""Median width of vehicles [m], the standard deviation of its logarithm, and how far that may be from it [-]."""
+
+_FOOT = 0.15
+"""Standard deviation of the height of what is taken for the foot [m]: in fog a bumper's lower edge is clearer."""
+
+_KNOWN_WIDTH = 0.02
+"""Relative standard deviation of a width that is given: edges are rounded [-]."""
+
+_CONSISTENT = 0.1
+"""Largest relative difference of a range by the contact with the road from the range that is tried [-]."""
+
+_EDGE, _REGISTERED = 0.3, 0.2
+"""Standard deviation of the width between two edges, and of one by registration [px]."""
+
+_MOST_JUMP = 12.0
+"""Change of range between frames by more than which the vehicle is another one [m]."""
+
+
+def registered_deviation(camera: Camera, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation of ranges whose pictures were registered [m]."""
+    return np.asarray(_REGISTERED * distance**2 / (_USUAL_WIDTH * camera.focal_length))
+
+
+class CameraRange:
+    """Ranges to a vehicle by the width of its picture, d = f W / w.
+
+    Its width W is known, or follows from the row at which it stands on the road, d = λ / (v − v_h), weighted over its
+    pictures, for the nearest show it best, and from the usual width of vehicles. An error of W is common to all ranges,
+    and so goes into k as a factor.
+
+    Takes `width` [m], `pitch_deviation` [rad].
+    """
+
+    def __init__(self, camera: Camera, width: float | None, pitch_deviation: float) -> None:
+        self._camera, self._known, self._pitch_deviation = camera, width, pitch_deviation
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the vehicle."""
+        self._distance: float | None = None
+        self._first_width, self._weighted, self._weight, self._nearest = 0.0, 0.0, 0.0, math.inf
+
+    @property
+    def scale(self) -> float:
+        """What true ranges are over the measured ones, by all pictures and the usual width of vehicles [-]."""
+        if self._known:
+            return 1.0
+        share = (self.scale_deviation / _WIDTH_SPREAD) ** 2
+        width = (1.0 - share) * self._weighted / self._weight + share * math.log(_USUAL_WIDTH)
+        return math.exp(width) / self._first_width
+
+    @property
+    def scale_deviation(self) -> float:
+        """Relative standard deviation of all ranges together [-]."""
+        if self._known:
+            return _KNOWN_WIDTH
+        # The pitch may be off by as much in every picture; the nearest shows that least.
+        by_contact = math.hypot(self._pitch_deviation * self._nearest, _FOOT) / self._camera.mount_height
+        return 1.0 / math.hypot(1.0 / by_contact, 1.0 / _WIDTH_SPREAD)
+
+    def measure(self, crop_at: Callable[[float], VehicleCrop]) -> tuple[float, float]:
+        """Range from the camera, and its standard deviation that is not common to all [m] (`crop_at` [m])."""
+        box = self._search(crop_at) if self._distance is None else self._follow(crop_at, self._distance)
+        width = self._known or self._first_width
+        distance = width * self._camera.focal_length / box.width
+        if self._distance is not None and abs(distance - self._distance) > _MOST_JUMP:
+            raise CannotTellError("the vehicle ahead no longer stands out")
+        self._distance = distance
+        contact = self._contact(box)
+        if contact is not None and not self._known:
+            weight = contact**-2.0
+            self._weighted += weight * math.log(box.width * contact / self._camera.focal_length)
+            self._weight += weight
+            self._nearest = min(self._nearest, contact)
+        return distance, _EDGE * distance / box.width
+
+    def _contact(self, box: RearBox) -> float | None:
+        """Range by the row at which a vehicle stands [m]; None where its foot does not stand out."""
+        below = box.foot - self._camera.horizon_row
+        clear = box.evidence > math.log1p(STANDS_OUT**2) and below > 1.0
+        return self._camera.row_distance / below if clear else None
+
+    def _search(self, crop_at: Callable[[float], VehicleCrop]) -> RearBox:
+        farthest = WIDTHS[1] * self._camera.focal_length / _LEAST_RANGED
+        count = max(math.ceil(math.log(max(farthest, _NEAREST) / _NEAREST) / math.log(STEP)), 1)
+        for tried in np.geomspace(_NEAREST, _NEAREST * STEP**count, count + 1):
+            try:
+                box = _localised(crop_at(float(tried)), float(tried))
+            except CannotTellError:
+                continue
+            contact = None if box is None else self._contact(box)
+            if box is None or contact is None or abs(math.log(contact / tried)) > _CONSISTENT:
+                continue
+            width = box.width * contact / self._camera.focal_length
+            if abs(math.log(width / (self._known or _USUAL_WIDTH))) < _UNUSUAL:
+                # Farther ones are parts of it: in the image they lie above its foot.
+                self._first_width = width
+                return box
+        raise CannotTellError("no vehicle stands out ahead whose range the image shows")
+
+    def _follow(self, crop_at: Callable[[float], VehicleCrop], distance: float) -> RearBox:
+        box = _localised(crop_at(distance), distance)
+        if box is None:
+            raise CannotTellError("the vehicle ahead no longer stands out")
+        return box
+
+
+def _localised(crop: VehicleCrop, distance: float) -> RearBox | None:
+    return localise_rear(crop.luminance, crop.origin, crop.camera, distance, crop.noise)

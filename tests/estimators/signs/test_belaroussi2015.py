@@ -13,8 +13,7 @@ from fogsim.errors import InputError
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import ProjectedSign
-from fogsim.estimators.signs.track import SignTrack
-from fogsim.estimators.signs.watch import Watched
+from fogsim.estimators.signs.watch import SignTrack, Watched
 from fogsim.values import Camera, Frame, Observation, SignSighting
 
 CAMERA = Camera(140, 60, 140.0, (69.5, 29.5), 1.4)

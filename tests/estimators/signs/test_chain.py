@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fogsim.estimators.signs.regions import project_sightings
-from fogsim.estimators.signs.registration import Registration, register_signs
+from fogsim.estimators.signs.regions import Registration, project_sightings, register_signs
 from fogsim.values import Camera, SignSighting
 from fogsim.vision.symmetry.detection import detect_signs
 

@@ -1,7 +1,6 @@
 import pytest
 
-from fogsim.estimators.signs.regions import project_sightings
-from fogsim.estimators.signs.registration import register_signs
+from fogsim.estimators.signs.regions import project_sightings, register_signs
 from fogsim.values import Camera, SignSighting
 from fogsim.vision.symmetry.detection import SignDetection
 

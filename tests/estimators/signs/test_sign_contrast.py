@@ -7,9 +7,8 @@ import pytest
 from sign_picture import AIRLIGHT, CAMERA, LATERAL, SETBACK, observed, picture
 
 from fogsim.estimators import make
-from fogsim.estimators.signs.approach_fit import GRID, ApproachFit, extinction_of
-from fogsim.estimators.signs.face_light import face_light
-from fogsim.estimators.signs.layout import LAYOUTS, UNKNOWN, face_maps, layout_of
+from fogsim.estimators.signs.face_light import LAYOUTS, UNKNOWN_SIGN, face_light, face_maps, layout_of
+from fogsim.estimators.signs.sign_contrast import GRID, ApproachFit, extinction_of
 from fogsim.units import extinction_from_visibility
 from fogsim.values.estimate import NORMAL_90_PERCENT
 
@@ -86,9 +85,9 @@ def test_one_of_three_signs_may_be_wrong() -> None:
 
 def test_every_layout_is_drawn_within_its_face() -> None:
     rows, cols = np.mgrid[-30:31, -30:31].astype(float)
-    for layout in (*LAYOUTS.values(), UNKNOWN):
+    for layout in (*LAYOUTS.values(), UNKNOWN_SIGN):
         covered, light, _ = face_maps(layout, cols.ravel(), rows.ravel(), 20.0, 0.5, 1.0)
         assert 0.3 * math.pi * 400 < covered.sum() < 4.1 * 400
         assert np.all(light <= 0.97)
         assert light[covered < 0.01] == pytest.approx(0.0, abs=0.02)
-    assert layout_of("7-unheard") is UNKNOWN
+    assert layout_of("7-unheard") is UNKNOWN_SIGN

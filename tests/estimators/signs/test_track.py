@@ -1,8 +1,7 @@
 import pytest
 
-from fogsim.estimators.signs.regions import project_sightings
-from fogsim.estimators.signs.registration import Registration
-from fogsim.estimators.signs.track import SignTracks
+from fogsim.estimators.signs.regions import Registration, project_sightings
+from fogsim.estimators.signs.watch import SignTracks
 from fogsim.values import Camera, SignSighting
 from fogsim.vision.symmetry.detection import SignDetection
 

@@ -18,8 +18,7 @@ from fogsim.vision.day.confirmation import (
     without_far_objects,
 )
 from fogsim.vision.day.day_fit import free_road
-from fogsim.vision.day.far_objects import STANDS_OUT
-from fogsim.vision.day.verdict import DISAGREE, DayVerdict
+from fogsim.vision.day.second_opinion import DISAGREE, STANDS_OUT, DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)

@@ -5,13 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.vision.day.evidence_kernels import Law, evidence, no_factor
-from fogsim.vision.day.row_filters import (
+from fogsim.vision.day.evidence_kernels import (
     GRAIN,
     PATCHES,
     SHARED_ROWS,
     SKY_VARIANCE,
+    Law,
+    evidence,
     footprint,
+    no_factor,
     road_pass,
     road_steps,
     sky_pass,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera, Response
-from fogsim.vision.day.response_curves import MOST_SLOPE, STATED, curves_of
+from fogsim.vision.day.row_data import MOST_SLOPE, STATED, curves_of
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
 

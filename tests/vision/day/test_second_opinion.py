@@ -8,8 +8,7 @@ import pytest
 
 from fogsim.values import Camera, Estimate
 from fogsim.vision.day import second_opinion
-from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, SecondOpinion
-from fogsim.vision.day.verdict import DayVerdict
+from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)

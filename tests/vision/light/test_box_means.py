@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.light.box_means import box_means
+from fogsim.vision.vehicle.contrast_ratio import box_means
 
 PICTURE = np.random.default_rng(5).uniform(0.0, 1.0, (30, 40))
 

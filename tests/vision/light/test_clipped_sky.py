@@ -3,8 +3,7 @@ import pytest
 
 from fogsim.values.camera import Camera, Response
 from fogsim.values.camera_response import respond
-from fogsim.vision.light.clipped_sky import clipping, darker_by
-from fogsim.vision.light.luminance import linear_table
+from fogsim.vision.light.luminance import clipping, darker_by, linear_table
 
 
 def even_sky(light, noise, response, channels):

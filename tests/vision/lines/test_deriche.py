@@ -2,8 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fogsim.vision.lines.deriche import CannyDeriche, derivative_kernel, derivatives, smoothing_kernel
-from fogsim.vision.lines.edges import smoothed
+from fogsim.vision.lines.edges import CannyDeriche, derivative_kernel, derivatives, smoothed, smoothing_kernel
 
 
 def recursion(signal, alpha):

@@ -8,10 +8,10 @@ from stripes import CENTRE, ROW, road_lines
 
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.lines.deriche import CannyDeriche
-from fogsim.vision.lines.gradient_lines import consensus_vanishing_point, edge_points, hough_peaks
+from fogsim.vision.lines.edges import CannyDeriche
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_lines import road_vanishing_point
+from fogsim.vision.lines.vanishing_point import consensus_vanishing_point, edge_points, hough_peaks
 
 
 def found(image, guess=(325.0, 64.0)):

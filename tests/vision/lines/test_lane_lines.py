@@ -7,7 +7,7 @@ import pytest
 from stripes import CENTRE, ROW, road_lines
 
 from fogsim.vision.lines.edges import edge_map, smoothed
-from fogsim.vision.lines.lane_lines import LaneLine, hough_lines, published_vanishing_point
+from fogsim.vision.lines.vanishing_point import LaneLine, hough_lines, published_vanishing_point
 
 FIRST = math.ceil(ROW) + 20
 

@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.lines.row_edges import FALLING, RIDGE, RISING, may_lie_on_road, row_points
+from fogsim.vision.lines.road_line_kernels import FALLING, RIDGE, RISING, may_lie_on_road, row_points
 
 STEP = 3
 

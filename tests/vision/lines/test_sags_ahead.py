@@ -3,17 +3,24 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
-from fogsim.vision.lines.sags_ahead import (
+from fogsim.vision.lines.road_course import (
     BEGINS,
     SAG_DEVIATION,
     SAG_LENGTH,
     SagsAhead,
     beginning_cost,
+    cost_given,
+    row_given,
     sag_covariance,
     sag_from,
+    sag_precision,
     unseen_sags,
 )
+from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
+
+
+def cost(ahead: SagsAhead, sag: np.ndarray) -> float:
+    return cost_given(ahead, sag, sag_precision())
 
 
 def test_curvatures_of_neighbouring_pieces_are_alike_and_those_of_far_ones_are_not():
@@ -26,8 +33,8 @@ def test_without_lines_every_sag_is_as_likely_by_them_and_the_row_stays():
     ahead = unseen_sags(220.0, 0.3)
     for piece in range(PIECES):
         sag = sag_from(piece, 1e-4)
-        assert ahead.cost(sag) == pytest.approx(0.0, abs=1e-9)
-        assert ahead.row(sag) == pytest.approx((220.0, 0.09))
+        assert cost(ahead, sag) == pytest.approx(0.0, abs=1e-9)
+        assert row_given(ahead, sag) == pytest.approx((220.0, 0.09))
 
 
 def test_lines_make_the_curvature_that_they_show_likeliest_and_move_the_row_with_it():
@@ -42,9 +49,9 @@ def test_lines_make_the_curvature_that_they_show_likeliest_and_move_the_row_with
         return -0.5 * (seen - 5000.0 * curvature) ** 2 / (0.09 + 0.01)
 
     for curvature in (-1e-4, 5e-5, 2e-4):
-        told = ahead.cost(sag_from(0, curvature)) - ahead.cost(sag_from(0, 0.0))
+        told = cost(ahead, sag_from(0, curvature)) - cost(ahead, sag_from(0, 0.0))
         assert told == pytest.approx(-2.0 * (log_likelihood(curvature) - log_likelihood(0.0)), rel=1e-6)
-        row, variance = ahead.row(sag_from(0, curvature))
+        row, variance = row_given(ahead, sag_from(0, curvature))
         assert row == pytest.approx(0.9 * (seen - 5000.0 * curvature), rel=1e-6)
         assert variance == pytest.approx(0.009, rel=1e-6)
 

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.vision.sources.halo_profile import UP, direction_of, half_of, halos_of, is_selected
-from fogsim.vision.sources.source_tree import source_tree
+from fogsim.vision.sources.halo_profile import UP, direction_of, half_of, halos_of, is_selected, source_tree
 from fogsim.vision.sources.tree_kernels import AREA
 from tests.vision.sources.night_pictures import in_colour, picture
 

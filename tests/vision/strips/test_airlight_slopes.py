@@ -16,13 +16,17 @@ from fogsim.vision.strips.airlight_slopes import (
     slope_table,
 )
 from fogsim.vision.strips.joint_fit import fit_jointly
-from fogsim.vision.strips.joint_kernels import DEPTH_STEP, FIRST_DEPTH
+from fogsim.vision.strips.joint_kernels import DEPTH_STEP, FIRST_DEPTH, JointPrior
 from fogsim.vision.strips.sky import Sky
 from fogsim.vision.strips.strip_curves import StripCurves
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, PRIOR, curves, transmittance
 
 HEIGHTS = (0.01, 0.19)
 KINDS = (Droplets.MODERATE_RADIATION, Droplets.HEAVY_RADIATION, Droplets.HEAVY_ADVECTION)
+
+
+def darkened(grazing: np.ndarray, prior: JointPrior) -> tuple[np.ndarray, np.ndarray]:
+    return darkening_of_bins(grazing, GEOMETRY.below, prior, slope_table().angle, slope_table().below)
 
 
 def darkness(albedo, level):
@@ -130,7 +134,7 @@ def test_under_an_even_or_clipped_sky_the_airlight_counts_as_even():
     for one in (flat, unsure, clipped, Sky(200.0, 1.0, 1.0, 1.0, 0.0, 0.0)):
         assert darkening_priors(PRIOR, one) == ()
         assert row_airlight(one, CAMERA) is None
-    darker, by_row = darkening_of_bins(GEOMETRY.grazing, GEOMETRY.below, PRIOR)
+    darker, by_row = darkened(GEOMETRY.grazing, PRIOR)
     assert darker.shape == by_row.shape == (0, GEOMETRY.below.size)
 
 
@@ -156,8 +160,8 @@ def test_rows_are_closer_with_the_extinction_that_is_known(k):
 
 def test_derivative_by_row_is_that_of_the_table():
     prior = darkening_priors(PRIOR, sky(0.03, 0.1))[0]
-    darker, by_row = darkening_of_bins(GEOMETRY.grazing, GEOMETRY.below, prior)
-    moved, _ = darkening_of_bins(GEOMETRY.grazing * (GEOMETRY.below - 0.01) / GEOMETRY.below, GEOMETRY.below, prior)
+    darker, by_row = darkened(GEOMETRY.grazing, prior)
+    moved, _ = darkened(GEOMETRY.grazing * (GEOMETRY.below - 0.01) / GEOMETRY.below, prior)
     close = np.isclose(moved - darker, 0.01 * by_row, atol=2e-6)
     # But where a bin lies on one of the table's angles.
     assert close.mean() > 0.95

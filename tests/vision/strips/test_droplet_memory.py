@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.strips.airlight_slopes import DROPLET_CHANCES
-from fogsim.vision.strips.droplet_memory import LASTS, MOST, OTHER_ROAD, DropletMemory
+from fogsim.vision.strips.airlight_slopes import DROPLET_CHANCES, LASTS, MOST, OTHER_ROAD, DropletMemory
 
 LARGE = (-2.0, -1.0, 0.0)
 """What a picture says of droplets that are large."""

@@ -20,7 +20,7 @@ def test_scatter_is_measured_against_the_contrast_of_road_and_airlight():
     seen = curves(0.03)
     fit = fit_own(seen, GEOMETRY, (PRIOR,))
     for factor, scattered in ((0.95, False), (1.05, True)):
-        patchy = replace(seen, scatter=np.full_like(seen.scatter, factor * MAX_SCATTER * (fit.airlight - fit.road)))
+        patchy = seen._replace(scatter=np.full_like(seen.scatter, factor * MAX_SCATTER * (fit.airlight - fit.road)))
         assert is_scattered(fit, patchy, GEOMETRY) is scattered
         assert ("patchy" in no_road(fit, patchy, GEOMETRY, CAMERA)) is scattered
 
@@ -29,9 +29,9 @@ def test_scatter_is_measured_against_the_contrast_of_road_and_airlight():
 def test_a_background_drawn_evenly_in_pixel_values_is_a_ramp_whatever_the_response(response):
     camera, table = replace(CAMERA, response=response), linear_table(response)
     values = 230.0 - 0.5 * GEOMETRY.below
-    drawn = replace(curves(0.03), luminance=np.tile(np.interp(values, np.arange(256), table), (3, 1)))
+    drawn = curves(0.03)._replace(luminance=np.tile(np.interp(values, np.arange(256), table), (3, 1)))
     assert is_ramp(drawn, GEOMETRY, camera)
-    level = replace(drawn, luminance=np.full_like(drawn.luminance, 120.0))
+    level = drawn._replace(luminance=np.full_like(drawn.luminance, 120.0))
     assert not is_ramp(level, GEOMETRY, camera)
-    few = replace(drawn, variance=np.where(np.arange(GEOMETRY.below.size) < 2, 1.0, 0.0) * np.ones((3, 1)))
+    few = drawn._replace(variance=np.where(np.arange(GEOMETRY.below.size) < 2, 1.0, 0.0) * np.ones((3, 1)))
     assert not is_ramp(few, GEOMETRY, camera)

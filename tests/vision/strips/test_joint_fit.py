@@ -47,7 +47,7 @@ def test_less_noise_and_more_strips_are_surer():
     seen = curves(0.03, 5)
     own, all_strips = fit_own(seen, GEOMETRY, (PRIOR,)), fit_jointly(seen, GEOMETRY, (PRIOR,))
     assert all_strips.extinction_deviation < own.extinction_deviation
-    louder = replace(seen, variance=25.0 * seen.variance)
+    louder = seen._replace(variance=25.0 * seen.variance)
     assert fit_jointly(louder, GEOMETRY, (PRIOR,)).extinction_deviation > all_strips.extinction_deviation
 
 
@@ -55,13 +55,13 @@ def test_too_few_bins_give_no_answer():
     seen = curves(0.03)
     assert (
         fit_jointly(
-            replace(seen, variance=np.where(np.arange(seen.variance.shape[1]) < 7, 1.0, 0.0) * np.ones((3, 1))),
+            seen._replace(variance=np.where(np.arange(seen.variance.shape[1]) < 7, 1.0, 0.0) * np.ones((3, 1))),
             GEOMETRY,
             (PRIOR,),
         )
         is None
     )
-    assert fit_own(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
+    assert fit_own(seen._replace(variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
 
 
 def test_what_stands_on_the_lane_is_found_and_hides_what_is_behind():

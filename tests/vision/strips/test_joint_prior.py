@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.lines.horizon import calibrated_horizon
-from fogsim.vision.strips.joint_prior import MOST_CLOUD, OVEREXPOSURE, SKY_DEVIATION, joint_prior
+from fogsim.vision.strips.airlight_slopes import MOST_CLOUD, OVEREXPOSURE, SKY_DEVIATION, joint_prior
 from fogsim.vision.strips.sky import Sky
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
@@ -14,7 +14,7 @@ SKY = Sky(200.0, 1.5, 3.0, 1.0, 0.0, 0.0, 0.4, 0.05)
 
 
 def clipped(saturated, share=0.5, luminance=254.0):
-    return joint_prior(replace(SKY, luminance=luminance, saturated=saturated, clipped=share), CAMERA, HORIZON)
+    return joint_prior(SKY._replace(luminance=luminance, saturated=saturated, clipped=share), CAMERA, HORIZON)
 
 
 def test_an_open_sky_is_the_airlight_within_its_deviation():
@@ -27,7 +27,7 @@ def test_an_open_sky_is_the_airlight_within_its_deviation():
 
 
 def test_airlight_is_as_uneven_as_a_sky_that_trees_and_rounding_do_not_explain():
-    cloud = [joint_prior(replace(SKY, unevenness=uneven), CAMERA, HORIZON).cloud for uneven in (0.0, 0.015, 0.025, 0.5)]
+    cloud = [joint_prior(SKY._replace(unevenness=uneven), CAMERA, HORIZON).cloud for uneven in (0.0, 0.015, 0.025, 0.5)]
     assert cloud[:2] == [0.0, 0.0]
     assert 0.0 < cloud[2] < cloud[3] == MOST_CLOUD
 

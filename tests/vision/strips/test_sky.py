@@ -5,8 +5,15 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.strips.sky import UNKNOWN_VIGNETTING, even_rows, sky_above
-from fogsim.vision.strips.sky_kernels import level_at_horizon, pixel_noise, saturation, sky_shading
+from fogsim.vision.strips.sky import (
+    UNKNOWN_VIGNETTING,
+    even_rows,
+    level_at_horizon,
+    pixel_noise,
+    saturation,
+    sky_above,
+    sky_shading,
+)
 
 CAMERA = Camera(320, 240, 288.0, (159.5, 119.5), 1.38, np.radians(1.0))
 ROWS, COLS = np.indices((240, 320))

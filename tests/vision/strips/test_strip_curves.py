@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -48,8 +46,8 @@ def test_what_a_tracked_vehicle_hides_is_left_out_and_may_be_read_later():
 
 def test_frames_are_averaged_at_the_last_ones_exposure():
     curves = strip_curves(photographed(np.full(ROWS.shape, 100.0)), GEOMETRY, 1.0, CAMERA)
-    darker = replace(curves, luminance=0.5 * curves.luminance, variance=0.25 * curves.variance)
-    mean = mean_curves(((darker, replace(SKY, luminance=100.0)), (curves, SKY)))
+    darker = curves._replace(luminance=0.5 * curves.luminance, variance=0.25 * curves.variance)
+    mean = mean_curves(((darker, SKY._replace(luminance=100.0)), (curves, SKY)))
     assert mean.luminance == pytest.approx(np.where(curves.variance > 0, curves.luminance, 0.0))
     assert mean.variance == pytest.approx(0.5 * curves.variance)
     assert mean_curves(((curves, SKY),)) is curves

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera
-from fogsim.vision.strips.strip_geometry import LANES, WHOLE_ROWS, strip_geometry
+from fogsim.vision.strips.strip_geometry import SIDES, WHOLE_ROWS, strip_geometry
 
 CAMERA = Camera(640, 480, 577.0, (300.0, 250.0), 1.4, np.radians(3.0))
 
@@ -27,7 +27,7 @@ def test_bins_lie_where_the_road_is_seen():
         assert np.interp(row - CAMERA.horizon_row, geometry.below[::-1], geometry.distance[::-1]) == pytest.approx(
             distance, rel=0.01
         )
-        for strip, sides in enumerate(LANES):
+        for strip, sides in enumerate(SIDES):
             expected = [np.clip(projected(CAMERA, ahead, side)[0], -0.5, CAMERA.width - 0.5) for side in sides]
             found = [np.interp(distance, geometry.distance, side[strip]) for side in (geometry.left, geometry.right)]
             assert found == pytest.approx(expected, abs=3.0)

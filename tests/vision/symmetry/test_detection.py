@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fogsim.vision.symmetry.detection import SearchRegion, SignDetection, detect_signs
-from fogsim.vision.symmetry.outlines import OUTLINES, polygon_outline
+from fogsim.vision.symmetry.detection import OUTLINES, SearchRegion, SignDetection, detect_signs, polygon_outline
 
 FINE = 8
 CORNERS = {

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.symmetry.detection import OUTLINES
+from fogsim.vision.symmetry.detection import OUTLINES, Floats, fitted, support
 from fogsim.vision.symmetry.edge_kernels import NX, NY, X, Y
-from fogsim.vision.symmetry.outline_kernels import Floats, fitted, support
 
 MIDDLE, RADIUS = 20.0, 6.0
 

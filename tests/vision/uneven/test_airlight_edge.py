@@ -1,7 +1,6 @@
 """The front of a bank is the row from which on ground is airlight; in even fog there is none."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.sky import Sky
 from fogsim.vision.strips.strip_geometry import strip_geometry
-from fogsim.vision.uneven.airlight_edge import airlight_edge
-from fogsim.vision.uneven.uneven_fit import even_fog
+from fogsim.vision.uneven.uneven_fit import airlight_edge, even_fog
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, math.radians(2.0))
 GEOMETRY = strip_geometry(CAMERA, 1.0)
@@ -75,7 +73,7 @@ def test_an_unsure_horizon_hides_fronts_that_are_near_to_it():
 
 def test_rows_that_a_crest_hides_do_not_count():
     hidden = GEOMETRY.distance > 90.0
-    crest = replace(
-        GEOMETRY, below=np.where(hidden, 1.2, GEOMETRY.below), distance=np.where(hidden, 664.0, GEOMETRY.distance)
+    crest = GEOMETRY._replace(
+        below=np.where(hidden, 1.2, GEOMETRY.below), distance=np.where(hidden, 664.0, GEOMETRY.distance)
     )
     assert airlight_edge(drawn(0.0015, 130.0), crest, CAMERA, SKY, fitted(0.0015), 0.05) is None

@@ -12,7 +12,7 @@ from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 from fogsim.vision.strips.course_geometry import course_geometry
 from fogsim.vision.strips.joint_fit import fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, fog_nodes
+from fogsim.vision.uneven.fog_evidence import NODES, UNEVENNESS, fog_nodes
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_fit import fit_uneven
 from fogsim.vision.uneven.uneven_kernels import depth_at, distance_at_depth, extinction_at
@@ -23,7 +23,7 @@ PRIOR = koschmieder_strips.PRIOR._replace(shift_deviation=0.2)
 """The road's lines tell the horizon; without them a bank may be a horizon that lies lower."""
 
 UNSEEN = unseen_course(CAMERA, Horizon(CAMERA.horizon_row, 0.2))
-LEVEL = replace(UNSEEN, ahead=replace(UNSEEN.ahead, covariance=np.diag([0.04, *np.full(PIECES, 1e-16)])))
+LEVEL = replace(UNSEEN, ahead=UNSEEN.ahead._replace(covariance=np.diag([0.04, *np.full(PIECES, 1e-16)])))
 """Lines that nobody sees, and lines that show the road to be level as far as it is seen."""
 
 Depth = Callable[[np.ndarray], np.ndarray]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.decay_fit import fit_decay
+from fogsim.estimators.lead_contrast import fit_decay
 
 RANGES = np.arange(25.0, 91.0, 5.0)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.template_matching import correlations, match_cost, vertex
+from fogsim.vision.vehicle.patch import correlations, match_cost, vertex
 
 RNG = np.random.default_rng(5)
 IMAGE, TEMPLATE = RNG.normal(100.0, 20.0, (19, 23)), RNG.normal(50.0, 10.0, (6, 7))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera, Response
-from fogsim.vision.light.clipped_sky import Clipping
+from fogsim.vision.light.luminance import Clipping
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.vehicle_crop import SkyReading, daytime_crop, noise_gain, vehicle_crop
 

@@ -42,7 +42,8 @@ from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
-from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
+from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
 from fogsim.traffic.sumo_lanes.courses import Courses
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.leaders import Leaders
@@ -92,6 +93,7 @@ class _Run:
     courses: Courses
     lights: LightsAhead
     bodies: LongBodies
+    directions: LaneDirections
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
@@ -177,6 +179,7 @@ class SumoTraffic:
             courses=Courses(api, self._link.remote),
             lights=LightsAhead(api),
             bodies=LongBodies(api, self._link.remote),
+            directions=LaneDirections(api),
         )
         self._signals = None
         self._seed = seed
@@ -252,12 +255,11 @@ class SumoTraffic:
 
     def _perception(self, run: _Run, fog: FogAccess) -> DriversPerception | None:
         """What drivers see in a fog, past what stands next to the roads; None if they see through both."""
-        setup, remote = self._setup, self._link.remote
-        if setup.sight is None:
+        sight, standing = self._setup.sight, self._obstructions(run.api)
+        if sight is None:
             return None
-        api, roster, session = run.api, run.roster, run.session
-        standing = self._obstructions(api)
-        return drivers_perception(api, fog, setup.sight, roster, remote, session, setup.net, standing)
+        view = DriversView(run.api, fog, sight, run.roster, run.session, self._link.remote, standing)
+        return DriversPerception(view, self._setup.net)
 
     def _obstructions(self, api: Api) -> Obstructions:
         """What stands next to the roads and hides others from drivers."""
@@ -358,7 +360,7 @@ class SumoTraffic:
             return GapToEgo(run.api, ego).measure(other) if ego is not None and ego in present else None
 
         may_change = functools.partial(has_lane, run.api)
-        return Situation(self._elapsed(run), present, LaneDirections(run.api).driven, gap_to_ego, may_change)
+        return Situation(self._elapsed(run), present, run.directions.driven, gap_to_ego, may_change)
 
     def _step(self, run: _Run) -> None:
         self._update_drivers(run, _NO_ADVICE)

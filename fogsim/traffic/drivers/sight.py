@@ -22,7 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.traffic.drivers.adaptation import Adaptation, adaptation
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.traffic.drivers.own_beams import HIGH_BEAM_LIGHT
-from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
+from fogsim.traffic.drivers.sight_kernels import (
+    DISTANCE_TOLERANCE,
+    depth_limit,
+    depth_limits,
+    judge_leaders,
+    seen_distance,
+)
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, luminance_of
 from fogsim.values.fog import AIRLIGHT_SHARE
 
@@ -92,6 +98,12 @@ class DriverSight:
         eyes, threshold, reach = self._eyes(glare)
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
         return depth_limit(eyes, threshold, reach, float(distance), *seen)
+
+    def depth_limits(self, looks: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Optical depths up to which vehicles are seen, without glare (n,) [-]; see `sight_kernels.depth_limits`."""
+        limits = np.empty(looks.shape[1])
+        depth_limits(*self._eyes(0.0), looks, limits)
+        return limits
 
     def _adapted(self, glare: float) -> Adaptation:
         return adaptation(self.illuminance, glare, self.airlight_share)

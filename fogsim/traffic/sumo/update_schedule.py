@@ -1,12 +1,14 @@
 """Which vehicles are to be looked at again in which step: those whose gaps can have changed enough."""
 
 import itertools
-import math
-from collections.abc import Sequence
-from typing import TypeVar
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fogsim.traffic.sumo.roster import Roster
 
 MAX_RELATIVE_ACCELERATION = 20.0
 """One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
@@ -37,15 +39,10 @@ class UpdateSchedule:
         self._step = step
         self._batch = max(1, round(_BATCH_PERIOD / step))
         self._current = self._number(now)
-        self._due: dict[int, list[str]] = {}
+        self._due: defaultdict[float, list[str]] = defaultdict(list)
 
-    def _number(self, time: float) -> int:
-        return math.floor(time / self._step + _ROUNDING)
-
-    def _step_at(self, time: float) -> int:
-        """Number of the step in which who is due at a time is looked at."""
-        number = max(math.floor(time / self._step + _ROUNDING), self._current + 1)
-        return number - number % self._batch if number - self._current >= self._batch else number
+    def _number(self, time: float) -> float:
+        return (time / self._step + _ROUNDING) // 1.0
 
     def unscheduled(self, vehicles: Sequence[str]) -> list[str]:
         """Those of some vehicles that wait for no step, each once."""
@@ -58,16 +55,19 @@ class UpdateSchedule:
     def add(self, vehicles: Sequence[str], time: float) -> None:
         """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
         if vehicles:
-            self._due.setdefault(self._step_at(time), []).extend(vehicles)
+            self.add_each(vehicles, itertools.repeat(time, len(vehicles)))
 
-    def add_each(self, vehicles: Sequence[str], times: Sequence[float]) -> None:
+    def add_each(self, vehicles: Sequence[str], times: Iterable[float]) -> None:
         """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
-        due, step_at, last, number = self._due, self._step_at, math.nan, 0
+        due, step, batch, current = self._due, self._step, self._batch, self._current
         for vehicle, time in zip(vehicles, times, strict=True):
-            # Mostly many wait as long as they may, and so for the same time.
-            if time != last:
-                last, number = time, step_at(time)
-            due.setdefault(number, []).append(vehicle)
+            # As in `_number`, without a call for each vehicle.
+            number = (time / step + _ROUNDING) // 1.0
+            if number <= current:
+                number = current + 1
+            if number - current >= batch:
+                number -= number % batch
+            due[number].append(vehicle)
 
     def bring_forward(self, vehicle: str) -> None:
         """Make a vehicle that waits due in the next step; one that waits for nothing stays so."""
@@ -75,7 +75,7 @@ class UpdateSchedule:
         for waiting in self._due.values():
             if vehicle in waiting:
                 waiting.remove(vehicle)
-                self._due.setdefault(self._current + 1, []).append(vehicle)
+                self._due[self._current + 1].append(vehicle)
                 return
 
     def pop_due(self, now: float) -> list[str]:
@@ -90,3 +90,47 @@ class UpdateSchedule:
     def clear(self) -> None:
         """Forget all vehicles."""
         self._due.clear()
+
+
+class Due(NamedTuple):
+    """Vehicles of one step."""
+
+    vehicles: Sequence[str]  # Those to be looked at; all are on the road
+    new: Sequence[str]  # Those that have entered the road since the last step, or come back to it, and are on it
+    gone: Sequence[str]  # Those that have left it, if they were due, and all new ones, whose ids others may have borne
+
+
+class DueVehicles:
+    """Schedules the vehicles of a roster; a new one is due at once (`step` [s])."""
+
+    def __init__(self, roster: Roster, step: float) -> None:
+        self._roster = roster
+        self._schedule = UpdateSchedule(step, roster.time)
+        self._mark = 0
+
+    def take(self) -> Due:
+        """Take out those that are due, by a roster that is up to date; who is to wait again is scheduled again."""
+        roster = self._roster
+        due = self._schedule.pop_due(roster.time)
+        entered, self._mark = roster.entered_since(self._mark)
+        if not entered and roster.present.issuperset(due):
+            return Due(due, (), ())
+        gone = [v for v in due if v not in roster.present]
+        due = [v for v in due if v in roster.present]
+        new = [v for v in entered if v in roster.present]
+        known = set(due)
+        due += [v for v in self._schedule.unscheduled(new) if v not in known]
+        return Due(due, new, gone + entered)
+
+    def schedule(self, vehicles: Sequence[str], pause: float) -> None:
+        """Schedule vehicles that have been taken out (`pause` [s])."""
+        self._schedule.add(vehicles, self._roster.time + pause)
+
+    def schedule_each(self, vehicles: Sequence[str], pauses: Iterable[float]) -> None:
+        """Schedule vehicles that have been taken out, each for a pause of its own (`pauses` [s])."""
+        now = self._roster.time
+        self._schedule.add_each(vehicles, [now + pause for pause in pauses])
+
+    def bring_forward(self, vehicle: str) -> None:
+        """Let a vehicle that waits be due in the next step."""
+        self._schedule.bring_forward(vehicle)

@@ -147,6 +147,7 @@ class VehicleReader:
         self._lane_limits = {"": math.inf}
         self._mark = 0
         self._constants: _Constants | None = None
+        self._free: tuple[tuple[str, ...], _Constants | None, NDArray[np.float64]] = (), None, np.zeros(0)
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
     def state(
@@ -183,17 +184,23 @@ class VehicleReader:
             lamps=lamps,
             paint=constants.paint,
             grade=np.radians(now.slope),
-            free_speed=np.minimum(self._limits(now.lane) * constants.speed_factor, constants.top_speed),
+            free_speed=self._free_speeds(now.lane, constants),
             advised_speed=advised_speeds(now.ids, heard or {}),
             off_lanes=off_lanes,
         )
 
-    def _limits(self, lanes: Sequence[str]) -> NDArray[np.float64]:
-        """Speed limits (n,) [m/s], as they were when the ego first came near: those of signs that change are advice."""
-        known = self._lane_limits
-        for lane in {*lanes}.difference(known):
-            known[lane] = float(self._lane_limit(lane))
-        return np.array([known[lane] for lane in lanes])
+    def _free_speeds(self, lanes: tuple[str, ...], constants: _Constants) -> NDArray[np.float64]:
+        """Speeds that drivers would drive by themselves (n,) [m/s].
+
+        Limits are as they were when the ego first came near: those of signs that change are advice.
+        """
+        if lanes != self._free[0] or constants is not self._free[1]:
+            known = self._lane_limits
+            for lane in {*lanes}.difference(known):
+                known[lane] = float(self._lane_limit(lane))
+            limits = np.array([known[lane] for lane in lanes]) * constants.speed_factor
+            self._free = lanes, constants, np.minimum(limits, constants.top_speed)
+        return self._free[2]
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
         """Lamps of all by their own signals; computed again when a signal has changed."""

@@ -1,5 +1,6 @@
 """Drivers who keep up with the leader whom they see, though by themselves they would drive slower in fog."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,8 @@ from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.perception import REACH
 from fogsim.traffic.sumo_lanes.leaders import Leaders
+
+_NO_LEADER = "", 0.0
 
 
 class KeepingUp:
@@ -35,9 +38,11 @@ class KeepingUp:
 
     def kept_speeds(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen (`rows` (n,) int)."""
-        reaches = self._table.values[rows, Column.REACH].tolist()
-        return np.array([self._kept_speed(v, reach) for v, reach in zip(vehicles, reaches, strict=True)])
-
-    def _kept_speed(self, vehicle: str, seen: float) -> float:
-        leader, gap = self._leader(vehicle, REACH) or ("", 0.0)
-        return float(self._speed(leader)) + CATCHING_UP if leader and gap <= seen else 0.0
+        reaches, speed = self._table.values[rows, Column.REACH].tolist(), self._speed
+        ahead = [found or _NO_LEADER for found in map(self._leader, vehicles, itertools.repeat(REACH))]
+        return np.array(
+            [
+                float(speed(leader)) + CATCHING_UP if leader and gap <= reach else 0.0
+                for (leader, gap), reach in zip(ahead, reaches, strict=True)
+            ]
+        )

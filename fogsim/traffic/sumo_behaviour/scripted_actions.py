@@ -102,6 +102,7 @@ class ScriptedActions:
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
         self._offsets = LaneOffsets(api)
         self._paths = Paths(api)
+        self._directions = LaneDirections(api)
         self._changing: dict[str, float] = {}
         self._oncoming: set[str] = set()
 
@@ -170,7 +171,7 @@ class ScriptedActions:
             signed = GapToEgo(self._api, leader).measure(follower)
             return None if signed is None or signed > 0.0 else -signed
 
-        return Motion(time, self._step, present, LaneDirections(self._api).driven, vehicle.getSpeed, gap)
+        return Motion(time, self._step, present, self._directions.driven, vehicle.getSpeed, gap)
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Go on with what has begun, for the next step (`time` [s])."""

@@ -201,6 +201,10 @@ class SumoDesiredSpeeds:
         self._api = api
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
+        self._allowed_speed, self._top_speed = (
+            vehicle_getter(api, "getAllowedSpeed"),
+            vehicle_getter(api, "getMaxSpeed"),
+        )
         self._step = float(api.simulation.getDeltaT())
         self._compliance = {display: setup.drivers.compliance_with(display) for display in Display}
         self._fog = fog
@@ -345,12 +349,12 @@ class SumoDesiredSpeeds:
 
         Off the lanes it is ``inf``.
         """
-        get = self._api.vehicle
-        allowed = float(get.getAllowedSpeed(vehicle))
+        allowed = float(self._allowed_speed(vehicle))
         if allowed == UNKNOWN:
             return math.inf
-        if allowed < get.getMaxSpeed(vehicle):
+        if allowed < self._top_speed(vehicle):
             return allowed
+        get = self._api.vehicle
         # The top speed is the lower one, and SUMO gives only that.
         return float(self._api.lane.getMaxSpeed(get.getLaneID(vehicle)) * get.getSpeedFactor(vehicle))
 

@@ -11,7 +11,6 @@ from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST as BRIGHTEST_LAMP
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.own_beams import high_beam_veil, uses_high_beam
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.sight_kernels import (
     BRIGHTEST,
     CONTRAST,
@@ -30,11 +29,10 @@ from fogsim.traffic.drivers.sight_kernels import (
     Z,
     face_leaders,
 )
-from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo.link import Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import closing_speed_bound
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
 from fogsim.values import Lamp
 
 _LEAST_EXTINCTION = 1e-6
@@ -51,54 +49,46 @@ Pair = tuple[str, str, float]
 
 
 class LeaderSight:
-    """Computes sight along the fog between drivers and the vehicles ahead of them (`speed` [m/s])."""
+    """Computes sight along the fog between drivers and the vehicles ahead of them (`speed` [m/s], `horizon` [s])."""
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter, remote: bool = False) -> None:
-        self._speed = speed
-        self._fog = fog
-        self._max_extinction = fog.maximum_extinction
-        self._is_even = fog.minimum_extinction == fog.maximum_extinction
-        self._sight = sight
-        self._position = vehicle_getter(api, "getPosition3D")
-        (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
-        self._vehicles = SeenVehicles(api, remote, sight.airlight_share)
-        self._glare = OncomingGlare(api, fog, self._vehicles, remote)
-        self._most_glare = most_glare(sight.illuminance)
-        self._get_minimum_gap = vehicle_getter(api, "getMinGap")
-        self._rows: dict[str, int] = {}
-        self._traits, self._traits_end = np.empty((64, 3)), 0
+    def __init__(self, view: DriversView, speed: Getter, horizon: float) -> None:
+        self._speed, self._horizon = speed, horizon
+        self._fog, self._sight, self._vehicles, self._extinction = view.fog, view.sight, view.vehicles, view.extinction
+        self._position = vehicle_getter(view.api, "getPosition3D")
+        (self._signals,) = view.getters("getSignals")
+        self._glare = OncomingGlare(view)
+        self._most_glare = most_glare(view.sight.illuminance)
+        is_even, most = view.extinction is not None, view.fog.maximum_extinction
+        densest, change = max(most, _LEAST_EXTINCTION) if is_even else most, closing_speed_bound(0.0, 0.0, horizon)
+        self._closing = Closing(change, _FASTEST_DRIFT, densest, is_even)
 
-    def forget(self, vehicles: Collection[str]) -> None:
-        """Forget vehicles whose ids others may bear now."""
-        for vehicle in vehicles:
-            self._rows.pop(vehicle, None)
-        self._vehicles.forget(vehicles)
-
-    def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
-        """Whether each leader is seen, and for how long that is sure to stay so [s] (`horizon` [s])."""
-        facing = self._facing(pairs, horizon)
+    def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> tuple[list[bool], list[float]]:
+        """Whether each leader is seen, and for how long that is sure to stay so [s]."""
+        facing = self._facing(pairs)
         if own_lamps:
             self._add_own_lamps(facing, pairs, own_lamps)
-        judged, pauses = self._sight.judge_leaders(facing, self._most_glare, horizon)
+        judged, pauses = self._sight.judge_leaders(facing, self._most_glare, self._horizon)
         if own_lamps and self._most_glare > 0.0:
             self._doubt_own_beams(judged, pauses, pairs, own_lamps)
-        return [
-            (verdict == SEEN if verdict != DAZZLED else self._is_seen(pairs[i], facing[:, i], own_lamps), pause)
-            for i, (verdict, pause) in enumerate(zip(judged.tolist(), pauses.tolist(), strict=True))
-        ]
+        seen: list[bool] = (judged == SEEN).tolist()
+        for i in np.flatnonzero(judged == DAZZLED).tolist() if self._most_glare > 0.0 else ():
+            seen[i] = self._is_seen(pairs[i], facing[:, i], own_lamps)
+        return seen, pauses.tolist()
 
-    def _facing(self, pairs: Sequence[Pair], horizon: float) -> NDArray[np.float64]:
+    def _facing(self, pairs: Sequence[Pair]) -> NDArray[np.float64]:
         """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
         followers, leaders, gaps = zip(*pairs, strict=True)
+        both = followers + leaders
         # Mostly who leads one follows another.
-        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys((*followers, *leaders)))}
-        rows = np.array([place[v] for v in (*followers, *leaders)], dtype=np.int64).reshape(2, -1)
+        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
+        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
         facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
-        extinction = max(self._max_extinction, _LEAST_EXTINCTION) if self._is_even else self._max_extinction
-        closing = Closing(closing_speed_bound(0.0, 0.0, horizon), _FASTEST_DRIFT, extinction, self._is_even)
-        face_leaders(self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), closing, facing, lines)
-        facing[DEPTH] = self._max_extinction * facing[DISTANCE] if self._is_even else self._fog.optical_depth(*lines)
-        facing[STEADY], facing[OWN_STEADY : OWN + 1] = _STEADY_INTENSITY, 1.0
+        face_leaders(
+            self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), self._closing, facing, lines
+        )
+        known = self._extinction
+        facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
+        facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
         facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
         return facing
 
@@ -108,7 +98,7 @@ class LeaderSight:
         flat = itertools.chain.from_iterable(map(self._position, vehicles))
         read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
         read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        read[:, MINIMUM_GAP:] = self._look_up(vehicles)
+        read[:, MINIMUM_GAP:] = self._vehicles.traits(vehicles)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
         return read
 
     @staticmethod
@@ -121,19 +111,6 @@ class LeaderSight:
                 pauses[i] = 0.0
                 if uses_high_beam(own_lamps[follower]):
                     judged[i] = DAZZLED
-
-    def _look_up(self, vehicles: Collection[str]) -> NDArray[np.float64]:
-        """What never changes about vehicles (n, 3): minimum gap [m], contrast [-], height of the driver's eyes [m]."""
-        known = self._rows
-        for vehicle in vehicles if not known.keys() >= set(vehicles) else ():
-            if vehicle not in known:
-                row = known[vehicle] = self._traits_end
-                self._traits_end += 1
-                if row == len(self._traits):
-                    self._traits = np.concatenate((self._traits, np.empty_like(self._traits)))
-                contrast, eyes = self._vehicles.body(vehicle).contrast, self._vehicles.eye_height(vehicle)
-                self._traits[row] = float(self._get_minimum_gap(vehicle)), contrast, eyes
-        return self._traits[[known[vehicle] for vehicle in vehicles]]
 
     def _add_own_lamps(self, facing: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
         for i, (follower, leader, _) in enumerate(pairs):
@@ -159,10 +136,10 @@ class LeaderSight:
 
     def _extinction_at(self, vehicle: str) -> float:
         """Extinction coefficient where a vehicle is [1/m]."""
-        if self._is_even:
-            return self._max_extinction
+        if self._extinction is not None:
+            return self._extinction
         x, y, z = self._position(vehicle)
-        return float(self._fog.extinction((x, y, z + self._vehicles.eye_height(vehicle))))
+        return float(self._fog.extinction((x, y, z + self._vehicles.body(vehicle).eye_height)))
 
 
 @functools.lru_cache(maxsize=1024)

@@ -13,22 +13,19 @@ looked for in each step.
 """
 
 import itertools
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from types import MappingProxyType
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
+import numpy as np
+
 from fogsim.traffic.appearance import TRAINS
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
+from fogsim.traffic.sumo.claims import SPEED_GAIN, SessionValues
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
+from fogsim.traffic.sumo.update_schedule import DueVehicles, closing_speed_bound
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
 from fogsim.traffic.sumo_drivers.oncoming_glare import most_glare
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 
 REACH = 250.0
@@ -84,23 +81,6 @@ class IgnoredLeaders:
 class Perception:
     """Decides in each step which leaders are seen.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster or None
-        Who is on the road; None for one of its own.
-    remote : bool
-        True where every call is a message to another process: leaders and speeds are subscribed to.
-    session : str
-        Name of the session.
-    obstructions : Obstructions
-        What stands next to the roads.
-
     Attributes
     ----------
     leader, speed : Getter
@@ -109,26 +89,16 @@ class Perception:
         Leaders that are not reacted to, by follower, as they are at any time.
     """
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster | None = None,
-        remote: bool = False,
-        session: str = SOLE_SESSION,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
-        self._ignored_leaders = IgnoredLeaders(api, session)
-        self.leader = Leaders(api, remote).within(REACH)
-        (self.speed,) = vehicle_getters(api, remote, ("getSpeed",))
-        self._roster = Roster(api) if roster is None else roster
+    def __init__(self, view: DriversView) -> None:
+        api, fog, sight, self._roster = view.api, view.fog, view.sight, view.roster
+        self._view, self._hidden_vehicles = view, view.hidden_vehicles
+        self._ignored_leaders = IgnoredLeaders(api, view.session)
+        self.leader = Leaders(api, view.remote).within(REACH)
+        (self.speed,) = view.getters("getSpeed")
         self._reaction_time = sight.reaction_time
-        self._leader_sight = LeaderSight(api, fog, sight, self.speed, remote)
-        self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._leader_sight = LeaderSight(view, self.speed, MAX_PAUSE)
+        self._due = DueVehicles(self._roster, float(api.simulation.getDeltaT()))
         self._vehicle_class = api.vehicle.getVehicleClass
-        self._mark = 0
         self._ignored: dict[str, str] = {}
         self.hidden = MappingProxyType(self._ignored)
         self._emerging: dict[str, tuple[str, float]] = {}
@@ -141,78 +111,60 @@ class Perception:
         margin = _FASTEST_APPROACH * MAX_PAUSE
         self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
-    @property
-    def ignored(self) -> dict[str, str]:
-        """Leaders that are not reacted to, by follower."""
-        return dict(self._ignored)
-
     def expect_unseen(self, follower: str, leader: str) -> None:
         """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step."""
         self._hide(follower, leader)
-        self._schedule.bring_forward(follower)
+        self._due.bring_forward(follower)
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore a leader that they do not see."""
-        due = self._due()
+        due, new, gone = self._due.take()
+        if gone:
+            self._view.vehicles.forget(gone)
+            for follower in gone:
+                self._ignored.pop(follower, None)
+                self._emerging.pop(follower, None)
+            # A vehicle that comes back from a teleport still ignores its leader.
+            for follower in new:
+                self._ignored_leaders.stop_ignoring(follower)
+            trains = {v for v in new if self._vehicle_class(v) in TRAINS}
+            due = [v for v in due if v not in trains]
         doubtful = self._decide_by_gap(due) if due else ()
         if doubtful:
             self._decide_by_sight(doubtful, own_lamps)
-
-    def _due(self) -> list[str]:
-        roster, schedule = self._roster, self._schedule
-        roster.update()
-        due = schedule.pop_due(roster.time)
-        if not roster.present.issuperset(due):
-            self._forget(v for v in due if v not in roster.present)
-            due = [v for v in due if v in roster.present]
-        new, self._mark = roster.entered_since(self._mark)
-        self._forget(new)
-        self._leader_sight.forget(new)
-        if self._hidden_vehicles is not None:
-            self._hidden_vehicles.forget(new)
-        # A vehicle that comes back from a teleport still ignores its leader.
-        for follower in roster.present.intersection(new) if new else ():
-            self._ignored_leaders.stop_ignoring(follower)
-        if not new:
-            return due
-        unscheduled = [v for v in schedule.unscheduled(new) if v in roster.present and v not in due]
-        return due + [v for v in unscheduled if self._vehicle_class(v) not in TRAINS]
-
-    def _forget(self, vehicles: Iterable[str]) -> None:
-        for follower in vehicles:
-            self._ignored.pop(follower, None)
-            self._emerging.pop(follower, None)
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
         ignored, emerging = self._ignored, self._emerging
         # Most vehicles are far from any doubt, and pause for the longest time.
         certain: list[str] = []
+        near_edge: list[Pair] = []
         doubtful: list[Pair] = []
         ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
         obstructed = self._obstructed(due, ahead)
         for follower, (leader, gap) in zip(due, ahead, strict=True):
             if follower in obstructed:
                 self._hide(follower, leader)
-                self._pause((follower,), 0.0)
+                near_edge.append((follower, leader, 0.0))
                 continue
             if not leader:
                 if follower in ignored:
                     self._reveal(follower)
             elif gap > self._certainly_hidden:
-                if ignored.get(follower) != leader or follower in emerging:
+                if follower not in ignored or ignored[follower] != leader or follower in emerging:
                     self._hide(follower, leader)
                 if gap <= self._hidden_for_long:
-                    self._pause_near_edge(follower, leader, gap - self._certainly_hidden)
+                    near_edge.append((follower, leader, gap - self._certainly_hidden))
                     continue
             elif gap > self._certainly_seen or follower in ignored:
                 doubtful.append((follower, leader, gap))
                 continue
             elif gap > self._seen_for_long:
-                self._pause_near_edge(follower, leader, self._certainly_seen - gap)
+                near_edge.append((follower, leader, self._certainly_seen - gap))
                 continue
             certain.append(follower)
-        self._pause(certain, MAX_PAUSE)
+        self._pause_near_edge(near_edge)
+        self._due.schedule(certain, MAX_PAUSE)
         return doubtful
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
@@ -223,26 +175,27 @@ class Perception:
         hidden = self._hidden_vehicles.are_hidden(pairs)
         return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
-    def _pause_near_edge(self, follower: str, leader: str, distance: float) -> None:
-        """Leave a follower alone until the gap could have changed by a distance [m]."""
-        closing = closing_speed_bound(float(self.speed(follower)), float(self.speed(leader)), MAX_PAUSE)
-        self._pause((follower,), min(distance / closing, MAX_PAUSE))
+    def _pause_near_edge(self, waiting: Sequence[Pair]) -> None:
+        """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
+        if waiting:
+            followers, leaders, distances = zip(*waiting, strict=True)
+            flat = map(self.speed, followers + leaders)
+            speed = np.fromiter(flat, np.float64, 2 * len(waiting)).reshape(2, -1)
+            pauses = np.minimum(distances / closing_speed_bound(speed[0], speed[1], MAX_PAUSE), MAX_PAUSE)
+            self._due.schedule_each(followers, pauses.tolist())
 
     def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
-        assessed = self._leader_sight.assess(pairs, own_lamps, MAX_PAUSE)
-        now, ignored, emerging = self._roster.time, self._ignored, self._emerging
-        due: list[float] = []
-        for (follower, leader, _), (is_seen, pause) in zip(pairs, assessed, strict=True):
+        seen, pauses = self._leader_sight.assess(pairs, own_lamps)
+        ignored, emerging = self._ignored, self._emerging
+        waits: list[float] = []
+        for (follower, leader, _), is_seen, pause in zip(pairs, seen, pauses, strict=True):
             if not is_seen:
-                if follower in emerging or ignored.get(follower) != leader:
+                if follower in emerging or follower not in ignored or ignored[follower] != leader:
                     self._hide(follower, leader)
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-            due.append(now if follower in emerging else now + pause)
-        self._schedule.add_each([follower for follower, _, _ in pairs], due)
-
-    def _pause(self, followers: Sequence[str], pause: float) -> None:
-        self._schedule.add(followers, self._roster.time + pause)
+            waits.append(0.0 if follower in emerging else pause)
+        self._due.schedule_each([follower for follower, _, _ in pairs], waits)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

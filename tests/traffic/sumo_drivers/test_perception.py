@@ -24,7 +24,9 @@ from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
 from fogsim.values import Collision, Command, FogBank, FogField, Lamp
 from fogsim.values.fog import AIRLIGHT_SHARE
 
@@ -90,6 +92,9 @@ class SeesFrom:
 
     def depth_limit(self, distance: float, *_: float) -> float:
         return math.inf if distance <= self.distance else -math.inf
+
+    def depth_limits(self, looks: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(looks[0] <= self.distance, math.inf, -math.inf)
 
     def judge_leaders(self, facing: NDArray[np.float64], *_: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """To be looked at again in the next step."""
@@ -214,8 +219,8 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: b
         assert gap + 2.5 == pytest.approx(way, abs=1e-3)
         assert abs(front[2] - ahead[2]) > 2.5
         sight = DriverSight(illuminance=10_000.0)
-        pairs = LeaderSight(api, fog, sight, api.vehicle.getSpeed)
-        assert pairs._facing([("ego", leader, gap)], 0.5)[DEPTH] == pytest.approx([0.03 * way], rel=1e-4)
+        pairs = LeaderSight(DriversView(api, fog, sight, Roster(api)), api.vehicle.getSpeed, 0.5)
+        assert pairs._facing([("ego", leader, gap)])[DEPTH] == pytest.approx([0.03 * way], rel=1e-4)
     finally:
         link.end()
 

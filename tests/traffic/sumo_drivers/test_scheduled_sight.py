@@ -14,7 +14,9 @@ from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
 from fogsim.values import FogBank, FogField, Lamp
 
 FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
@@ -62,14 +64,16 @@ def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field:
     for _ in range(600):
         link.step()
     sight = DriverSight(illuminance, reaction_time=0.0)
-    perception = Perception(api, fog, sight)
+    roster = Roster(api)
+    perception = Perception(DriversView(api, fog, sight, roster))
     steady: dict[str, tuple[str, int]] = {}
-    compared, changes, before = 0, 0, perception.ignored
+    compared, changes, before = 0, 0, dict(perception.hidden)
     for step in range(400):
         link.step()
         lamps = Lamp.REAR_FOG if step % 100 > 50 else Lamp.NONE
+        roster.update()
         perception.update({"ego": int(lamps)})
-        ignored = perception.ignored
+        ignored = dict(perception.hidden)
         changes += len(ignored.items() ^ before.items())
         before = ignored
         for follower in api.vehicle.getIDList():
@@ -88,7 +92,8 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
     api = link.begin(ARGUMENTS)
     for _ in range(600):
         link.step()
-    perception = Perception(api, FieldAccess(EVEN), DriverSight(10_000.0))
+    roster = Roster(api)
+    perception = Perception(DriversView(api, FieldAccess(EVEN), DriverSight(10_000.0), roster))
     asked: list[str] = []
     original = perception.leader
 
@@ -100,6 +105,7 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
     present = 0
     for _ in range(100):
         link.step()
+        roster.update()
         perception.update({"ego": 0})
         present += api.vehicle.getIDCount()
     assert set(api.vehicle.getIDList()) <= set(asked)

@@ -17,6 +17,7 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
 from fogsim.traffic.sumo_lanes.courses import Courses
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.units import extinction_from_visibility
@@ -157,8 +158,8 @@ def test_drivers_look_for_those_ahead_of_their_width(tmp_path: Path) -> None:
         link.step()
         assert api.vehicle.getLeader("me", REACH)[0] == "m"
         fog = FieldAccess(FogField(extinction_from_visibility(25.0), (3000.0,) * 3))
-        perception = Perception(api, fog, DriverSight(1000.0), Roster(api))
+        perception = Perception(DriversView(api, fog, DriverSight(1000.0), Roster(api)))
         perception.update({})
-        assert perception.ignored["me"] == "c"
+        assert perception.hidden["me"] == "c"
     finally:
         link.end()

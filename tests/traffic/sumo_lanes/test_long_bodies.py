@@ -14,9 +14,12 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import scenario_from_config
 from fogsim.scenario.build import traffic_setup
 from fogsim.traffic import DriverSight, libsumo_traffic
+from fogsim.traffic.drivers.sight_kernels import LINE
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.traffic.sumo_lanes.lights import LightsAhead
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, sections
@@ -156,12 +159,14 @@ def test_a_train_on_the_crossing_is_near_wherever_its_front_is(link: LibsumoLink
     api = begun(link, "-c", str(RAILS))
     for _ in range(40):
         link.step()
-    sight = VehicleSight(api, FieldAccess(FogField(extinction_from_visibility(40.0), (3000.0,) * 3)), DriverSight(1e3))
+    fog = FieldAccess(FogField(extinction_from_visibility(40.0), (3000.0,) * 3))
+    sight = VehicleSight(DriversView(api, fog, DriverSight(1e3), Roster(api)))
     eyes, front = (np.array(api.vehicle.getPosition(v)) for v in ("semi", "train"))
     gap = 351.6 - 0.5 * api.vehicle.getWidth("train") - eyes[0]
     assert math.dist(eyes, front) > 100.0
-    assert sight.line_of_sight("semi", "train").distance == pytest.approx(gap, abs=0.5)
-    assert sight.sees([("semi", "train")], {}) == [True]
+    pairs = [("semi", "train")]
+    assert sight.lines_of_sight(pairs)[0, LINE] == pytest.approx(gap, abs=0.5)
+    assert sight.sees(pairs, {}) == [True]
 
 
 def test_an_ego_on_rails_runs_and_is_shown_no_light_of_the_road() -> None:

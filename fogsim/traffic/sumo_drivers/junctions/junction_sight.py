@@ -12,14 +12,10 @@ from collections.abc import Iterable, Mapping
 
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.due_vehicles import DueVehicles
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo.update_schedule import DueVehicles
 from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
 from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
@@ -60,30 +56,19 @@ _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
 class JunctionSight:
     """Decides which foes at junctions are seen."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        foes: JunctionFoes,
-        vehicle_sight: VehicleSight,
-        remote: bool,
-        session: str,
-    ) -> None:
-        self._roster = roster
-        self._reaction_time = sight.reaction_time
+    def __init__(self, view: DriversView, foes: JunctionFoes, vehicle_sight: VehicleSight) -> None:
+        api, self._roster, self._reaction_time = view.api, view.roster, view.sight.reaction_time
         self._foes = foes
-        self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
-            api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
+        self._speed, self._position, self._lane, self._lane_position = view.getters(
+            "getSpeed", "getPosition3D", "getLaneID", "getLanePosition"
         )
         self._lane_length, self._directions = api.lane.getLength, LaneDirections(api)
-        self._lane_lengths: dict[str, float] = {}
+        self._lanes: dict[str, tuple[float, bool]] = {}
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
-        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST)
-        self._unseen = UnseenFoes(api, session, sight.reaction_time)
-        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._certainly_hidden = view.sight.hidden_distance(view.fog.minimum_extinction, _BRIGHTEST)
+        self._unseen = UnseenFoes(api, view.session, self._reaction_time)
+        self._due = DueVehicles(view.roster, float(api.simulation.getDeltaT()))
 
     @property
     def ignored(self) -> dict[str, frozenset[str]]:
@@ -96,7 +81,6 @@ class JunctionSight:
             return
         due = self._due.take()
         if due.gone:
-            self._vehicle_sight.forget(due.gone)
             self._unseen.forget(due.gone, due.new)
         doubts: dict[str, dict[str, float]] = {}
         certain: dict[float, list[str]] = {MAX_PAUSE: [], ALONG_A_LANE: []}
@@ -116,11 +100,10 @@ class JunctionSight:
 
         With each, when to look for it again [s].
         """
-        speed = self._speed(driver)
-        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
-        unseen = self._unseen.of(driver)
+        speed, unseen = self._speed(driver), self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
             return ALONG_A_LANE, {}
+        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
         doubtful: dict[str, float] = {}
         near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * _BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
@@ -137,12 +120,11 @@ class JunctionSight:
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `ALONG_A_LANE`."""
         lane = self._lane(driver)
-        if self._directions.is_against(driver, lane):
-            return False
-        length = self._lane_lengths.get(lane)
-        if length is None:
-            length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
-        if length < _LONG_LANE:
+        if lane not in self._lanes:
+            length = float(self._lane_length(lane)) if lane else 0.0
+            self._lanes[lane] = length, self._directions.is_two_way(lane)
+        length, is_two_way = self._lanes[lane]
+        if length < _LONG_LANE or (is_two_way and self._directions.is_against(driver, lane)):
             return False
         fastest = speed + _FASTEST_GAIN
         reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)

@@ -12,14 +12,11 @@ import math
 
 import numpy as np
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
-from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
-from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo.link import vehicle_getter
+from fogsim.traffic.sumo.update_schedule import Due, DueVehicles
+from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
@@ -52,30 +49,19 @@ _NOT_SEEN = math.inf
 class SignalSight:
     """Decides which drivers see the light ahead of them."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        session: str,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._obstructions = obstructions
-        self._api = api
-        self._fog = fog
-        self._sight = sight
-        self._roster = roster
+    def __init__(self, view: DriversView) -> None:
+        api = self._api = view.api
+        self._fog, self._sight, self._roster, self._obstructions = view.fog, view.sight, view.roster, view.obstructions
         self._lights = LightsAhead(api)
         self._speed = vehicle_getter(api, "getSpeed")
         self._deceleration = vehicle_getter(api, "getEmergencyDecel")
-        self._modes = Claims(api, SPEED_MODE, session)
+        self._modes = Claims(api, SPEED_MODE, view.session)
         self._step = float(api.simulation.getDeltaT())
-        self._due = DueVehicles(roster, self._step)
+        self._due = DueVehicles(view.roster, self._step)
         self._certainly_seen = self._certainly_hidden = math.inf
         if api.trafficlight.getIDCount():
-            self._certainly_seen = 0.0 if obstructions else self._seen_distance(fog.maximum_extinction)
-            self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
+            self._certainly_seen = 0.0 if view.obstructions else self._seen_distance(view.fog.maximum_extinction)
+            self._certainly_hidden = self._seen_distance(view.fog.minimum_extinction)
         self._unseen: dict[str, float] = {}
         self._braking_late: dict[str, str] = {}
         self._left_passing: set[str] = set()

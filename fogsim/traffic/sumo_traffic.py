@@ -15,15 +15,13 @@ from fogsim.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
 from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import ClearAir, FogAccess
+from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import structures
 from fogsim.traffic.setup import ANY_EGO, TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
-from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
 from fogsim.traffic.sumo.loaded_files import (
     check_microscopic,
@@ -33,26 +31,21 @@ from fogsim.traffic.sumo.loaded_files import (
     end_time,
     loaded_additional,
     loaded_net,
+    planned_way,
 )
-from fogsim.traffic.sumo.planned_way import planned_way
+from fogsim.traffic.sumo.options import command_line
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
-from fogsim.traffic.sumo_behaviour.ego_choice import EgoChoice
-from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
-from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
-from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
+from fogsim.traffic.sumo_behaviour.ego_driving import EgoChoice, EgoDriving
+from fogsim.traffic.sumo_behaviour.scripted_actions import LampPublisher, LaneKeeping, ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
-from fogsim.traffic.sumo_lanes.courses import Courses
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
-from fogsim.traffic.sumo_lanes.leaders import Leaders
-from fogsim.traffic.sumo_lanes.lights import LightsAhead
-from fogsim.traffic.sumo_lanes.long_bodies import LongBodies
-from fogsim.traffic.sumo_lanes.rail_collisions import rail_collisions
+from fogsim.traffic.sumo_lanes.leaders import Courses, Leaders
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, rail_collisions
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
-from fogsim.traffic.sumo_street.person_reader import PersonReader
-from fogsim.traffic.sumo_street.signal_reader import SignalReader
+from fogsim.traffic.sumo_lanes.street import LightsAhead, PersonReader, SignalReader
 from fogsim.values import (
     Command,
     Lamp,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fogsim.core.registry import Registry
-from fogsim.traffic.drivers.leader_reach import LeaderReach
+from fogsim.traffic.drivers.sight import LeaderReach
 
 CATCHING_UP = 5.0
 """Who keeps up with a leader is ready to drive so much faster, as IDM must be to hold a gap [m/s]; FogSim's own."""

@@ -14,9 +14,8 @@ from fogsim.core.files.xml_reader import read_elements, root_tag
 from fogsim.core.garbage import no_garbage_collection
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
-from fogsim.traffic.road.limit_signs import limit_sign
-from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
-from fogsim.traffic.road.road_map import RoadMap, edge_ranges
+from fogsim.traffic.road.map_cache import RoadMap, cached_map, compacted, edge_ranges, is_worth_caching, keep_map
+from fogsim.traffic.road.signs import limit_sign
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, SignalHead, Structure
 from fogsim.values.light import SIGNAL_DIAMETER
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError
-from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
-from fogsim.traffic.road.plan_view import PlanView, plan_view
+from fogsim.traffic.road.opendrive import PlanView, is_opendrive, plan_view, read_opendrive
 
 _FARTHEST_ROUTE, _LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""

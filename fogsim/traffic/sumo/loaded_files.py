@@ -4,9 +4,12 @@ import difflib
 import math
 from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from fogsim.errors import SimulationError
-from fogsim.traffic.road.configuration import NO_LANES
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.road.configuration import NO_LANES, configured_files
+from fogsim.traffic.road.demand import read_configured_demand, read_demand
+from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api
 
 CLOCK_TICK = 1e-3
@@ -74,3 +77,35 @@ def loaded_additional(api: Api) -> tuple[Path, ...]:
     """Additional files of a running simulation, as far as they are here to be read."""
     names = api.simulation.getOption("additional-files").split(",")
     return tuple(path for name in names if (path := Path(name.strip())).is_file())
+
+
+class PlannedWay(NamedTuple):
+    """Where the ego drives."""
+
+    net: Path  # Network
+    additional: tuple[Path, ...]  # Files with what stands next to the road
+    edges: tuple[str, ...]  # Ids of the edges that the ego drives on
+
+
+def planned_way(setup: TrafficSetup) -> PlannedWay | None:
+    """Look for the ego's way in the files; None where it is not written out in them."""
+    if setup.ego is None:
+        return None
+    if setup.config is None:
+        if setup.net is None:
+            return None
+        net, additional = setup.net, setup.additional
+        demand = read_demand((*setup.additional, *setup.routes), (setup.ego,))
+    elif setup.routes or setup.additional:
+        return None
+    else:
+        try:
+            net, additional = configured_files(setup.config)
+            demand = read_configured_demand(setup.config, (setup.ego,))
+        except InputError:
+            return None  # SUMO reports what is wrong with it
+        additional = tuple(path for path in additional if path.is_file())
+        if not net.is_file():
+            return None
+    way = demand.routes.get(setup.ego)
+    return None if way is None else PlannedWay(net, additional, way.edges)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, UpdateSchedule
+from fogsim.traffic.sumo.roster import MAX_RELATIVE_ACCELERATION, Roster, UpdateSchedule
 
 _TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
-from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+from fogsim.traffic.templates.placement import VEHICLE_KINDS
 from fogsim.values.script import Depart, Enter
 
 _UNLIMITED = 10.0

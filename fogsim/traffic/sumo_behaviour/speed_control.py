@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from fogsim.core.kinematics import decelerated_speed
 from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, advised_by_name, heard_since
-from fogsim.traffic.drivers.compliance import Compliance
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.following import FollowingModel
-from fogsim.traffic.drivers.leader_reach import LeaderReach, drivers_visibility, leader_reach
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess, LeaderReach, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
     SPEED_CHOICES,
+    Compliance,
     DriverSetup,
     speed_by_compliance,
     speed_share,
@@ -27,10 +26,8 @@ from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
-from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
-from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
-from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
-from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
+from fogsim.traffic.sumo_behaviour.headways import HeadwayControl, KeepingUp
+from fogsim.traffic.sumo_behaviour.top_speeds import SpeedShareControl, TopSpeedControl
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
 from fogsim.units import visibility_from_extinction

@@ -6,14 +6,12 @@ from typing import Protocol
 
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.playing import Lamps
-from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
-from fogsim.traffic.sumo_drivers.junctions.junction_sight import JunctionSight
-from fogsim.traffic.sumo_drivers.junctions.pedestrian_sight import PedestrianSight
-from fogsim.traffic.sumo_drivers.junctions.signal_sight import SignalSight
+from fogsim.traffic.sumo_drivers.junction_sight import JunctionFoes, JunctionSight
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
+from fogsim.traffic.sumo_drivers.pedestrian_sight import PedestrianSight
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.signal_sight import SignalSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
 
 

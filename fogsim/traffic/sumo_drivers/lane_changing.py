@@ -29,12 +29,11 @@ from fogsim.traffic.sumo.claims import (
     Claims,
 )
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.update_schedule import DueVehicles
-from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch, refusal_of
+from fogsim.traffic.sumo.roster import DueVehicles
 from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, Neighbours, NeighbourSight, WantedChange
 from fogsim.traffic.sumo_drivers.perception import REACH, Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.unseen import LaneChangeSwitch, refusal_of
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 
 _LOOK_PERIOD = 0.5
 """Time between two looks of a driver [s]."""

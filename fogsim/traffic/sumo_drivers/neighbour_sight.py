@@ -6,10 +6,8 @@ import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from fogsim.traffic.sumo.link import vehicle_getter
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo.link import vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 
 NEAR = 5.0
 """A vehicle next to, or with less gap than this along the road, is seen in any fog [m]."""

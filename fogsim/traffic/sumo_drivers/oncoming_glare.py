@@ -6,10 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn
-from fogsim.traffic.drivers.own_beams import uses_high_beam
+from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn, uses_high_beam
 from fogsim.traffic.sumo.link import getter, vehicle_getter
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import disability_glare

@@ -13,7 +13,7 @@ from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.core.kinematics import safe_speed
 from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
-from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import leader_reach
 from fogsim.traffic.drivers.speed_choice import HeardAdvice, desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility

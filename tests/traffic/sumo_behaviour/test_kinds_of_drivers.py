@@ -8,7 +8,7 @@ import pytest
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import leader_reach
 from fogsim.traffic.drivers.speed_choice import observed
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line

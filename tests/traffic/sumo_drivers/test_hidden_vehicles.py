@@ -12,8 +12,7 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.obstruction import Obstructions, obstructions_of
 from fogsim.traffic import DriverSight
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.values import FogField, Structure, StructureKind
 
 PAIRS = [("me", "other"), ("other", "me")]

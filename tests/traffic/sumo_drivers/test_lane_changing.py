@@ -17,8 +17,7 @@ from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
 from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
 from tests.traffic.sumo_drivers.test_perception import NET, Fog, SeesFrom
 

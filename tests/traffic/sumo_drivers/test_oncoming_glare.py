@@ -10,18 +10,18 @@ import pytest
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
+from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
 from fogsim.traffic.sumo_drivers.oncoming_glare import (
     LAMP_HEIGHT,
     MOST_GLARE,
     OncomingGlare,
     most_glare,
 )
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
+from fogsim.traffic.sumo_drivers.perception import LeaderSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import OppositeEdges
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp

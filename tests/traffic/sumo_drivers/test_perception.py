@@ -25,8 +25,8 @@ from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
+from fogsim.traffic.sumo_drivers.perception import LeaderSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import Collision, Command, FogBank, FogField, Lamp
 from fogsim.values.fog import AIRLIGHT_SHARE
 

@@ -8,15 +8,14 @@ import pytest
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
-from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
-from fogsim.traffic.drivers.eye_heights import eye_height
+from fogsim.traffic.appearance import OTHERS_LAMPS, eye_height, lamps_from_signals, paint
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import FogBank, FogField, Lamp
 
 FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"

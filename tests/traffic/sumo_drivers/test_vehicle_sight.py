@@ -10,8 +10,7 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.sight_kernels import BEARING, LINE, NEAREST
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogBank, FogField, Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on

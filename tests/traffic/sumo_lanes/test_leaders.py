@@ -17,9 +17,8 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
-from fogsim.traffic.sumo_lanes.courses import Courses
-from fogsim.traffic.sumo_lanes.leaders import Leaders
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
+from fogsim.traffic.sumo_lanes.leaders import Courses, Leaders
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, TrafficState
 

@@ -19,10 +19,9 @@ from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
-from fogsim.traffic.sumo_lanes.lights import LightsAhead
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, sections
+from fogsim.traffic.sumo_lanes.street import LightsAhead
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, FogField, Lamp, SignalColour, TrafficState
 from fogsim.values.command import EgoControl

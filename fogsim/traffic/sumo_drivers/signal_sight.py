@@ -15,9 +15,9 @@ import numpy as np
 from fogsim.traffic.appearance import RAILWAYS
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
 from fogsim.traffic.sumo.link import vehicle_getter
-from fogsim.traffic.sumo.update_schedule import Due, DueVehicles
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
-from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
+from fogsim.traffic.sumo.roster import Due, DueVehicles
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
+from fogsim.traffic.sumo_lanes.street import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
 _SIGNAL_HEIGHT = 2.0

@@ -10,11 +10,10 @@ import math
 from collections.abc import Iterable, Iterator
 
 from fogsim.traffic.appearance import OTHERS_LAMPS
-from fogsim.traffic.drivers.lamp_intensity import head_lamp_share
-from fogsim.traffic.drivers.own_beams import head_lamp_light
+from fogsim.traffic.drivers.lamp_intensity import head_lamp_light, head_lamp_share
 from fogsim.traffic.sumo.link import getter, vehicle_getter
-from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
-from fogsim.traffic.sumo_drivers.seen_vehicles import DriversView, OwnLamps
+from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 
 LOOK_PERIOD = 0.2
 """Time between two looks at pedestrians [s]."""

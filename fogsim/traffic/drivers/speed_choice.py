@@ -10,7 +10,7 @@ import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -89,18 +89,10 @@ CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
 Choice = Callable[[float], float]
-"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter."""
+"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter.
 
-
-@runtime_checkable
-class RelativeChoice(Protocol):
-    """A choice that also slows drivers relative to the speed that they would drive in clear air, on any road."""
-
-    def __call__(self, visibility: float) -> float:
-        """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
-
-    def share(self, visibility: float) -> float:
-        """Share of the speed in clear air that a driver still wants [-] (`visibility` [m])."""
+One with a method `share` also slows drivers relative to the speed that they would drive in clear air, on any road.
+"""
 
 
 def speed_share(choice: Choice, visibility: float) -> float:
@@ -108,7 +100,6 @@ def speed_share(choice: Choice, visibility: float) -> float:
 
     Takes `visibility` [m].
     """
-    # Asked thousands of times a second, where isinstance of a protocol takes 50 times as long.
     share: Callable[[float], float] | None = getattr(choice, "share", None)
     return 1.0 if share is None else share(visibility)
 

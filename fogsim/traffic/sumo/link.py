@@ -91,6 +91,27 @@ def is_off_lanes(api: Api, vehicle: str) -> bool:
     return not api.vehicle.getLaneID(vehicle)
 
 
+def edge_length(api: Api, edge: str) -> float:
+    """Length of an edge [m]."""
+    return float(api.lane.getLength(f"{edge}_0"))
+
+
+def inner_lanes(links: Getter, lane: str) -> Iterator[str]:
+    """A lane inside a junction and those there that follow it; `links` is SUMO's getter of a lane's links."""
+    while lane:
+        yield lane
+        lane = next((link[4] for link in links(lane)), "")
+
+
+def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
+    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
+    if is_off_lanes(api, vehicle):
+        return False
+    edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
+    # Lanes of a junction say nothing about those behind it, where SUMO makes the change.
+    return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))
+
+
 def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
     """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message."""
     simulation = api.simulation

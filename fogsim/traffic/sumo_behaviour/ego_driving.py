@@ -1,29 +1,31 @@
 """The ego driven by hand: an acceleration and changes of lane in place of SUMO's own driver."""
 
+from collections.abc import Callable
+
+from fogsim.errors import SimulationError
 from fogsim.traffic.appearance import TRAINS, body_kind
 from fogsim.traffic.setup import ANY_EGO
-from fogsim.traffic.sumo.link import Api, getter, is_off_lanes
-from fogsim.traffic.sumo_behaviour.scripted_actions import has_lane
+from fogsim.traffic.sumo.link import Api, edge_length, getter, has_lane, is_off_lanes
 from fogsim.values import EgoControl
 
-LONG_WAY = 1000.0
+_LONG_WAY = 1000.0
 """The first vehicle with so much of its route ahead is chosen [m]."""
 
 _PATIENCE = 600.0
 """So long after the first vehicle that would do, the one with the longest way is chosen, if possible without stops [s].
 """
 
-LOOK_PERIOD = 1.0
+_LOOK_PERIOD = 1.0
 """Time between two looks at those who have departed [s]."""
 
 _BODIES = frozenset({"car", "van", "truck", "bus"})
 _DRIVES = 1.0  # [m/s]
 
 
-class EgoChoice:
+class _EgoChoice:
     """Watches a simulation until a vehicle suits: a car, van, truck or bus that drives on a lane.
 
-    It is the first one with `LONG_WAY` and no stop ahead of it, or a vehicle whose id is ``any``.
+    It is the first one with `_LONG_WAY` and no stop ahead of it, or a vehicle whose id is ``any``.
     """
 
     def __init__(self, api: Api) -> None:
@@ -45,7 +47,7 @@ class EgoChoice:
             return ANY_EGO
         if now < self._next:
             return None
-        self._next = now + LOOK_PERIOD
+        self._next = now + _LOOK_PERIOD
         present = set(self._api.vehicle.getIDList())
         waiting, self._waiting = self._waiting, []
         for vehicle in waiting:
@@ -55,7 +57,7 @@ class EgoChoice:
                 self._waiting.append(vehicle)
                 continue
             way = not self._api.vehicle.getStops(vehicle, 1), self._way_ahead(vehicle)
-            if way >= (True, LONG_WAY):
+            if way >= (True, _LONG_WAY):
                 return vehicle
             if way > self._longest:
                 self._until = self._until or now + _PATIENCE
@@ -73,9 +75,23 @@ class EgoChoice:
 
     def _way_ahead(self, vehicle: str) -> float:
         """What a vehicle has yet to drive of its route, without the ways across junctions [m]."""
-        get, length = self._api.vehicle, self._api.lane.getLength
+        get = self._api.vehicle
         route = get.getRoute(vehicle)[get.getRouteIndex(vehicle) :]
-        return float(sum(length(f"{edge}_0") for edge in route) - get.getLanePosition(vehicle))
+        return float(sum(edge_length(self._api, edge) for edge in route) - get.getLanePosition(vehicle))
+
+
+def choose_ego(api: Api, step: Callable[[], object], last: float) -> str:
+    """Run a simulation until a vehicle suits as the ego, at the longest until a time [s], and give back its id."""
+    choice, simulation = _EgoChoice(api), api.simulation
+    while (found := choice.look()) is None:
+        if simulation.getTime() >= last or simulation.getMinExpectedNumber() == 0:
+            found = choice.best
+            break
+        step()
+    if found is None:
+        until = f"until {simulation.getTime():g} s"
+        raise SimulationError(f"ego: {ANY_EGO}: no car, van, truck or bus drives on a lane {until}")
+    return found
 
 
 _NO_CHECKS = 0

@@ -7,7 +7,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api, is_off_lanes
+from fogsim.traffic.sumo.link import Api, has_lane
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.paths import LaneOffsets, Paths
@@ -280,12 +280,3 @@ class ScriptedActions:
         for vehicle in self._changing.keys() & set(present):
             self._modes.withdraw(vehicle)
         self._changing.clear()
-
-
-def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
-    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
-    if is_off_lanes(api, vehicle):
-        return False
-    edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
-    # Lanes of a junction say nothing about those behind it, where SUMO makes the change.
-    return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))

@@ -14,7 +14,7 @@ from pathlib import Path
 from fogsim.core.files.xml_reader import open_unpacked
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import Api, edge_length, vehicle_getter
 from fogsim.traffic.sumo.roster import DueVehicles
 from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
@@ -36,8 +36,6 @@ class JunctionFoes:
         self._net = net
         self._foes = vehicle_getter(api, "getJunctionFoes")
         self._vehicles, self._places = api.vehicle, RoutePlaces(api)
-        self._lanes = api.lane
-        self._lengths: dict[str, float] = {}
 
     @functools.cached_property
     def _unregulated(self) -> frozenset[str]:
@@ -65,16 +63,10 @@ class JunctionFoes:
         for edge in vehicles.getRoute(driver)[max(int(vehicles.getRouteIndex(driver)), 0) :]:
             if edge in self._leading_there:
                 return True
-            way += self._length(edge)
+            way += edge_length(self._api, edge)
             if way > reach:
                 return False
         return False
-
-    def _length(self, edge: str) -> float:
-        known = self._lengths.get(edge)
-        if known is None:
-            known = self._lengths[edge] = float(self._lanes.getLength(f"{edge}_0"))
-        return known
 
 
 def unregulated_junctions(net: Path) -> frozenset[str]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.traffic.sumo.link import Api, Getter, getter, vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo.link import Api, Getter, getter, inner_lanes, vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.values import Leader, TrafficState
 
@@ -171,12 +171,7 @@ class Leaders:
         return known
 
     def _way_of(self, link: Sequence[str]) -> tuple[str, ...]:
-        inner: list[str] = []
-        lane = link[4]
-        while lane:
-            inner.append(lane)
-            lane = next((further[4] for further in self._links(lane)), "")
-        return (*inner, link[0])
+        return (*inner_lanes(self._links, link[4]), link[0])
 
     def _from(self, edge: str, station: float) -> Iterator[_Spot]:
         """Vehicles on an edge whose fronts are past a station [m], in their order."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.sumo.link import Api, Getter, vehicle_getters
+from fogsim.traffic.sumo.link import Api, Getter, inner_lanes, vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.values import Collision, TrafficState
 from fogsim.values.traffic import BodyPieces
@@ -179,17 +179,12 @@ class LongBodies:
         target, best = lane.rpartition("_")[0], list[str]()
         for number in range(int(self._api.edge.getLaneNumber(edge))):
             for link in self._api.lane.getLinks(f"{edge}_{number}"):
-                way = [f"{edge}_{number}", *self._inner(link[4]), link[0]]
+                way = [f"{edge}_{number}", *inner_lanes(self._api.lane.getLinks, link[4]), link[0]]
                 if lane in way:
                     return way[: way.index(lane)][::-1]
                 if way[-1].rpartition("_")[0] == target:
                     best = way[:-1][::-1]
         return best
-
-    def _inner(self, lane: str) -> Iterator[str]:
-        while lane:
-            yield lane
-            lane = next((link[4] for link in self._api.lane.getLinks(lane)), "")
 
     def _point(self, lanes: Sequence[str], station: float) -> _Point:
         """Place along lanes, from the beginning of the first one on [m]; straight on behind the last one."""

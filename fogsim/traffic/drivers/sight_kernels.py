@@ -13,9 +13,9 @@ from fogsim.values.eye import flux_root, luminance_root
 from fogsim.values.fog import AIRLIGHT_SHARE
 
 DAY_EYE_THRESHOLD = 1e-3
-"""Illuminance at the eye at which a lamp is noticed by day, before fog of `BRIGHT_LUMINANCE` and more [lx]."""
+"""Illuminance at the eye at which a lamp is noticed by day, before fog of `_BRIGHT_LUMINANCE` and more [lx]."""
 
-BRIGHT_LUMINANCE = 302.0
+_BRIGHT_LUMINANCE = 302.0
 """Luminance before which no lamp needs more light to be noticed than before less [cd/m²]."""
 
 HEAD_LAMP_LUMINANCE = 0.28
@@ -52,7 +52,7 @@ def _roots(luminance: float) -> tuple[float, float]:
 
 _DAY_LUMINANCE = airlight_luminance(DAY_ILLUMINANCE)
 _DAY_FLUX_ROOT, _DAY_LUMINANCE_ROOT = _roots(_DAY_LUMINANCE)
-_BRIGHT_FLUX_ROOT, _ = _roots(BRIGHT_LUMINANCE)
+_BRIGHT_FLUX_ROOT, _ = _roots(_BRIGHT_LUMINANCE)
 
 
 class Adaptation(NamedTuple):
@@ -91,7 +91,7 @@ def adaptation(illuminance: float, glare: float = 0.0, share: float = AIRLIGHT_S
     """
     airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare
-    flux, extended = _roots(min(luminance, BRIGHT_LUMINANCE))
+    flux, extended = _roots(min(luminance, _BRIGHT_LUMINANCE))
     return Adaptation(airlight, luminance, DAY_EYE_THRESHOLD * (flux / _BRIGHT_FLUX_ROOT) ** 2, flux, extended)
 
 
@@ -99,7 +99,7 @@ NIGHT_EYE_THRESHOLD = adaptation(0.0).eye_threshold
 """Illuminance at the eye at which a lamp is noticed on a road in the dark [lx]."""
 
 
-FARTHEST = 1e5
+_FARTHEST = 1e5
 """Distance beyond which sight is not distinguished from sight without end [m]."""
 
 DISTANCE_TOLERANCE = 0.01
@@ -124,7 +124,7 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
 
 
-X, Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
+_X, _Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
 """Columns of what is known of a vehicle: where its front bumper is [m], its speed [m/s], its driver's minimum gap [m],
 the contrast of its body [-], and its driver's eyes above the road [m]."""
 
@@ -166,12 +166,12 @@ def face_leaders(
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
         facing[_DEEPENING, i] = closing.extinction * (facing[_CLOSING, i] if closing.is_even else apart)
-        x, y, z = other[X] - own[X], other[Y] - own[Y], other[Z] - own[Z]
+        x, y, z = other[_X] - own[_X], other[_Y] - own[_Y], other[Z] - own[Z]
         height = own[EYE_HEIGHT]
         z += min(height, BODY_MIDDLE) - height
         share = facing[DISTANCE, i] / math.sqrt(x * x + y * y + z * z)
-        lines[0, i] = own[X], own[Y], own[Z] + height
-        lines[1, i] = own[X] + x * share, own[Y] + y * share, own[Z] + height + z * share
+        lines[0, i] = own[_X], own[_Y], own[Z] + height
+        lines[1, i] = own[_X] + x * share, own[_Y] + y * share, own[Z] + height + z * share
 
 
 @kernel
@@ -222,7 +222,7 @@ def seen_distance(
 
     Takes `reach` [m], `extinction` [1/m], `contrast`, `intensity`, `head_lamps` [cd].
     """
-    near, far = 0.0, FARTHEST
+    near, far = 0.0, _FARTHEST
     if depth_limit(eyes, threshold, reach, far, contrast, intensity, head_lamps) >= extinction * far:
         return math.inf
     while far - near > DISTANCE_TOLERANCE:
@@ -281,10 +281,10 @@ def draw_lines_of_sight(
     """
     first = 0
     for n in range(ends.size):
-        x, y, height = observers[n, X], observers[n, Y], observers[n, 4]
+        x, y, height = observers[n, _X], observers[n, _Y], observers[n, 4]
         nearest = math.inf
         for i in range(first, ends[n]):
-            front_x, front_y, half = parts[i, X], parts[i, Y], 0.5 * parts[i, 6]
+            front_x, front_y, half = parts[i, _X], parts[i, _Y], 0.5 * parts[i, 6]
             east, north = math.cos(parts[i, 3]), math.sin(parts[i, 3])
             ahead = (x - front_x) * east + (y - front_y) * north
             aside = (y - front_y) * east - (x - front_x) * north

@@ -35,7 +35,7 @@ class Compliance:
     foreseen: float = 1.0  # Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1
 
 
-FULL = Compliance()
+_FULL = Compliance()
 """Everyone is reached and goes all the way down, and no one up: the best case."""
 
 _SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
@@ -54,7 +54,7 @@ Caltrans' CAWS near Stockton (MacCarley, Ackles & Watts 2006): mean speeds fell 
 word "fog" without a speed 1.8 mph on the M25 (Cooper & Sawyer 1993).
 """
 
-IN_CAR = Compliance(strength=0.55)
+_IN_CAR = Compliance(strength=0.55)
 """Advice on a display in the car.
 
 Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the way into the fog and 64.8 in place of
@@ -63,15 +63,15 @@ Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the w
 """
 
 _VEHICLE_TO_VEHICLE = Compliance(reached_share=0.3, strength=0.55)
-"""Advice from vehicle to vehicle, displayed in the car: as `IN_CAR`, to those who are equipped; FogSim's own share."""
+"""Advice from vehicle to vehicle, displayed in the car: as `_IN_CAR`, to those who are equipped; FogSim's own share."""
 
 COMPLIANCES: Registry[Compliance] = Registry(
     "compliance",
     {
-        "full": FULL,
+        "full": _FULL,
         "speed_limit_sign": _SPEED_LIMIT_SIGN,
         "advisory_sign": _ADVISORY_SIGN,
-        "in_car": IN_CAR,
+        "in_car": _IN_CAR,
         "vehicle_to_vehicle": _VEHICLE_TO_VEHICLE,
     },
 )
@@ -88,14 +88,14 @@ UNAFFECTED_ABOVE = 200.0
 CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
-Choice = Callable[[float], float]
+_Choice = Callable[[float], float]
 """From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter.
 
 One with a method `share` also slows drivers relative to the speed that they would drive in clear air, on any road.
 """
 
 
-def speed_share(choice: Choice, visibility: float) -> float:
+def speed_share(choice: _Choice, visibility: float) -> float:
     """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
 
     Takes `visibility` [m].
@@ -181,7 +181,7 @@ def _clipped(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-SPEED_CHOICES: Registry[Choice] = Registry(
+SPEED_CHOICES: Registry[_Choice] = Registry(
     "speed choice",
     {"observed": observed, "unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight},
 )
@@ -193,7 +193,7 @@ class DriverSetup:
 
     speed_choice: str = "observed"  # Name in `SPEED_CHOICES`
     spread: float = 0.1  # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
-    compliance: Compliance = FULL  # How they follow advice
+    compliance: Compliance = _FULL  # How they follow advice
     # By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
     # outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001)
     misjudgement: float = 0.0
@@ -267,7 +267,7 @@ def _drawn_kind(shares: Mapping[str, float], draw: float) -> str:
     return next(reversed(list(shares)))
 
 
-def chosen_speed(choice: Choice, factor: float, own: float, visibility: float) -> float:
+def chosen_speed(choice: _Choice, factor: float, own: float, visibility: float) -> float:
     """Speed that a driver chooses in fog [m/s] (`own` [m/s], `visibility` [m])."""
     return min(factor * choice(visibility), speed_share(choice, visibility) * own)
 

@@ -33,12 +33,12 @@ def limit_sight(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
     """Let the drivers of an environment see only what a fog lets them see, until its next reset."""
     # On this one road, not in the library: other environments of the process go on in clear air.
     road = fleet.environment.road
-    road.neighbour_vehicles = neighbours = VisibleNeighbours(fog, fleet, sight)
+    road.neighbour_vehicles = neighbours = _VisibleNeighbours(fog, fleet, sight)
     if isinstance(road, RegulatedRoad):
         road.respect_priorities = neighbours.who_gives_way
 
 
-class VisibleNeighbours:
+class _VisibleNeighbours:
     """Stands in for the methods ``neighbour_vehicles`` and ``respect_priorities`` of one road."""
 
     def __init__(self, fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
@@ -91,7 +91,7 @@ class VisibleNeighbours:
         return depth <= self._sight.depth_limit(distance, contrast, lit, own, glare)
 
 
-class Manoeuvres:
+class _Manoeuvres:
     """Makes vehicles do what is scripted."""
 
     def __init__(self, fleet: Fleet, events: Sequence[Event]) -> None:
@@ -240,7 +240,7 @@ class DriverControl:
         self._fleet = fleet
         self._sight = sight
         self._desired_speeds = HighwayDesiredSpeeds(fleet, setup, seed, advice_deceleration, sight)
-        self._manoeuvres = Manoeuvres(fleet, events)
+        self._manoeuvres = _Manoeuvres(fleet, events)
 
     def enter_fog(self, fog: FogAccess) -> None:
         """Let the drivers choose their speeds in a fog, and see only what it lets them see."""
@@ -254,11 +254,11 @@ class DriverControl:
         return self._desired_speeds.heard if math.isinf(own) else {**self._desired_speeds.heard, ego: own}
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin what a script asks for; see `Manoeuvres.begin`."""
+        """Begin what a script asks for; see `_Manoeuvres.begin`."""
         return self._manoeuvres.begin(actions)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """List what has not been played so far; see `Manoeuvres.unplayed`."""
+        """List what has not been played so far; see `_Manoeuvres.unplayed`."""
         return self._manoeuvres.unplayed(keep_lane)
 
     def __call__(self) -> None:

@@ -25,7 +25,7 @@ from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Stretch
 
 
-class HighwayVehiclePlaces:
+class _HighwayVehiclePlaces:
     """Finds vehicles by their lanes; edges are named as in the road network. See `VehiclePlaces`."""
 
     def __init__(self, fleet: Fleet) -> None:
@@ -92,7 +92,7 @@ class HighwayDesiredSpeeds:
         self._deceleration = advice_deceleration
         self._sight = sight
         self._traits: dict[str, DriverTraits] = {}
-        self._hearing = AdviceHearing(HighwayVehiclePlaces(fleet))
+        self._hearing = AdviceHearing(_HighwayVehiclePlaces(fleet))
         self._advised_since: Heard = {}
         self._desired: dict[Any, float] = {}
         self._own_speed: dict[Any, float] = {}

@@ -41,11 +41,11 @@ def lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
 
 
 def _leads_on(lane: Any, following: Any) -> bool:
-    turn = following.heading_at(reached_at(lane, following)) - lane.heading_at(lane.length)
+    turn = following.heading_at(_reached_at(lane, following)) - lane.heading_at(lane.length)
     return abs(math.remainder(turn, math.tau)) < _WIDEST_BEND
 
 
-def reached_at(lane: Any, following: Any) -> float:
+def _reached_at(lane: Any, following: Any) -> float:
     """Station of a lane abreast of another's end [m]."""
     station, _ = following.local_coordinates(lane.position(lane.length, 0.0))
     return float(np.clip(station, 0.0, following.length))
@@ -197,7 +197,7 @@ def _centreline(lane: Any, start: float = 0.0) -> NDArray[np.float64]:
 def _route(network: Any, ego: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points of the ego's route [m], and the speed limits on the way to them [m/s]."""
     lanes = [network.get_lane(index) for index in lanes_ahead(network, ego)]
-    starts = [0.0, *(reached_at(one, following) for one, following in itertools.pairwise(lanes))]
+    starts = [0.0, *(_reached_at(one, following) for one, following in itertools.pairwise(lanes))]
     lines = [_centreline(lane, start) for lane, start in zip(lanes, starts, strict=True)]
     points, limits = np.concatenate(lines), np.repeat([speed_limit(lane) for lane in lanes], list(map(len, lines)))
     apart = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6))

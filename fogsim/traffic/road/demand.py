@@ -15,7 +15,7 @@ _MOST_BYTES = 50_000_000
 
 
 @dataclass(slots=True)
-class Flows:
+class _Flows:
     """Rates of all flows together by vehicle type [1/h], number of flows, and vehicles that are written one by one.
 
     `is_whole` is False if a file could not be read to its end.
@@ -27,7 +27,7 @@ class Flows:
     is_whole: bool = True
 
 
-def read_flows(files: Iterable[Path]) -> Flows:
+def read_flows(files: Iterable[Path]) -> _Flows:
     """Flows and single vehicles of additional and route files, in SUMO's order."""
     reader = _FlowReader()
     for file in files:
@@ -44,7 +44,7 @@ class _FlowReader:
     is_done = False
 
     def __init__(self) -> None:
-        self.found = Flows()
+        self.found = _Flows()
         self._mixes: dict[str, dict[str, float]] = {}
         self._mix = ""
 
@@ -94,7 +94,7 @@ def _number(text: str) -> float:
         return 0.0
 
 
-MOST_NAMES = 10_000
+_MOST_NAMES = 10_000
 """Maximum number of ids that are kept to suggest the nearest."""
 
 _OPENING = frozenset(("include", "calibrator", "personTrip"))
@@ -114,8 +114,8 @@ class VehicleRoute:
 class Demand:
     """What route and additional files say about the wanted vehicles.
 
-    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `MOST_NAMES` ids in
-    file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
+    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `_MOST_NAMES` ids
+    in file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
     those that were not found.
     """
 
@@ -138,14 +138,12 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
     return read_demand(configured.files, wanted, reroutes=configured.reroutes)
 
 
-def read_demand(
-    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = _MOST_BYTES, *, reroutes: bool = False
-) -> Demand:
+def read_demand(files: Iterable[Path], wanted: Iterable[str], *, reroutes: bool = False) -> Demand:
     """Search for vehicles in additional and route files, in SUMO's order.
 
-    After `most_bytes` unpacked bytes the demand counts as open.
+    After `_MOST_BYTES` unpacked bytes the demand counts as open.
     """
-    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
+    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), _MOST_BYTES
     for file in files:
         reader.file = file
         try:
@@ -215,7 +213,7 @@ class _DemandReader:
     def _take(
         self, attributes: Mapping[str, str], names: tuple[str, ...], vehicles: Collection[str] | None = None
     ) -> None:
-        if len(self._names) < MOST_NAMES:
+        if len(self._names) < _MOST_NAMES:
             self._names += names
         here = tuple(v for v in (names if vehicles is None else vehicles) if v in self._wanted)
         self._found.update(here)

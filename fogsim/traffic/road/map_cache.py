@@ -67,7 +67,7 @@ _MADE_BY = ("map_cache.py", "network.py", "signs.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 
-Arrays = dict[str, NDArray[Any]]
+_Arrays = dict[str, NDArray[Any]]
 
 
 def is_worth_caching(net: Path) -> bool:
@@ -119,7 +119,7 @@ def _version() -> bytes:
     return hashlib.sha256(b"\0".join((*versions, *sources))).digest()
 
 
-def _arrays_of(roads: RoadMap) -> Arrays:
+def _arrays_of(roads: RoadMap) -> _Arrays:
     lanes, areas, signs, heads = roads.lanes, roads.areas, roads.limit_signs, roads.signal_heads
     return {
         "edges": _text(list(roads.edges)),
@@ -185,7 +185,7 @@ def _lane(name: tuple[str, str], line: NDArray[np.float64], sizes: Sequence[floa
     return Lane(*name, line, width, speed_limit, *markings, bool(outermost), _KINDS[kind], _ENDS[end])
 
 
-def _lines(name: str, lines: Sequence[NDArray[np.float64]]) -> Arrays:
+def _lines(name: str, lines: Sequence[NDArray[np.float64]]) -> _Arrays:
     points = np.concatenate([np.zeros((0, 3)), *lines])
     return {name: points, f"{name}_counts": np.array([len(line) for line in lines], np.int64)}
 

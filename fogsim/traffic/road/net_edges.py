@@ -12,7 +12,7 @@ from fogsim.errors import InputError
 _MOST_BYTES = 50_000_000
 """Unpacked bytes of a network file after which reading stops."""
 
-Point = tuple[float, ...]
+_Point = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class NetEdges:
     """
 
     lanes: Mapping[str, int]
-    axes: Mapping[str, Sequence[Point]]
+    axes: Mapping[str, Sequence[_Point]]
     signals: tuple[str, ...] = ()
     gaps: Collection[tuple[str, str]] = ()
 
@@ -55,7 +55,7 @@ class _EdgeReader:
         self.is_done = self.has_edges = False
         self.unlinked = unlinked
         self.lanes: dict[str, int] = {}
-        self.shapes: dict[str, list[list[Point]]] = {edge: [] for edge in wanted}
+        self.shapes: dict[str, list[list[_Point]]] = {edge: [] for edge in wanted}
         self.signals: dict[str, None] = {}
         self._edge = ""
 
@@ -79,7 +79,7 @@ class _EdgeReader:
         pass
 
 
-def _points(shape: str) -> list[Point]:
+def _points(shape: str) -> list[_Point]:
     """Points of a shape [m]; those without a height are at 0."""
     points = [tuple(map(float, point.split(","))) for point in shape.split()]
     return [(*point, 0.0) if len(point) == 2 else point for point in points]

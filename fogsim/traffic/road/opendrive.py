@@ -60,7 +60,7 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
-class CubicPiece:
+class _CubicPiece:
     """A stretch of a reference line whose coordinates are cubic polynomials (``paramPoly3``).
 
     `forward` and `left` are coefficients along and to the left of the first direction, constant term first; the
@@ -95,7 +95,7 @@ def _cubic(coefficients: tuple[float, ...], p: float) -> tuple[float, float]:
 class PlanView:
     """A road's reference line: its pieces in order of s."""
 
-    pieces: tuple["Piece | CubicPiece | UnknownPiece", ...]
+    pieces: tuple["Piece | _CubicPiece | _UnknownPiece", ...]
 
     def at(self, s: float) -> Place:
         """Point at s [m]; ValueError if it is not on the road, or the shape there is unknown."""
@@ -109,7 +109,7 @@ class PlanView:
     def nearest(self, x: float, y: float) -> float:
         """Where the line is nearest to a point, s [m], as far as its shape is known; ValueError if nothing is."""
         found = []
-        for piece in (one for one in self.pieces if not isinstance(one, UnknownPiece)):
+        for piece in (one for one in self.pieces if not isinstance(one, _UnknownPiece)):
             steps = np.linspace(0.0, piece.length, int(piece.length / _STEP) + 2)
             _, along = min((math.dist(piece.at(float(d))[:2], (x, y)), float(d)) for d in steps)
             for _ in range(_ROUNDS):
@@ -123,7 +123,7 @@ class PlanView:
 
 
 @dataclass(frozen=True, slots=True)
-class UnknownPiece:
+class _UnknownPiece:
     """A stretch of another shape, on which nothing can be placed."""
 
     s: float
@@ -144,15 +144,15 @@ def plan_view(geometries: Iterable[Element]) -> PlanView:
     return PlanView(pieces)
 
 
-def _piece(geometry: Element) -> Piece | CubicPiece | UnknownPiece:
+def _piece(geometry: Element) -> Piece | _CubicPiece | _UnknownPiece:
     s, x, y, heading, length = _numbers(geometry, "s", "x", "y", "hdg", "length")
     shape = next(iter(geometry), None)
     tag = "geometry without a shape" if shape is None else shape.tag
     if shape is not None and tag == "paramPoly3" and length > 0:
         forward, left = (tuple(_numbers(shape, *(f"{c}{axis}" for c in "abcd"))) for axis in "UV")
-        return CubicPiece(s, length, x, y, heading, forward, left, shape.get("pRange") != "arcLength")
+        return _CubicPiece(s, length, x, y, heading, forward, left, shape.get("pRange") != "arcLength")
     if shape is None or tag not in ("line", "arc", "spiral") or length <= 0:
-        return UnknownPiece(s, length, tag)
+        return _UnknownPiece(s, length, tag)
     start = end = 0.0
     if tag == "arc":
         start = end = _numbers(shape, "curvature")[0]

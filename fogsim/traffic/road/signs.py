@@ -15,15 +15,15 @@ from fogsim.traffic.road.structures import MarkedShape, marked_shapes
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 
-SPEED_LIMIT = "speed_limit"
+_SPEED_LIMIT = "speed_limit"
 """Type of the signs."""
 _SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
 _OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
 """Alternative distances where the usual one is on another road; the first free one is used [m]."""
-SIGN_HEIGHT = 2.6
+_SIGN_HEIGHT = 2.6
 """Height of the middle of a sign's face above the road [m]."""
-SIGN_DIAMETER = 0.9
+_SIGN_DIAMETER = 0.9
 """Diameter of a round sign outside towns [m]; 0.75–0.9 m for speeds above 80 km/h (German VzKat size 3)."""
 
 
@@ -52,11 +52,11 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
     x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])
     return Sign(
         f"limit.{edge.getID()}",
-        SPEED_LIMIT,
+        _SPEED_LIMIT,
         float(limit),
-        (x, y, float(z) + SIGN_HEIGHT),
+        (x, y, float(z) + _SIGN_HEIGHT),
         heading,
-        SIGN_DIAMETER,
+        _SIGN_DIAMETER,
     )
 
 
@@ -74,7 +74,7 @@ def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:
 _SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
-_LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
+_LIMITS = frozenset((_SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Types whose value is a speed, in km/h in additional files."""
 _GANTRY_HEIGHT = 6.2
 """Height of the middle of a face above a lane [m]: vehicles up to 4.5 m pass below."""
@@ -82,7 +82,7 @@ _GANTRY_HEIGHT = 6.2
 _DIAMETERS, _HEIGHTS = (0.05, 20.0), (0.0, 50.0)
 """Sizes of signs, and heights of their middle above the road [m]."""
 
-LonLat = tuple[float, float]
+_LonLat = tuple[float, float]
 
 
 def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
@@ -96,7 +96,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
     return SignMap(tuple(signs))
 
 
-def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | None:
+def geographic_position(roads: RoadMap) -> Callable[[float, float], _LonLat] | None:
     """Conversion of a network's x, y [m] to longitude and latitude [deg]; None without projection or pyproj."""
     if roads.location is None:
         return None
@@ -108,7 +108,7 @@ def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | No
         return None
     x_offset, y_offset = _net_offset(roads)
 
-    def convert(x: float, y: float) -> LonLat:
+    def convert(x: float, y: float) -> _LonLat:
         longitude, latitude = projection(x - x_offset, y - y_offset, inverse=True)
         return float(longitude), float(latitude)
 
@@ -150,9 +150,9 @@ def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
         value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
     else:
         value = shape.parameter("value", -FARTHEST, FARTHEST, 0.0)
-    diameter = shape.parameter("diameter", *_DIAMETERS, SIGN_DIAMETER)
+    diameter = shape.parameter("diameter", *_DIAMETERS, _SIGN_DIAMETER)
     ground, over_lane = roads.below(x, y)
-    above = shape.parameter("height", *_HEIGHTS, _GANTRY_HEIGHT if over_lane else SIGN_HEIGHT)
+    above = shape.parameter("height", *_HEIGHTS, _GANTRY_HEIGHT if over_lane else _SIGN_HEIGHT)
     return Sign(shape.name, shape.kind, value, (x, y, ground + above), heading, diameter)
 
 

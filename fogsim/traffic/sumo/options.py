@@ -109,7 +109,7 @@ _EXPECTED: Mapping[str, tuple[str, tuple[type, ...]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class KnownOption:
+class _KnownOption:
     """An option of the installed SUMO."""
 
     name: str  # Its first name; synonyms are known by theirs
@@ -127,7 +127,7 @@ def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
     return {name: mistake for name, mistake in mistakes.items() if mistake is not None}
 
 
-def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) -> str | None:
+def _mistake(name: str, value: OptionValue, known: Mapping[str, _KnownOption]) -> str | None:
     option = known.get(name)
     first = name if option is None else option.name
     if first in OWN_OPTIONS:
@@ -144,7 +144,7 @@ def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) ->
     return None if fits else f"must be {expected}, got {shown(value)}"
 
 
-def known_options() -> Mapping[str, KnownOption]:
+def known_options() -> Mapping[str, _KnownOption]:
     """Every option of the installed SUMO by each of its names; none where it cannot be asked now."""
     try:
         # SUMO's options are global: asking would end a simulation that runs.
@@ -154,16 +154,16 @@ def known_options() -> Mapping[str, KnownOption]:
 
 
 @functools.cache
-def _options_of_template() -> Mapping[str, KnownOption]:
+def _options_of_template() -> Mapping[str, _KnownOption]:
     with tempfile.TemporaryDirectory(prefix="fogsim-") as folder:
         template = Path(folder, "options.xml")
         # Six milliseconds, in which nothing is simulated.
         load_libsumo().start(["sumo", "--save-template", str(template)])
         root = read_tree(template)
-    found: dict[str, KnownOption] = {}
+    found: dict[str, _KnownOption] = {}
     for element in root.iter():
         kind = element.get("type")
         if kind is not None:
-            option = KnownOption(element.tag, kind)
+            option = _KnownOption(element.tag, kind)
             found |= dict.fromkeys((element.tag, *element.get("synonymes", "").split()), option)
     return found

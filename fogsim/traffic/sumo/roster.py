@@ -20,7 +20,7 @@ _GETTERS = {
 }
 """Getters, and their variables in SUMO's TraCI protocol."""
 
-CHECK_PERIOD = 1.0
+_CHECK_PERIOD = 1.0
 """Time after which the vehicles are counted [s], should somebody have removed one by hand."""
 
 
@@ -36,7 +36,7 @@ class Roster:
     remote : bool
         True where every call is a message to another process.
     mark : LoadMark or None
-        Checked at every step, or where that is a message, whenever all ids are read again and once a `CHECK_PERIOD`.
+        Checked at every step, or where that is a message, whenever all ids are read again and once a `_CHECK_PERIOD`.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Roster:
         self._leave(self.teleported)
         self._enter(self._returned())
         self._leave(self._arrived())
-        if now - self._checked >= CHECK_PERIOD:
+        if now - self._checked >= _CHECK_PERIOD:
             self._checked = now
             self._check_mark()
             self.check_count()

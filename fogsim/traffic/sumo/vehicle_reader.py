@@ -49,7 +49,7 @@ _MARGIN = 50.0
 """SUMO gathers vehicles by the lanes near the ego; this much more radius leaves none out [m]."""
 
 
-class DynamicState(NamedTuple):
+class _DynamicState(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
 
     A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
@@ -219,14 +219,14 @@ class VehicleReader:
             )
         return self._constants
 
-    def _dynamic_state(self) -> DynamicState:
+    def _dynamic_state(self) -> _DynamicState:
         ids, position = self._nearby_vehicles.find()
         angle, speed, acceleration, signals, lane = self._getters
         # One array for all: for few vehicles making arrays costs more than asking.
         flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
         angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
         lanes, lit, slopes = tuple(map(lane, ids)), list(map(signals, ids)), self._slopes(ids, position[:, 2])
-        return DynamicState(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
+        return _DynamicState(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
 
     def _slopes(self, ids: Sequence[str], heights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Slopes (n,) [°], which are not asked for while all stay on the level."""
@@ -257,7 +257,7 @@ class VehicleReader:
         return math.hypot(hit.colliderSpeed - hit.victimSpeed * math.cos(turn), hit.victimSpeed * math.sin(turn))
 
 
-def _off_lanes(now: DynamicState) -> NDArray[np.bool_]:
+def _off_lanes(now: _DynamicState) -> NDArray[np.bool_]:
     """Who is off the lanes (n,); without the acceleration and slope that SUMO reports of these. Empty if none is."""
     if "" not in now.lane:
         return np.zeros(0, np.bool_)
@@ -277,7 +277,7 @@ class SubscribedReader(VehicleReader):
 
     _read: tuple[str, ...] = ()
 
-    def _dynamic_state(self) -> DynamicState:
+    def _dynamic_state(self) -> _DynamicState:
         if self._ego is None:
             return super()._dynamic_state()
         rows = self._surroundings()
@@ -286,7 +286,7 @@ class SubscribedReader(VehicleReader):
         position = np.array([rows[v][_POSITION_3D] for v in listed])
         near = self._is_near(listed, position)
         ids = self._read = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
-        return DynamicState(
+        return _DynamicState(
             ids=ids,
             position=position[near],
             angle=np.array([rows[v][_ANGLE] for v in ids]),

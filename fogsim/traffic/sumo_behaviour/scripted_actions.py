@@ -69,7 +69,7 @@ class LampPublisher:
                 self._published[vehicle] = lit
 
 
-class SignalControl:
+class _SignalControl:
     """Sets traffic lights; remembers which, to give them back."""
 
     def __init__(self, api: Api) -> None:
@@ -150,7 +150,7 @@ class ScriptedActions:
         self._speeds = speeds
         self._playing = Playing(lamps)
         self._lane_changes = lane_changes
-        self._signals = SignalControl(api)
+        self._signals = _SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
         self._offsets = LaneOffsets(api)
         self._paths = Paths(api)

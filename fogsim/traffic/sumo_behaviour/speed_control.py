@@ -34,7 +34,7 @@ from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Display
 
 
-class FogChoices:
+class _FogChoices:
     """Writes into the table what drivers choose."""
 
     def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
@@ -209,7 +209,7 @@ class SumoDesiredSpeeds:
         self._ego = setup.ego
         self._roster = roster
         table = self._table = DriverTable(api, setup.drivers, seed, session)
-        self._choices = FogChoices(table, setup.drivers, setup.sight)
+        self._choices = _FogChoices(table, setup.drivers, setup.sight)
         self._keeping_up = KeepingUp(api, table, setup.sight, remote)
         self._headways = HeadwayControl(api, table, setup.drivers.misjudgement, setup.sight)
         self._top_speeds = TopSpeedControl(api, table, table.top_speeds, setup.advice_deceleration, roster.time)

@@ -18,7 +18,7 @@ from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 _UNNOTICED_SPEED = 0.3
 """Change of a desired speed [m/s] that is not noticed; setting it costs calls."""
 
-MAX_INTERVAL = 1.0
+_MAX_INTERVAL = 1.0
 """However long ago the last update was, a top speed falls by no more than it does in this time [s]."""
 
 
@@ -65,7 +65,7 @@ class TopSpeedControl:
 
     def update(self, time: float, present: Collection[str]) -> None:
         """Lower further the top speeds that are being lowered (`time` [s])."""
-        passed, self._updated_at = min(max(time - self._updated_at, 0.0), MAX_INTERVAL), time
+        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
         for vehicle, row in list(self._falling.items()) if self._falling else ():
             if vehicle not in present:
                 del self._falling[vehicle]
@@ -141,7 +141,7 @@ class SpeedShareControl:
 
     def update(self, time: float, present: Collection[str]) -> None:
         """Lower further the shares that are being lowered (`time` [s])."""
-        passed, self._updated_at = min(max(time - self._updated_at, 0.0), MAX_INTERVAL), time
+        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
         for vehicle, (row, rate) in list(self._falling.items()) if self._falling else ():
             if vehicle not in present:
                 del self._falling[vehicle]

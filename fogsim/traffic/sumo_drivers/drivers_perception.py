@@ -15,7 +15,7 @@ from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, Veh
 from fogsim.values import Lamp
 
 
-class PerceivedPart(Protocol):
+class _PerceivedPart(Protocol):
     """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
 
     def update(self, own_lamps: OwnLamps) -> None:
@@ -31,7 +31,7 @@ class DriversPerception:
     def __init__(self, view: DriversView, net: Path | None = None) -> None:
         self._roster = view.roster
         leaders, sight = Perception(view), VehicleSight(view)
-        self._parts: tuple[PerceivedPart, ...] = (
+        self._parts: tuple[_PerceivedPart, ...] = (
             leaders,
             LaneChanging(view, leaders, sight),
             JunctionSight(view, JunctionFoes(view.api, net), sight),

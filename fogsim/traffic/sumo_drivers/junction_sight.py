@@ -21,7 +21,7 @@ from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, Veh
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 
-Foe = tuple[str, float, float, float, float, str, str, bool, bool]
+_Foe = tuple[str, float, float, float, float, str, str, bool, bool]
 """SUMO's answer: foe, ways of driver and foe to where they cross, and so on; see libsumo's ``getJunctionFoes``."""
 
 _JUNCTION = re.compile(rb'<junction\s[^>]*\btype="(?:traffic_light_)?unregulated"[^>]*>')
@@ -47,11 +47,11 @@ class JunctionFoes:
         get = self._api.junction.getIncomingEdges
         return frozenset(edge for name in self._unregulated for edge in get(name))
 
-    def ahead_of(self, driver: str, reach: float) -> Sequence[Foe]:
+    def ahead_of(self, driver: str, reach: float) -> Sequence[_Foe]:
         """Foes of a driver at the junctions within reach (`reach` [m])."""
         if self._leading_there and self._meets_unregulated(driver, reach):
             return ()
-        foes: Sequence[Foe] = self._foes(driver, reach)
+        foes: Sequence[_Foe] = self._foes(driver, reach)
         return foes
 
     def _meets_unregulated(self, driver: str, reach: float) -> bool:
@@ -90,7 +90,7 @@ _ON_JUNCTION = 15.0
 _BRAKING = 4.5
 """SUMO's drivers begin to brake for a foe on the junction where this deceleration is enough [m/s²]."""
 
-MAX_PAUSE = 0.5
+_MAX_PAUSE = 0.5
 """A driver near a junction looks for foes at least this often [s]."""
 
 _PAUSE_IN_DOUBT = 0.2
@@ -99,14 +99,14 @@ _PAUSE_IN_DOUBT = 0.2
 For one who may be on the junction, in each step.
 """
 
-ALONG_A_LANE = 2.0
+_ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
 
 _LONG_LANE = 150.0
 """On shorter lanes a junction is always near [m]."""
 
 _FASTEST_GAIN = 10.0
-"""No one is faster by more than this after `ALONG_A_LANE` [m/s]."""
+"""No one is faster by more than this after `_ALONG_A_LANE` [m/s]."""
 
 # Of the lamps that others light, on any side of a vehicle.
 _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
@@ -142,7 +142,7 @@ class JunctionSight:
         if due.gone:
             self._unseen.forget(due.gone, due.new)
         doubts: dict[str, dict[str, float]] = {}
-        certain: dict[float, list[str]] = {MAX_PAUSE: [], ALONG_A_LANE: []}
+        certain: dict[float, list[str]] = {_MAX_PAUSE: [], _ALONG_A_LANE: []}
         for driver in due.vehicles:
             pause, foes = self._foes_in_doubt(driver)
             if foes:
@@ -161,8 +161,8 @@ class JunctionSight:
         """
         speed, unseen = self._speed(driver), self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
-            return ALONG_A_LANE, {}
-        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
+            return _ALONG_A_LANE, {}
+        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * _MAX_PAUSE)
         doubtful: dict[str, float] = {}
         near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * _BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
@@ -174,10 +174,10 @@ class JunctionSight:
                 doubtful[foe] = 0.0 if is_there else _PAUSE_IN_DOUBT
         if unseen and not doubtful:
             self._unseen.decide(driver, {}, self._roster.time)
-        return MAX_PAUSE, doubtful
+        return _MAX_PAUSE, doubtful
 
     def _is_far(self, driver: str, speed: float) -> bool:
-        """Whether no junction can come near a driver for `ALONG_A_LANE`."""
+        """Whether no junction can come near a driver for `_ALONG_A_LANE`."""
         lane = self._lane(driver)
         if lane not in self._lanes:
             length = float(self._lane_length(lane)) if lane else 0.0
@@ -186,7 +186,7 @@ class JunctionSight:
         if length < _LONG_LANE or (is_two_way and self._directions.is_against(driver, lane)):
             return False
         fastest = speed + _FASTEST_GAIN
-        reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
+        reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)
         return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * _BRAKING))
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:

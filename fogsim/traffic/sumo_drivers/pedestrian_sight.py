@@ -15,7 +15,7 @@ from fogsim.traffic.sumo.link import getter, vehicle_getter
 from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 
-LOOK_PERIOD = 0.2
+_LOOK_PERIOD = 0.2
 """Time between two looks at pedestrians [s]."""
 
 _FARTHEST_PERSON = 100.0
@@ -31,7 +31,7 @@ where such a vehicle is at 55 m; FogSim's choice."""
 _BODY_MIDDLE = 1.0
 """Height of eyes and persons above the road [m]."""
 
-HEAD = 1.65
+_HEAD = 1.65
 """Height above the road of a person's head, which may be seen over a hedge or a wall [m]."""
 
 _OWN_PART = "persons"
@@ -60,7 +60,7 @@ class PedestrianSight:
         now = self._roster.time
         if self._certainly_seen >= _FARTHEST_PERSON or now < self._next:
             return
-        self._next = now + LOOK_PERIOD
+        self._next = now + _LOOK_PERIOD
         new, self._mark = self._roster.entered_since(self._mark)
         present = self._roster.present
         self._unseen.forget([v for v in self._unseen.drivers if v not in present] + new, present.intersection(new))
@@ -116,7 +116,7 @@ class PedestrianSight:
         (x, y, z), (end_x, end_y, end_z) = self._position(driver), self._person_position(person)
         eyes, end = (x, y, z + _BODY_MIDDLE), (end_x, end_y, end_z + _BODY_MIDDLE)
         distance = math.dist(eyes, end)
-        if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + HEAD)]])[0]:
+        if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + _HEAD)]])[0]:
             return False
         if distance <= self._seen_through_fog:
             return True

@@ -2,7 +2,7 @@
 
 SUMO's own car-following models get the leader to ignore (``carFollowModel.ignoreIDs``), and only when that changes; so
 Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road. Lane changing is changed with
-it; see `IgnoredLeaders`.
+it; see `_IgnoredLeaders`.
 
 Sight is computed only in steps in which what a driver sees could have changed. Between two computations a gap changes
 at most by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a
@@ -59,7 +59,7 @@ _FASTEST_DRIFT = 30.0
 _STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
 
-Pair = tuple[str, str, float]
+_Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
 
 
@@ -77,7 +77,7 @@ class LeaderSight:
         densest, change = max(most, _LEAST_EXTINCTION) if is_even else most, closing_speed_bound(0.0, 0.0, horizon)
         self._closing = Closing(change, _FASTEST_DRIFT, densest, is_even)
 
-    def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> tuple[list[bool], list[float]]:
+    def assess(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> tuple[list[bool], list[float]]:
         """Whether each leader is seen, and for how long that is sure to stay so [s]."""
         facing = self._facing(pairs)
         if own_lamps:
@@ -90,7 +90,7 @@ class LeaderSight:
             seen[i] = self._is_seen(pairs[i], facing[:, i], own_lamps)
         return seen, pauses.tolist()
 
-    def _facing(self, pairs: Sequence[Pair]) -> NDArray[np.float64]:
+    def _facing(self, pairs: Sequence[_Pair]) -> NDArray[np.float64]:
         """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
         followers, leaders, gaps = zip(*pairs, strict=True)
         both = followers + leaders
@@ -118,7 +118,7 @@ class LeaderSight:
 
     @staticmethod
     def _doubt_own_beams(
-        judged: NDArray[np.float64], pauses: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps
+        judged: NDArray[np.float64], pauses: NDArray[np.float64], pairs: Sequence[_Pair], own_lamps: OwnLamps
     ) -> None:
         """Look again, one by one, for drivers with high beams, which veil the fog; and soon, for those who may have."""
         for i, (follower, _, _) in enumerate(pairs):
@@ -127,7 +127,7 @@ class LeaderSight:
                 if uses_high_beam(own_lamps[follower]):
                     judged[i] = DAZZLED
 
-    def _add_own_lamps(self, facing: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
+    def _add_own_lamps(self, facing: NDArray[np.float64], pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         for i, (follower, leader, _) in enumerate(pairs):
             if leader in own_lamps:
                 facing[INTENSITY, i] = rear_intensity(self._vehicles.lamps(leader, own_lamps))
@@ -137,7 +137,7 @@ class LeaderSight:
                 facing[OWN_STEADY, i] = 0.0
                 facing[OWN, i] = self._vehicles.head_lamps(follower, own_lamps)
 
-    def _is_seen(self, pair: Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
+    def _is_seen(self, pair: _Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
         """Whether a leader is seen who is unless glare hides it, which costs more than all the rest to know."""
         follower, leader, _ = pair
         glare = self._glare.veil(follower, leader, own_lamps)
@@ -181,7 +181,7 @@ _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
 
 
-class IgnoredLeaders:
+class _IgnoredLeaders:
     """Makes drivers ignore the vehicle ahead, and not leave the lane because of it.
 
     SUMO's lane changing takes no notice of `_IGNORED`: it would avoid a slow leader that its driver cannot see. To a
@@ -228,7 +228,7 @@ class Perception:
     def __init__(self, view: DriversView) -> None:
         api, fog, sight, self._roster = view.api, view.fog, view.sight, view.roster
         self._view, self._hidden_vehicles = view, view.hidden_vehicles
-        self._ignored_leaders = IgnoredLeaders(api, view.session)
+        self._ignored_leaders = _IgnoredLeaders(api, view.session)
         self.leader = Leaders(api, view.remote).within(REACH)
         (self.speed,) = view.getters("getSpeed")
         self._reaction_time = sight.reaction_time
@@ -269,13 +269,13 @@ class Perception:
         if doubtful:
             self._decide_by_sight(doubtful, own_lamps)
 
-    def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
+    def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
         ignored, emerging = self._ignored, self._emerging
         # Most vehicles are far from any doubt, and pause for the longest time.
         certain: list[str] = []
-        near_edge: list[Pair] = []
-        doubtful: list[Pair] = []
+        near_edge: list[_Pair] = []
+        doubtful: list[_Pair] = []
         ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
         obstructed = self._obstructed(due, ahead)
         for follower, (leader, gap) in zip(due, ahead, strict=True):
@@ -311,7 +311,7 @@ class Perception:
         hidden = self._hidden_vehicles.are_hidden(pairs)
         return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
-    def _pause_near_edge(self, waiting: Sequence[Pair]) -> None:
+    def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
         """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
         if waiting:
             followers, leaders, distances = zip(*waiting, strict=True)
@@ -320,7 +320,7 @@ class Perception:
             pauses = np.minimum(distances / closing_speed_bound(speed[0], speed[1], MAX_PAUSE), MAX_PAUSE)
             self._due.schedule_each(followers, pauses.tolist())
 
-    def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
+    def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
         ignored, emerging = self._ignored, self._emerging
         waits: list[float] = []

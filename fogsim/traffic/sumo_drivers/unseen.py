@@ -63,7 +63,7 @@ _IGNORED = "junctionModel.ignoreIDs"
 _OWN = "own"
 
 
-class IgnoredFoes:
+class _IgnoredFoes:
     """Sets whom a driver does not yield to at a junction, outside it or on it, whoever has the right of way.
 
     A driver ignores what any session has it ignore, and whom it ignored by itself before.
@@ -96,7 +96,7 @@ class UnseenFoes:
     """
 
     def __init__(self, api: Api, session: str, reaction_time: float) -> None:
-        self._ignored = IgnoredFoes(api, session)
+        self._ignored = _IgnoredFoes(api, session)
         self._reaction_time = reaction_time
         self._since: dict[str, dict[str, float]] = {}
         self._left: set[str] = set()

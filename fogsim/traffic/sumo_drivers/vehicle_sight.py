@@ -37,7 +37,7 @@ _CORNERS = np.array(list(itertools.product((-1.0, 0.0), (-0.5, 0.5), (0.5, 1.0))
 """From the middle of the front bumper ahead, to the left and up, in lengths, widths and heights."""
 
 
-class SeenBody(NamedTuple):
+class _SeenBody(NamedTuple):
     """A vehicle's body, and how its driver sits in it."""
 
     minimum_gap: float  # The driver's [m]
@@ -50,7 +50,7 @@ class SeenBody(NamedTuple):
     missing: int  # Bits of sides on which there is no lamp
 
 
-class SeenVehicles:
+class _SeenVehicles:
     """Bodies, each read once, and lit lamps of vehicles."""
 
     def __init__(self, api: Api, remote: bool, airlight_share: float) -> None:
@@ -58,34 +58,34 @@ class SeenVehicles:
         (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
         names = ("getColor", "getMinGap", "getLength", "getWidth", "getHeight", "getVehicleClass", "getShapeClass")
         self._getters = tuple(vehicle_getter(api, name) for name in names)
-        self._bodies: dict[str, SeenBody] = {}
+        self._bodies: dict[str, _SeenBody] = {}
         self._rows: dict[str, int] = {}
-        self._traits = np.empty((64, len(SeenBody._fields)))
+        self._traits = np.empty((64, len(_SeenBody._fields)))
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._bodies.pop(vehicle, None)
 
-    def body(self, vehicle: str) -> SeenBody:
+    def body(self, vehicle: str) -> _SeenBody:
         """Body of a vehicle."""
         return self._bodies.get(vehicle) or self._read(vehicle)
 
     def traits(self, vehicles: Collection[str]) -> NDArray[np.float64]:
-        """Bodies of vehicles (n, 7), in the order of the fields of `SeenBody`."""
+        """Bodies of vehicles (n, 7), in the order of the fields of `_SeenBody`."""
         rows = self._rows
         if not self._bodies.keys() >= set(vehicles):
             for vehicle in vehicles:
                 self.body(vehicle)
         return self._traits[[rows[vehicle] for vehicle in vehicles]]
 
-    def _read(self, vehicle: str) -> SeenBody:
+    def _read(self, vehicle: str) -> _SeenBody:
         colour, gap, length, width, height, vehicle_class, shape = (get(vehicle) for get in self._getters)
         contrast = inherent_contrast(paint(vehicle, colour), self._airlight_share)
         kind = body_kind(vehicle_class, shape, length)
         missing = dark_on(int(MIDDLE_LAMPS), Side.MIDDLE) if kind in _NO_THIRD_STOP_LAMP else 0
         eyes = eye_height(vehicle_class, shape, length)
-        body = SeenBody(gap, contrast, eyes, length, width, height, missing)
+        body = _SeenBody(gap, contrast, eyes, length, width, height, missing)
         row = self._rows.setdefault(vehicle, len(self._rows))
         if row == len(self._traits):
             self._traits = np.concatenate((self._traits, np.empty_like(self._traits)))
@@ -105,10 +105,10 @@ class SeenVehicles:
         return 1.0 if own is None else head_lamp_light(own)
 
 
-class HiddenVehicles:
+class _HiddenVehicles:
     """Finds vehicles hidden by obstructions: no corner of the body is in sight, neither halfway up nor at the top."""
 
-    def __init__(self, api: Api, vehicles: SeenVehicles, obstructions: Obstructions, remote: bool) -> None:
+    def __init__(self, api: Api, vehicles: _SeenVehicles, obstructions: Obstructions, remote: bool) -> None:
         self._obstructions = obstructions
         self._vehicles = vehicles
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
@@ -170,8 +170,8 @@ class DriversView:
         self.session, self.remote, self.obstructions = session, remote, obstructions
         self.extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         """Extinction coefficient of fog that is the same everywhere [1/m]; None of other fog."""
-        self.vehicles = SeenVehicles(api, remote, sight.airlight_share)
-        self.hidden_vehicles = HiddenVehicles(api, self.vehicles, obstructions, remote) if obstructions else None
+        self.vehicles = _SeenVehicles(api, remote, sight.airlight_share)
+        self.hidden_vehicles = _HiddenVehicles(api, self.vehicles, obstructions, remote) if obstructions else None
 
     def getters(self, *names: str) -> tuple[Getter, ...]:
         """Getters of what is asked of vehicles often."""
@@ -229,23 +229,26 @@ class VehicleSight:
         _, _, eyes, length, width, _, _ = self._vehicles.traits(place).T
         read[:, 4], read[:, 5], read[:, 6] = eyes, length, width
         rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
-        observing, parts, ends = read[rows[0], :5], read[rows[1]], np.arange(1, len(pairs) + 1)
+        bodies, ends = read[rows[1]], np.arange(1, len(pairs) + 1)
+        bodies[:, 4] = 0.0
         if length.max() > LONGEST_RIGID:
-            parts, ends = self._bend(targets, parts)
-        else:
-            parts[:, 4] = 0.0
+            bodies, ends = self._bend(targets, bodies)
         lines = np.empty((len(pairs), 10))
-        draw_lines_of_sight(observing, parts, ends, lines)
+        draw_lines_of_sight(read[rows[0], :5], bodies, ends, lines)
         return lines
 
     def _bend(
         self, targets: Sequence[str], bodies: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Straight parts (m, 7) of bodies, and where those of each end (n,)."""
-        parts, ends = list[tuple[float, ...]](), list[int]()
-        for target, (x, y, z, heading, _, length, width) in zip(targets, bodies.tolist(), strict=True):
-            for part in self._bodies.parts(target, length, (x, y, z), heading):
-                parts.append((*part.front, part.heading, part.behind, part.length, width))
+        parts, ends = list[Sequence[float]](), list[int]()
+        for target, body in zip(targets, bodies.tolist(), strict=True):
+            x, y, z, heading, _, length, width = body
+            if length > LONGEST_RIGID:
+                bent = self._bodies.parts(target, length, (x, y, z), heading)
+                parts += [(*one.front, one.heading, one.behind, one.length, width) for one in bent]
+            else:
+                parts.append(body)
             ends.append(len(parts))
         return np.array(parts), np.array(ends)
 

@@ -20,11 +20,11 @@ from fogsim.values import Leader, TrafficState
 _EGO_REACH = 500.0
 """How far ahead a leader of the ego is searched [m]."""
 
-LONGEST = 25.0
+_LONGEST = 25.0
 """Vehicles that are longer than this may be missed where another is nearer by its front [m]."""
 
 
-class LaneSpots:
+class _LaneSpots:
     """Where vehicles are across their edge, in SUMO's measure of lanes.
 
     Parameters
@@ -77,7 +77,7 @@ class Leaders:
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._api, self._remote = api, remote
-        self._spots, self._directions = LaneSpots(api, remote), LaneDirections(api)
+        self._spots, self._directions = _LaneSpots(api, remote), LaneDirections(api)
         self._lane, self._station = vehicle_getters(api, remote, ("getLaneID", "getLanePosition"))
         self._now = getter(api, "simulation", "getTime")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
@@ -126,12 +126,12 @@ class Leaders:
         own = self._spot(vehicle, lane)
         best, gap = "", reach
         for begin, current in self._lanes_ahead(own, reach):
-            if begin - own.station - LONGEST > gap:
+            if begin - own.station - _LONGEST > gap:
                 break
             across = own.across - self._spots.middle(lane) + self._spots.middle(current)
             least = own.station if begin == 0.0 else -1.0
             for other in self._from(current.rpartition("_")[0], least):
-                if begin + other.station - own.station - LONGEST > gap:
+                if begin + other.station - own.station - _LONGEST > gap:
                     break
                 is_beside = abs(other.across - across) >= 0.5 * (other.width + own.width)
                 if is_beside or other.is_against != own.is_against or other.vehicle == vehicle:
@@ -206,7 +206,7 @@ class Courses:
     """Adds to a state what vehicles drive along where that is not their lane alone."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
-        self._spots = LaneSpots(api, remote)
+        self._spots = _LaneSpots(api, remote)
         self._directions = LaneDirections(api)
         self._two_way: dict[str, bool] = {}
         self._last: tuple[tuple[str, ...], tuple[str, ...]] = (), ()

@@ -36,7 +36,7 @@ _PRIORITY, _RAMP_PRIORITY = 10, 5
 
 
 @dataclass(frozen=True, slots=True)
-class Ramp(Motorway):
+class _Ramp(Motorway):
     """A motorway with a ramp that comes from the right, and a lane to speed up on.
 
     Attributes
@@ -135,7 +135,7 @@ ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
     "road template",
     {
         "motorway": Motorway,
-        "ramp": Ramp,
+        "ramp": _Ramp,
         "straight": Straight,
         "curve": Curve,
         "grade": Grade,

@@ -20,7 +20,7 @@ _FARTHER = 20.0  # how far out the direction is taken in which an edge lies [m]
 
 
 @dataclass(frozen=True, slots=True)
-class Junction:
+class _Junction:
     """A node of a network."""
 
     name: str  # Its id
@@ -101,7 +101,7 @@ class _End:
         return math.atan2(away[1], away[0])
 
 
-def junctions(plan: NetPlan) -> Iterator[Junction]:
+def junctions(plan: NetPlan) -> Iterator[_Junction]:
     """Nodes of a network."""
     edges = {edge.name: edge for edge in plan.edges}
     lit = {name for name, _ in plan.signals}
@@ -122,7 +122,7 @@ def _made_junction(
     around: tuple[tuple[Edge, ...], tuple[Edge, ...]],
     across: tuple[tuple[CrossingWay, ...], tuple[Zebra, ...]],
     has_signals: bool,
-) -> Junction:
+) -> _Junction:
     ways, zebras = across
     meets = tuple(tuple(way is not other and way.meets(other) for other in ways) for way in ways)
     yields = [
@@ -143,7 +143,7 @@ def _made_junction(
     all_yield = [(*row, *crossed) for row, crossed in zip(yields, walked, strict=True)]
     all_yield += [(False,) * (len(ways) + len(zebras)) for _ in zebras]
     areas = walking_areas(name, around, zebras)
-    return Junction(name, *around, ways, tuple(all_meet), tuple(all_yield), waits, has_signals, zebras, areas)
+    return _Junction(name, *around, ways, tuple(all_meet), tuple(all_yield), waits, has_signals, zebras, areas)
 
 
 def _waits_at(
@@ -239,11 +239,11 @@ def _lane(
     )
 
 
-InternalLane = tuple[str, int, Points]
+_InternalLane = tuple[str, int, Points]
 """Internal edge, number of a lane in it, and the lane's line [m]."""
 
 
-def _parts(node: Junction, number: int) -> list[InternalLane]:
+def _parts(node: _Junction, number: int) -> list[_InternalLane]:
     """Internal lanes of a way: two where it is waited within the junction."""
     way, share = node.ways[number], node.waits_at[number]
     if share is None:
@@ -259,8 +259,8 @@ def _split(line: Points, share: float) -> tuple[Points, Points]:
     return np.concatenate([line[along < at], point]), np.concatenate([point, line[along > at]])
 
 
-def _internal_edges(node: Junction) -> Iterator[str]:
-    lanes = list[tuple[InternalLane, CrossingWay]]()
+def _internal_edges(node: _Junction) -> Iterator[str]:
+    lanes = list[tuple[_InternalLane, CrossingWay]]()
     for number, way in enumerate(node.ways):
         lanes += [(part, way) for part in _parts(node, number)]
     for name, members in itertools.groupby(sorted(lanes, key=_internal_place), key=lambda lane: lane[0][0]):
@@ -283,12 +283,12 @@ def _internal_edges(node: Junction) -> Iterator[str]:
         yield "</edge>"
 
 
-def _internal_place(lane: tuple[InternalLane, CrossingWay]) -> tuple[int, int]:
+def _internal_place(lane: tuple[_InternalLane, CrossingWay]) -> tuple[int, int]:
     name, number, _ = lane[0]
     return int(name.rpartition("_")[2]), number
 
 
-def _junction(node: Junction) -> Iterator[str]:
+def _junction(node: _Junction) -> Iterator[str]:
     x, y, z = node.place.tolist()
     last = [_parts(node, number)[-1][:2] for number in range(len(node.ways))]
     place = {"x": f"{x:.2f}", "y": f"{y:.2f}", **({"z": f"{z:.3f}"} if z else {})}
@@ -316,7 +316,7 @@ def _bits(flags: Sequence[bool]) -> str:
     return "".join(str(int(flag)) for flag in reversed(flags))
 
 
-def _internal_junctions(node: Junction) -> Iterator[str]:
+def _internal_junctions(node: _Junction) -> Iterator[str]:
     """Where it is waited within the junction: for vehicles on lanes that lead to it, and on internal lanes."""
     for number, share in enumerate(node.waits_at):
         if share is None:
@@ -337,7 +337,7 @@ def _internal_junctions(node: Junction) -> Iterator[str]:
         )
 
 
-def _entry(node: Junction, number: int) -> str:
+def _entry(node: _Junction, number: int) -> str:
     edge, lane = node.entry(number)
     return f"{edge}_{lane}"
 
@@ -346,16 +346,16 @@ def _lane_from(way: CrossingWay) -> str:
     return way.source.lane_id(way.link.from_lane)
 
 
-def _area_before(node: Junction, zebra: Zebra) -> WalkingArea:
+def _area_before(node: _Junction, zebra: Zebra) -> WalkingArea:
     """Where SUMO has a crossing begin: next to the edge that leads away."""
     return next(area for area in node.areas if area.away == zebra.away)
 
 
-def _area_behind(node: Junction, zebra: Zebra) -> WalkingArea:
+def _area_behind(node: _Junction, zebra: Zebra) -> WalkingArea:
     return next(area for area in node.areas if area.into == zebra.into)
 
 
-def _connections(node: Junction) -> Iterator[str]:
+def _connections(node: _Junction) -> Iterator[str]:
     for number, way in enumerate(node.ways):
         signals: dict[str, object] = {"tl": node.name, "linkIndex": number} if node.has_signals else {}
         states = "Oo" if node.has_signals else "Mm"
@@ -391,7 +391,7 @@ def _connection(source: str, lane: int, way: CrossingWay, **further: object) -> 
     return element("connection", **ends, dir=link.direction, **further)
 
 
-def _signals(node: Junction, phases: Sequence[Phase]) -> Iterator[str]:
+def _signals(node: _Junction, phases: Sequence[Phase]) -> Iterator[str]:
     yield opening("tlLogic", id=node.name, type="static", programID="0", offset="0")
     for phase in phases:
         states = [_signal(node, number, phase) for number in range(len(node.ways))]
@@ -400,7 +400,7 @@ def _signals(node: Junction, phases: Sequence[Phase]) -> Iterator[str]:
     yield "</tlLogic>"
 
 
-def _signal(node: Junction, number: int, phase: Phase) -> str:
+def _signal(node: _Junction, number: int, phase: Phase) -> str:
     """Signal of a way: green that must let others go first is a small letter."""
     if node.ways[number].link.source not in phase.greens:
         return "r"

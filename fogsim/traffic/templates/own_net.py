@@ -11,7 +11,7 @@ _MOST_BYTES = 2_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class KnownEdge:
+class _KnownEdge:
     """What is known of an edge."""
 
     lanes: int  # How many lanes it has, next to footways
@@ -29,13 +29,13 @@ class KnownWays:
     """Ways on a network."""
 
     ways: tuple[tuple[str, tuple[str, ...]], ...]  # The ways by name
-    edges: Mapping[str, KnownEdge]  # What is known of their edges; those that the network does not have are missing
+    edges: Mapping[str, _KnownEdge]  # What is known of their edges; those that the network does not have are missing
 
     def way(self, name: str) -> tuple[str, ...]:
         """Edges of a way; none where there is no such way."""
         return dict(self.ways).get(name, ())
 
-    def edge(self, name: str) -> KnownEdge:
+    def edge(self, name: str) -> _KnownEdge:
         """An edge by its id."""
         return self.edges[name]
 
@@ -60,7 +60,7 @@ class _Reader:
 
     def __init__(self, wanted: frozenset[str]) -> None:
         self.is_done = False
-        self.edges: dict[str, KnownEdge] = {}
+        self.edges: dict[str, _KnownEdge] = {}
         self._wanted = wanted
         self._edge = ""
 
@@ -68,10 +68,12 @@ class _Reader:
         if tag == "edge":
             self._edge = attributes.get("id", "")
         elif tag == "lane" and self._edge in self._wanted:
-            before = self.edges.get(self._edge, KnownEdge(0, 0.0, 0.0))
+            before = self.edges.get(self._edge, _KnownEdge(0, 0.0, 0.0))
             is_footway = attributes.get("allow") == "pedestrian"
             measures = (float(attributes.get("length", "")), float(attributes.get("speed", "")))
-            self.edges[self._edge] = KnownEdge(before.lanes + (not is_footway), *measures, before.footways + is_footway)
+            self.edges[self._edge] = _KnownEdge(
+                before.lanes + (not is_footway), *measures, before.footways + is_footway
+            )
         elif tag == "connection":
             # All edges stand before the connections between them.
             self.is_done = True

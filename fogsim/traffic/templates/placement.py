@@ -28,12 +28,12 @@ class VehicleKind:
     imperfection: float = 0.4  # How imperfectly they drive (Krauss' sigma) [-]
 
 
-CAR = VehicleKind("passenger", 4.6, 1.85, 1.5, 55.0, "normc(0.95,0.10,0.75,1.20)", 1.4)
+_CAR = VehicleKind("passenger", 4.6, 1.85, 1.5, 55.0, "normc(0.95,0.10,0.75,1.20)", 1.4)
 
 VEHICLE_KINDS: Registry[VehicleKind] = Registry(
     "vehicle type",
     {
-        "car": CAR,
+        "car": _CAR,
         "van": VehicleKind("delivery", 5.9, 2.05, 2.4, 36.1, "normc(0.90,0.08,0.70,1.10)", 1.5),
         "lorry": VehicleKind("truck", 9.2, 2.5, 3.4, 25.0, "normc(0.95,0.05,0.80,1.05)", 1.6, 1.2, 4.0, 0.3),
         "truck": VehicleKind("truck", 15.5, 2.5, 3.8, 24.7, "normc(0.98,0.03,0.90,1.05)", 1.8, 0.8, 4.0, 0.3),
@@ -57,15 +57,15 @@ SLOW = ("truck", "coach", "bicycle")
 _LEAST_GAP = 0.5  # between two vehicles of a lane [m]
 
 
-class EdgeMeasures(Protocol):
+class _EdgeMeasures(Protocol):
     """What actors need to know of an edge: how many lanes it has, its length [m] and its limit [m/s]."""
 
     @property
-    def lanes(self) -> int: ...  # noqa: D102 - described above
+    def lanes(self) -> int: ...
     @property
-    def length(self) -> float: ...  # noqa: D102
+    def length(self) -> float: ...
     @property
-    def limit(self) -> float: ...  # noqa: D102
+    def limit(self) -> float: ...
 
     def index(self, number: int) -> int:
         """Number of a lane in SUMO; lanes are counted from the right, from 0."""
@@ -84,7 +84,7 @@ class Ways(Protocol):
         """Edges of a way."""
         ...
 
-    def edge(self, name: str) -> EdgeMeasures:
+    def edge(self, name: str) -> _EdgeMeasures:
         """An edge by its id."""
         ...
 

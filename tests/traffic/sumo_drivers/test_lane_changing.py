@@ -1,7 +1,7 @@
 """Drivers change lanes by what they see: in a real SUMO, with eyes that see so far and no farther."""
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
@@ -19,12 +19,9 @@ from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
-from tests.traffic.sumo_drivers.test_perception import NET, Fog, SeesFrom
+from tests.traffic.common import CROWD, NET, QUIET
+from tests.traffic.sumo_drivers.test_perception import Fog, SeesFrom
 
-CROWD = (
-    *("--net-file", str(NET), "--route-files", str(NET.parent / "motorway.rou.xml")),
-    *("--step-length", "0.1", "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
-)
 FREE, IN_LANE = 1621, 0
 CLEAR = 1000.0
 
@@ -68,8 +65,8 @@ class Road:
             encoding="utf-8",
         )
         files = ["--net-file", str(NET), "--route-files", str(routes), "--step-length", "0.1"]
-        quiet = ["--no-step-log", "true", "--no-warnings", "true", "--collision.action", "warn"]
-        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000", *self.options])
+        warn = ["--collision.action", "warn", "--collision.stoptime", "1000"]
+        self.api = api = self.link.begin([*files, *QUIET, *warn, *self.options])
         self.link.step()
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
@@ -106,10 +103,8 @@ class Road:
 
 
 @pytest.fixture
-def road(tmp_path: Path) -> Iterator[Road]:
-    link = LibsumoLink()
-    yield Road(link, tmp_path)
-    link.end()
+def road(link: LibsumoLink, tmp_path: Path) -> Road:
+    return Road(link, tmp_path)
 
 
 def vehicle(name: str, place: float, speed: float, lane: int, top: float | None = None, inside: str = "") -> str:

@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
 from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity
@@ -24,10 +22,11 @@ from fogsim.traffic.sumo_drivers.perception import LeaderSight
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import OppositeEdges
 from fogsim.units import extinction_from_visibility
-from fogsim.values import FogField, Lamp
+from fogsim.values import Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on
+from tests.traffic.common import DATA, even
 
-NET = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
+NET = DATA / "grid" / "grid.net.xml"
 ROUTES = """<routes><vType id="c" length="5" width="1.8"/><route id="r" edges="B0C0"/><route id="s" edges="C0B0"/>
   <vehicle id="leader" type="c" route="r" depart="0" departPos="65" departLane="0" color="0,0,0"/>
   <vehicle id="me" type="c" route="r" depart="0" departPos="10" departLane="0"/>
@@ -45,10 +44,6 @@ def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     link.step()
     yield begun
     link.end()
-
-
-def even(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
 
 
 def view(api: Any, visibility: float, headlamp_reach: float = 55.0) -> DriversView:

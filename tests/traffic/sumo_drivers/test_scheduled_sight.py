@@ -1,7 +1,5 @@
 """Looking only when sight could have changed decides in every step as looking in every step does."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,26 +15,15 @@ from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import FogBank, FogField, Lamp
+from tests.traffic.common import CROWD
 
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
 STEP = 0.1
-ARGUMENTS = (
-    *("--net-file", str(FOLDER / "motorway.net.xml"), "--route-files", str(FOLDER / "motorway.rou.xml")),
-    *("--step-length", str(STEP), "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
-)
 EVEN = FogField(0.04, (3000.0, 3000.0, 3000.0))
 BANKS = FogField(
     0.01,
     (3000.0, 3000.0, 3000.0),
     banks=tuple(FogBank((0.0, 0.0), (1.0, 0.0), x, x + 150.0, 60.0, 0.05) for x in range(200, 3000, 300)),
 )
-
-
-@pytest.fixture
-def link() -> Iterator[LibsumoLink]:
-    link = LibsumoLink()
-    yield link
-    link.end()
 
 
 def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str, float], lamps: Lamp) -> bool:
@@ -59,7 +46,7 @@ def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str
 @pytest.mark.parametrize("illuminance", [10_000.0, 3.0, 0.1], ids=["day", "dusk", "night"])
 def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
     """For every leader that has been the leader for as long as a look may wait."""
-    api, fog = link.begin(ARGUMENTS), FieldAccess(field)
+    api, fog = link.begin(CROWD), FieldAccess(field)
     for _ in range(600):
         link.step()
     sight = DriverSight(illuminance, reaction_time=0.0)
@@ -88,7 +75,7 @@ def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field:
 
 
 def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
-    api = link.begin(ARGUMENTS)
+    api = link.begin(CROWD)
     for _ in range(600):
         link.step()
     roster = Roster(api)

@@ -11,9 +11,9 @@ from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.sight_kernels import BEARING, LINE, NEAREST
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
-from fogsim.units import extinction_from_visibility
 from fogsim.values import FogBank, FogField, Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on
+from tests.traffic.common import even
 
 DAY, NIGHT = DriverSight(10_000.0), DriverSight(0.01)
 DARK: OwnLamps = {"other": sum(dark_on(int(ALL_LAMPS), side) for side in Side)}
@@ -46,10 +46,6 @@ def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0, 
 
 def sight_of(api: Any, fog: FieldAccess, sight: DriverSight) -> VehicleSight:
     return VehicleSight(DriversView(api, fog, sight, cast("Roster", None)))
-
-
-def even(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
 
 
 def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows() -> None:

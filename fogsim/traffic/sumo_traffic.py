@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from fogsim.errors import SimulationError
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
-from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import ClearAir, FogAccess
-from fogsim.traffic.setup import ANY_EGO, TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, CollisionLog, TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api, SumoLink, has_lane

@@ -11,7 +11,6 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError, SimulationError, suggest
-from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
@@ -25,7 +24,7 @@ from fogsim.traffic.highway.network import (
     same_roads,
     speed_limit,
 )
-from fogsim.traffic.setup import UNTOUCHED, AfterCollision
+from fogsim.traffic.setup import UNTOUCHED, AfterCollision, CollisionLog
 from fogsim.values import Collision, Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 from fogsim.values.script import TrafficAction
 

@@ -6,15 +6,16 @@ from fogsim.traffic.templates.demand import Demand, actors_text, cuts_around, ro
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_writer import net_text
 from fogsim.traffic.templates.on_foot import WALKING_SPEED, Footfall, Walker
-from fogsim.traffic.templates.own_net import KnownWays, read_ways
 from fogsim.traffic.templates.placement import (
     VEHICLE_KINDS,
     Actor,
+    KnownWays,
     Placed,
     PlacementError,
     Relation,
     check_placement,
     place_actors,
+    read_ways,
 )
 
 __all__ = [

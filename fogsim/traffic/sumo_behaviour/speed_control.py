@@ -293,7 +293,7 @@ class SumoDesiredSpeeds:
         keepers = self._keeping_up.keepers(rows)
         if len(keepers):
             kept = self._keeping_up.kept_speeds([ids[i] for i in keepers], rows[keepers])
-            in_clear_air = [self._allowed(ids[i]) for i in keepers] / values[keepers, Column.SHARE_SET]
+            in_clear_air = self._all_allowed([ids[i] for i in keepers]) / values[keepers, Column.SHARE_SET]
             desired[keepers] = np.maximum(desired[keepers], np.minimum(kept, values[keepers, Column.TOP_SPEED]))
             shares[keepers] = np.maximum(shares[keepers], np.minimum(kept / in_clear_air, 1.0))
         own = desired.copy()
@@ -340,6 +340,11 @@ class SumoDesiredSpeeds:
         """Top speed [m/s] of a driver who follows advice."""
         visibility = float(self._table.values[row, Column.VISIBILITY])
         return speed_by_compliance(compliance, min(own, self._allowed(vehicle)), advised, visibility)
+
+    def _all_allowed(self, ids: Sequence[str]) -> NDArray[np.float64]:
+        """What the road allows drivers (n,) [m/s]; see `_allowed`."""
+        both = zip(ids, map(self._allowed_speed, ids), map(self._top_speed, ids), strict=True)
+        return np.array([allowed if UNKNOWN < allowed < top else self._allowed(v) for v, allowed, top in both])
 
     def _allowed(self, vehicle: str) -> float:
         """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given.

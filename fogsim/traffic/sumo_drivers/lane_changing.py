@@ -275,8 +275,7 @@ class LaneChanging:
 
     def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
         """Let those change lanes who are blocked by no one whom they perceive, and whom no one helps whom they see."""
-        wanted = self._neighbours.wanted_changes(drivers, wishes)
-        doubtful = [change for change in wanted if not self._is_held_back_for_certain(change)]
+        doubtful = self._neighbours.wanted_changes(drivers, wishes, self._is_held_back_for_certain)
         ahead = [self._neighbours.ahead(change) for change in doubtful]
         pairs = [pair for change, leader in zip(doubtful, ahead, strict=True) for pair in _sights(change, leader)]
         perceived = self._sight.perceive(pairs, own_lamps, self._roster.time)
@@ -290,12 +289,12 @@ class LaneChanging:
         for switch in self._unhelpful:
             switch.decide(drivers, unhelpful)
 
-    def _is_held_back_for_certain(self, change: WantedChange) -> bool:
-        """Whether a vehicle in the way is near enough to be seen in any case."""
-        return any(
-            gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(change.driver, other))
-            for other, gap in change.blockers
-        )
+    def _is_held_back_for_certain(self, driver: str, others: Iterable[tuple[str, float]]) -> bool:
+        """Whether one of those in a driver's way is near enough to be seen in any case."""
+        for other, gap in others:
+            if gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(driver, other)):
+                return True
+        return False
 
     def _change(self, change: WantedChange, leader: str | None, perceived: Mapping[tuple[str, str], bool]) -> None:
         if not self._requests.ask(change.driver, change.side.offset, self._roster.time):

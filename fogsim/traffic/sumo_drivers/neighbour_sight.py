@@ -3,8 +3,9 @@
 import itertools
 import math
 import operator
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from fogsim.traffic.sumo.link import vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
@@ -21,8 +22,11 @@ _LEFT_LEADERS = _LEADERS
 _NO_ONE = "", math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class _Side:
+_Others = tuple[tuple[str, float], ...]
+"""Vehicles in another lane, and the gaps to them [m]."""
+
+
+class _Side(NamedTuple):
     """One side of a vehicle, in SUMO's numbers."""
 
     offset: int  # From the vehicle's lane to the neighbouring one
@@ -46,12 +50,12 @@ class WantedChange:
     driver: str  # Id of the vehicle
     side: _Side  # Where to
     is_urgent: bool  # True if the route needs it, for which drivers ask others to make room
-    # leaders, followers (str, float): vehicles that are in the way in the other lane, and the gaps to them [m]
-    leaders: tuple[tuple[str, float], ...]
-    followers: tuple[tuple[str, float], ...]
+    # leaders, followers: who is in the way in the other lane
+    leaders: _Others
+    followers: _Others
 
     @property
-    def blockers(self) -> tuple[tuple[str, float], ...]:
+    def blockers(self) -> _Others:
         """All vehicles that are in the way, and the gaps to them [m]."""
         return self.leaders + self.followers
 
@@ -72,26 +76,38 @@ class Neighbours:
         for found in map(self._left_leaders, vehicles, itertools.repeat(_LEFT_LEADERS)):
             yield (found[0] if len(found) == 1 else _nearest(found)) if found else _NO_ONE
 
-    def wanted_changes(self, vehicles: Sequence[str], wishing: Iterable[str]) -> list[WantedChange]:
-        """Changes that drivers want by their own model and that others block, and some more to the left."""
-        wanted: list[WantedChange] = []
+    def wanted_changes(
+        self, vehicles: Sequence[str], wishing: Iterable[str], is_held_back: Callable[[str, _Others], bool]
+    ) -> list[WantedChange]:
+        """Changes that drivers want by their own model and that others block, and some more to the left.
+
+        Those are left out in which a driver is held back for certain by some of the others.
+        """
+        wanted: dict[tuple[str, _Side], int] = {}
         for vehicle, signals in zip(vehicles, map(self._signals, vehicles), strict=True):
             # Who wants to change lanes blinks.
             for side in (_LEFT, _RIGHT) if signals & _BLINKERS else ():
                 state = int(self._state(vehicle, side.offset)[1])
                 # Another vehicle blocks what the driver's own model wants.
                 if state & side.wanted and state & side.blocked and not state & _TRACI:
-                    wanted.append(self._change(vehicle, side, state))
-        there = {change.driver for change in wanted}
-        more = ((v, _LEFT, int(self._state(v, _LEFT.offset)[1])) for v in wishing if v not in there)
-        return wanted + [self._change(*change) for change in more if not change[2] & _TRACI]
+                    wanted[vehicle, side] = state
+        there = {vehicle for vehicle, _ in wanted}
+        for vehicle in wishing:
+            if vehicle not in there and not (state := int(self._state(vehicle, _LEFT.offset)[1])) & _TRACI:
+                wanted[vehicle, _LEFT] = state
+        changes = (self._change(*which, state, is_held_back) for which, state in wanted.items())
+        return [change for change in changes if change is not None]
 
-    def _change(self, vehicle: str, side: _Side, state: int) -> WantedChange:
-        leaders, followers = (
-            tuple(self._neighbours(vehicle, side.neighbours | mode)) if state & bit else ()
-            for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING))
-        )
-        return WantedChange(vehicle, side, bool(state & _URGENT), leaders, followers)
+    def _change(
+        self, vehicle: str, side: _Side, state: int, is_held_back: Callable[[str, _Others], bool]
+    ) -> WantedChange | None:
+        blockers: list[_Others] = []
+        for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING)):
+            others = tuple(self._neighbours(vehicle, side.neighbours | mode)) if state & bit else ()
+            if others and is_held_back(vehicle, others):
+                return None
+            blockers.append(others)
+        return WantedChange(vehicle, side, bool(state & _URGENT), *blockers)
 
     def ahead(self, change: WantedChange) -> str | None:
         """Next vehicle ahead in the other lane, in the way or not."""

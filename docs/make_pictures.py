@@ -24,9 +24,9 @@ from fogsim.offline.overlay import Overlay
 from fogsim.recorders import FramePanel
 from fogsim.scenario import build
 from fogsim.traffic import DriverSight
+from fogsim.traffic.drivers.adaptation import adaptation, contrast_ratio
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
-from fogsim.traffic.drivers.sight_kernels import adaptation, contrast_ratio
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Lamp, Step
 

@@ -21,11 +21,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.traffic.drivers.adaptation import Adaptation, adaptation
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, HIGH_BEAM_LIGHT
 from fogsim.traffic.drivers.sight_kernels import (
     DISTANCE_TOLERANCE,
-    Adaptation,
-    adaptation,
     depth_limit,
     depth_limits,
     judge_leaders,

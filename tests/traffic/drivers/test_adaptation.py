@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere.visibility.visibility_level import angular_size, threshold
-from fogsim.traffic.drivers.sight_kernels import (
+from fogsim.traffic.drivers.adaptation import (
     DAY_EYE_THRESHOLD,
     HEAD_LAMP_LUMINANCE,
     NIGHT_EYE_THRESHOLD,

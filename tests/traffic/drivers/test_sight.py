@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.traffic.drivers.adaptation import DAY_EYE_THRESHOLD, HEAD_LAMP_LUMINANCE, adaptation, airlight_luminance
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
 from fogsim.traffic.drivers.sight import DriverSight, inherent_contrast
-from fogsim.traffic.drivers.sight_kernels import DAY_EYE_THRESHOLD, HEAD_LAMP_LUMINANCE, adaptation, airlight_luminance
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Lamp
 

@@ -3,18 +3,16 @@
 import warnings
 from pathlib import Path
 
-from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance
 from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, DriverSetup
-from fogsim.traffic.protocol import AnyTraffic, NetworkTraffic, Traffic
+from fogsim.traffic.drivers.speed_choice import COMPLIANCES, SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
-from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
-from fogsim.traffic.setup import ANY_EGO, AfterCollision, TrafficSetup
-from fogsim.traffic.sumo.command_line import has_error_log, output_prefix
+from fogsim.traffic.road.network import NetEdges, read_net_edges
+from fogsim.traffic.setup import ANY_EGO, AfterCollision, AnyTraffic, NetworkTraffic, Traffic, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.options import has_error_log, output_prefix
 from fogsim.traffic.sumo.output_folder import OutputFolder
 from fogsim.traffic.sumo.traci_link import TraciLink
 from fogsim.traffic.sumo_traffic import SumoTraffic

@@ -144,3 +144,26 @@ SIGNAL_COLOURS: Mapping[str, SignalColour] = {
     "O": SignalColour.OFF,
 }
 """What SUMO's letters for traffic lights mean."""
+
+
+EYE_HEIGHTS = {"car": 1.08, "van": 1.5, "truck": 2.33, "bus": 1.8, "motorcycle": 1.35}
+"""Height of the eyes above the road, by body kind [m]."""
+
+_OF_CLASSES = {
+    "bicycle": 1.4,
+    "pedestrian": 1.5,
+    "wheelchair": 1.2,
+    "tram": 2.0,
+    "rail_urban": 2.0,
+    "subway": 2.0,
+    "rail": 2.7,
+    "rail_electric": 2.7,
+    "rail_fast": 2.7,
+}
+"""The same of SUMO's vehicle classes that share a body with others, but not the height [m]."""
+
+
+def eye_height(vehicle_class: str, shape: str = "", length: float = 0.0) -> float:
+    """Height of a driver's eyes above the road [m]."""
+    known = _OF_CLASSES.get(vehicle_class)
+    return EYE_HEIGHTS[body_kind(vehicle_class, shape, length)] if known is None else known

@@ -1,12 +1,16 @@
-"""What a traffic simulation needs to know before it starts."""
+"""What a traffic simulation is, and what it needs to know before it starts."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import Protocol
 
 from fogsim.traffic.drivers.events import Event
-from fogsim.traffic.drivers.sight import DriverSight
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
+from fogsim.values import Collision, Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.values.script import TrafficAction
 
 UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
 """Drivers as the user's own simulation has them."""
@@ -46,3 +50,72 @@ class TrafficSetup:
     # (str, str): Further options of SUMO, named without dashes, and their values as on its command line
     sumo_options: tuple[tuple[str, str], ...] = ()
     warm_up: float = 0.0  # Without an ego, simulated time before the run begins [s]
+
+
+class AnyTraffic(Protocol):
+    """A running traffic simulation."""
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for, with the next step.
+
+        Returns those that could not begin: the vehicle has left, or there is no such lane.
+        """
+
+    def advance(self, command: Command) -> None:
+        """Move by one traffic step with a command in force."""
+
+    def unplayed(self) -> Unplayed:
+        """List what of the script has not been played since the start; before `close`."""
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+
+
+class Traffic(AnyTraffic, Protocol):
+    """A running traffic simulation with one ego vehicle."""
+
+    def start(self, seed: int) -> None:
+        """Begin, or begin again, and run until the ego is on the road."""
+
+    def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
+        """Roads and signs along the ego's way before `start`; None where no file has it written out."""
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Roads and signs; after `start`."""
+
+    def observe(self) -> TrafficSnapshot | None:
+        """Report where everyone is and what has happened since the last call; None once the ego has left."""
+
+
+class NetworkTraffic(AnyTraffic, Protocol):
+    """A running traffic simulation without an ego vehicle."""
+
+    def start(self, seed: int) -> None:
+        """Begin, or begin again."""
+
+    def observe_network(self) -> NetworkSnapshot:
+        """Report where everyone is and what has happened since the last call."""
+
+
+class CollisionLog:
+    """Collects collisions until they are asked for."""
+
+    def __init__(self) -> None:
+        self._pairs: set[frozenset[str]] = set()
+        self._pending: list[Collision] = []
+
+    def add(self, collisions: Iterable[Collision]) -> None:
+        """Take in the collisions of a step; those of pairs that have collided before are left out."""
+        for collision in collisions:
+            pair = frozenset((collision.collider, collision.victim))
+            if pair not in self._pairs:
+                self._pairs.add(pair)
+                self._pending.append(collision)
+
+    def take(self) -> tuple[Collision, ...]:
+        """Collisions since the last call."""
+        pending, self._pending = tuple(self._pending), []
+        return pending

@@ -12,53 +12,39 @@ from numpy.typing import NDArray
 
 from fogsim.errors import SimulationError
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
-from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import ClearAir, FogAccess
-from fogsim.traffic.road.network import read_net, road_network
-from fogsim.traffic.road.road_map import RoadMap
-from fogsim.traffic.road.signs import sign_map
-from fogsim.traffic.road.structures import structures
-from fogsim.traffic.setup import ANY_EGO, TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, CollisionLog, TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
-from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.lane_keeping import LaneKeeping
-from fogsim.traffic.sumo.link import Api, SumoLink
+from fogsim.traffic.sumo.link import Api, SumoLink, has_lane
 from fogsim.traffic.sumo.loaded_files import (
+    LoadedRoads,
     check_microscopic,
     check_step_length,
     describe_seen,
     describe_warnings,
     end_time,
-    loaded_additional,
-    loaded_net,
 )
-from fogsim.traffic.sumo.planned_way import planned_way
+from fogsim.traffic.sumo.options import command_line
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
-from fogsim.traffic.sumo_behaviour.ego_choice import EgoChoice
-from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
-from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
-from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
+from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving, choose_ego
+from fogsim.traffic.sumo_behaviour.scripted_actions import LampPublisher, LaneKeeping, ScriptedActions
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
-from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
-from fogsim.traffic.sumo_lanes.courses import Courses
+from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
-from fogsim.traffic.sumo_lanes.leaders import Leaders
-from fogsim.traffic.sumo_lanes.lights import LightsAhead
-from fogsim.traffic.sumo_lanes.long_bodies import LongBodies
-from fogsim.traffic.sumo_lanes.rail_collisions import rail_collisions
+from fogsim.traffic.sumo_lanes.leaders import Courses, Leaders
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, rail_collisions
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
-from fogsim.traffic.sumo_street.person_reader import PersonReader
-from fogsim.traffic.sumo_street.signal_reader import SignalReader
+from fogsim.traffic.sumo_lanes.street import LightsAhead, PersonReader, SignalReader
 from fogsim.values import (
     Command,
     Lamp,
     NetworkSnapshot,
     RoadNetwork,
     SignMap,
-    Structure,
     TrafficSnapshot,
     TrafficState,
     Unplayed,
@@ -92,6 +78,7 @@ class _Run:
     courses: Courses
     lights: LightsAhead
     bodies: LongBodies
+    directions: LaneDirections
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
@@ -129,9 +116,7 @@ class SumoTraffic:
         self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
-        self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
-        self._map: RoadMap | None = None
-        self._structures: tuple[Structure, ...] | None = None
+        self._roads = LoadedRoads(setup.net, setup.additional)
         self._signals: SignalReader | None = None
 
     @property
@@ -177,6 +162,7 @@ class SumoTraffic:
             courses=Courses(api, self._link.remote),
             lights=LightsAhead(api),
             bodies=LongBodies(api, self._link.remote),
+            directions=LaneDirections(api),
         )
         self._signals = None
         self._seed = seed
@@ -207,16 +193,8 @@ class SumoTraffic:
         """Id of the first vehicle that suits as the ego, for which the simulation runs until it drives."""
         if self._link.shared:
             raise SimulationError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
-        choice, simulation = EgoChoice(api), api.simulation
-        last = min(simulation.getTime() + self._setup.warm_up_limit, end_time(api))
-        while (found := choice.look()) is None:
-            if simulation.getTime() >= last or simulation.getMinExpectedNumber() == 0:
-                found = choice.best
-                break
-            self._link.step()
-        if found is None:
-            until = f"until {simulation.getTime():g} s"
-            raise SimulationError(f"ego: {ANY_EGO}: no car, van, truck or bus drives on a lane {until}")
+        last = min(api.simulation.getTime() + self._setup.warm_up_limit, end_time(api))
+        found = choose_ego(api, self._link.step, last)
         warnings.warn(f"traffic.ego: {ANY_EGO}: the ego is {found!r}", stacklevel=2)
         return found
 
@@ -252,51 +230,25 @@ class SumoTraffic:
 
     def _perception(self, run: _Run, fog: FogAccess) -> DriversPerception | None:
         """What drivers see in a fog, past what stands next to the roads; None if they see through both."""
-        setup, remote = self._setup, self._link.remote
-        if setup.sight is None:
+        sight, standing = self._setup.sight, self._obstructions(run.api)
+        if sight is None:
             return None
-        api, roster, session = run.api, run.roster, run.session
-        standing = self._obstructions(api)
-        return drivers_perception(api, fog, setup.sight, roster, remote, session, setup.net, standing)
+        view = DriversView(run.api, fog, sight, run.roster, run.session, self._link.remote, standing)
+        return DriversPerception(view, self._setup.net)
 
     def _obstructions(self, api: Api) -> Obstructions:
         """What stands next to the roads and hides others from drivers."""
-        return CLEAR_SIGHT if self._setup.sight is None else obstructions_of(self._read_structures(api))
-
-    def _read_structures(self, api: Api) -> tuple[Structure, ...]:
-        if self._structures is None:
-            files = self._setup.additional or loaded_additional(api)
-            self._structures = structures(path for path in files if path.is_file())
-        return self._structures
+        return CLEAR_SIGHT if self._setup.sight is None else obstructions_of(self._roads.structures(api))
 
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
-        setup = self._setup
-        planned = planned_way(setup)
-        if planned is None:
-            return None
-        net = self._map = read_net(planned.net)
-        if not net.edges.keys() >= set(planned.edges):
-            return None
-        self._structures = structures(planned.additional)
-        roads = road_network(net, planned.edges, self._structures), sign_map(net, planned.additional)
-        self._planned = planned.edges, roads
-        return roads
+        return self._roads.plan(self._setup)
 
     @_translates_errors
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""
         api = self._running.api
-        route = tuple(api.vehicle.getRoute(self._setup.ego))
-        if self._planned is not None and self._planned[0] == route:
-            return self._planned[1]
-        net, additional = self._read_net(api), self._setup.additional or loaded_additional(api)
-        return road_network(net, route, self._read_structures(api)), sign_map(net, additional)
-
-    def _read_net(self, api: Api) -> RoadMap:
-        if self._map is None:
-            self._map = read_net(self._setup.net or loaded_net(api))
-        return self._map
+        return self._roads.along(api, tuple(api.vehicle.getRoute(self._setup.ego)))
 
     @_translates_errors
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
@@ -358,7 +310,7 @@ class SumoTraffic:
             return GapToEgo(run.api, ego).measure(other) if ego is not None and ego in present else None
 
         may_change = functools.partial(has_lane, run.api)
-        return Situation(self._elapsed(run), present, LaneDirections(run.api).driven, gap_to_ego, may_change)
+        return Situation(self._elapsed(run), present, run.directions.driven, gap_to_ego, may_change)
 
     def _step(self, run: _Run) -> None:
         self._update_drivers(run, _NO_ADVICE)
@@ -440,7 +392,7 @@ class SumoTraffic:
         persons, signals = run.persons.state(here, run.roster.time), state.signals
         if here is not None:
             if self._signals is None:
-                heads = self._read_net(run.api).signal_heads if run.api.trafficlight.getIDCount() else ()
+                heads = self._roads.net(run.api).signal_heads if run.api.trafficlight.getIDCount() else ()
                 self._signals = SignalReader(run.api, heads)
             signals = self._signals.state(here)
         return replace(state, signals=signals, persons=persons) if signals.ids or persons.ids else state

@@ -14,7 +14,7 @@ from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Unplayed
 
 
-class AttachedLink:
+class _AttachedLink:
     """A simulation that runs already, and is neither stepped nor ended by this link."""
 
     shared = True
@@ -77,7 +77,7 @@ class AttachedTraffic(SumoTraffic):
             raise InputError("attaching to a simulation needs an ego vehicle in it, and traffic.ego is none")
         if setup.ego == ANY_EGO:
             raise InputError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
-        self._attached = AttachedLink(api)
+        self._attached = _AttachedLink(api)
         self._api = api
         with self._attached.translated_errors():
             check_microscopic(api)
@@ -117,5 +117,5 @@ class AttachedTraffic(SumoTraffic):
 
 def step_length(api: Api) -> float:
     """Step of a simulation that runs [s]."""
-    with AttachedLink(api).translated_errors():
+    with _AttachedLink(api).translated_errors():
         return float(api.simulation.getDeltaT())

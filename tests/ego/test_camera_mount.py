@@ -8,7 +8,7 @@ import pytest
 import fogsim
 from fogsim.camera import USUAL_MOUNTS
 from fogsim.scenario import build, catalogue
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
+from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Camera, Step
 

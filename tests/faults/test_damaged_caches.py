@@ -15,8 +15,8 @@ import pytest
 from fogsim.core.files.generated_files import kept_text, write_generated
 from fogsim.core.files.user_cache import keep_newest, read_entry, replace_file, write_entry
 from fogsim.traffic.road import map_cache, network
+from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net
-from fogsim.traffic.road.road_map import RoadMap
 
 GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.net.xml"
 TEXTS = {"road.net.xml": "<net/>\n" * 40, "road.rou.xml": "<routes/>\n"}

@@ -1,6 +1,6 @@
 """Each pair of vehicles collides once, however often the simulation tells it."""
 
-from fogsim.traffic.collision_log import CollisionLog
+from fogsim.traffic.setup import CollisionLog
 from fogsim.values import Collision
 
 

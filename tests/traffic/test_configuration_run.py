@@ -10,6 +10,7 @@ from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, TrafficSnapshot
+from tests.traffic.common import seen
 
 GRID = Path(__file__).resolve().parents[1] / "data" / "grid"
 EGO = "veh18"
@@ -51,8 +52,7 @@ def test_the_route_is_as_long_as_the_way_across_its_junctions(traffic: Traffic) 
 
 
 def test_vehicles_without_a_type_have_sumos_dimensions(traffic: Traffic) -> None:
-    snapshot = traffic.observe()
-    assert snapshot is not None
+    snapshot = seen(traffic)
     assert set(snapshot.state.length) == {5.0}
     assert set(snapshot.state.width) == {1.8}
     assert set(snapshot.state.height) == {1.5}
@@ -82,15 +82,14 @@ def test_a_configuration_with_a_port_and_a_seed_of_its_own_runs_as_one_without(t
     """It neither listens for a client nor asks the clock for random numbers."""
 
     def states(simulation: Traffic) -> list[tuple[str, ...]]:
-        seen = []
+        found = []
         simulation.start(1)
         for _ in range(2):
-            snapshot = simulation.observe()
-            assert snapshot is not None
-            seen.append((*snapshot.state.ids, *map(str, snapshot.state.position[snapshot.ego])))
+            snapshot = seen(simulation)
+            found.append((*snapshot.state.ids, *map(str, snapshot.state.position[snapshot.ego])))
             simulation.start(2)
         simulation.close()
-        return seen
+        return found
 
     own = '<remote-port value="8813"/><num-clients value="2"/><random value="true"/>'
     with pytest.warns(UserWarning, match=r"mine\.sumocfg: (remote-port=8813|random=true) is left out") as told:

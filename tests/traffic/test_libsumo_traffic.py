@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from early_motorway import ROUTES
 
 from fogsim.errors import SimulationError, SimulationRunningError
 from fogsim.traffic import (
@@ -15,25 +14,11 @@ from fogsim.traffic import (
     LampFailureEvent,
     LaneChangeEvent,
     Traffic,
-    TrafficSetup,
     Trigger,
     libsumo_traffic,
 )
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
-
-FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
-SETUP = TrafficSetup(
-    net=FOLDER / "motorway.net.xml",
-    routes=(ROUTES,),
-    additional=(FOLDER / "signs.add.xml",),
-    ego="ego",
-    step_length=0.1,
-    keep_lane=("ego", "lead"),
-    warm_up_limit=600.0,
-    advice_deceleration=2.0,
-    reading_radius=800.0,
-    events=(),
-)
+from tests.traffic.common import SETUP, seen
 
 
 @pytest.fixture
@@ -42,12 +27,6 @@ def traffic() -> Iterator[Traffic]:
     simulation.start(1)
     yield simulation
     simulation.close()
-
-
-def seen(traffic: Traffic) -> TrafficSnapshot:
-    snapshot = traffic.observe()
-    assert snapshot is not None
-    return snapshot
 
 
 def drive(traffic: Traffic, command: Command, steps: int) -> TrafficSnapshot:

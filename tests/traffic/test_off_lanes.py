@@ -12,25 +12,24 @@ import pytest
 import traci
 
 import fogsim
-from fogsim.atmosphere import FieldAccess
 from fogsim.errors import InputError, SimulationError
 from fogsim.metrics.run_metrics import RunMetrics
 from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.recording import record_run
 from fogsim.traffic import libsumo_traffic
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField, SpeedAdvice, Step
+from fogsim.values import Command, SpeedAdvice, Step
 from fogsim.values.script import ChangeLane, Depart
+from tests.traffic.common import DATA, driven, even
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "off_lanes"
+CASES = DATA / "off_lanes"
 BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=120")
 LANE, BAY, VERGE = -1.6, -4.8, -9.0  # north of the lane, of the places beside it, and of where the ego is put [m]
 LIMIT = 22.0
 
 
 def scenario(name: str, ego: str, duration: float = 60.0, *settings: str) -> Scenario:
-    return scenario_from_config(DATA / f"{name}.sumocfg", ego, [*BLIND, f"duration_s={duration}", *settings])
+    return scenario_from_config(CASES / f"{name}.sumocfg", ego, [*BLIND, f"duration_s={duration}", *settings])
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +72,8 @@ def test_others_are_flagged_where_they_park(parked: list[Step]) -> None:
 
 def test_metrics_leave_parked_vehicles_out(tmp_path: Path) -> None:
     # The others park elsewhere, so that the ego has the same place with and without them.
-    text = (DATA / "park.rou.xml").read_text(encoding="utf-8").replace('"pa" duration="1000"', '"pb" duration="1000"')
-    additional = (DATA / "park.add.xml").read_text(encoding="utf-8")
+    text = (CASES / "park.rou.xml").read_text(encoding="utf-8").replace('"pa" duration="1000"', '"pb" duration="1000"')
+    additional = (CASES / "park.add.xml").read_text(encoding="utf-8")
     area = '<parkingArea id="pb" lane="we1_0" startPos="300" endPos="360" roadsideCapacity="6"/></additional>'
     (tmp_path / "park.add.xml").write_text(additional.replace("</additional>", area), encoding="utf-8")
     found = []
@@ -83,7 +82,7 @@ def test_metrics_leave_parked_vehicles_out(tmp_path: Path) -> None:
         rows = [row for row in text.splitlines() if left_out is None or left_out not in row]
         routes.write_text("\n".join(rows), encoding="utf-8")
         config = tmp_path / "park.sumocfg"
-        files = f'<net-file value="{DATA / "a.net.xml"}"/><route-files value="{routes}"/>'
+        files = f'<net-file value="{CASES / "a.net.xml"}"/><route-files value="{routes}"/>'
         more = '<additional-files value="park.add.xml"/>'
         config.write_text(f"<configuration><input>{files}{more}</input></configuration>", encoding="utf-8")
         metrics = RunMetrics()
@@ -148,7 +147,7 @@ def check_moved(steps: list[Step]) -> None:
     assert after[0].route_position == pytest.approx(20.0 + 1.2 * 100)
 
 
-ARGUMENTS = ("-c", str(DATA / "two.sumocfg"), "--step-length", "0.1", "--no-step-log", "--end", "100")
+ARGUMENTS = ("-c", str(CASES / "two.sumocfg"), "--step-length", "0.1", "--no-step-log", "--end", "100")
 
 
 def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
@@ -187,15 +186,10 @@ def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_p
 def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
     command = Command(advice=SpeedAdvice(6.0), advised_speeds={"parked1": 6.0}, advice_reach=math.inf)
     traffic = libsumo_traffic(build.traffic_setup(scenario("park", "ego")))
-    traffic.enter_fog(FieldAccess(FogField(extinction_from_visibility(60.0), (3000.0, 3000.0, 3000.0))))
+    traffic.enter_fog(even(60.0))
     traffic.start(0)
     try:
-        speeds = []
-        for _ in range(600):
-            traffic.advance(command)
-            snapshot = traffic.observe()
-            assert snapshot is not None
-            speeds.append(float(snapshot.state.speed[snapshot.ego]))
+        speeds = [float(one.state.speed[one.ego]) for one in driven(traffic, 600, command)]
         get = load_libsumo().vehicle
         assert 0.0 < get.getMaxSpeed("parked1") <= get.getMaxSpeed("behind") <= 60.0
     finally:
@@ -217,7 +211,7 @@ def test_a_script_changes_no_lane_and_departs_no_vehicle_beside_a_parked_one() -
 
 def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
     config = tmp_path / "meso.sumocfg"
-    files = f'<net-file value="{DATA / "a.net.xml"}"/><route-files value="{DATA / "two.rou.xml"}"/>'
+    files = f'<net-file value="{CASES / "a.net.xml"}"/><route-files value="{CASES / "two.rou.xml"}"/>'
     meso = '<mesoscopic><mesosim value="on"/></mesoscopic>'
     config.write_text(f"<configuration><input>{files}</input>{meso}</configuration>", encoding="utf-8")
     told = r"mesosim: vehicles of a mesoscopic simulation have no positions in lanes[^\n]*$"

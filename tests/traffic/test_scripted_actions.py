@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from fogsim.errors import InputError
 from fogsim.traffic import TrafficSetup, libsumo_traffic
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import SumoTraffic
-from fogsim.values import Command, Lamp
+from fogsim.values import Lamp
 from fogsim.values.script import (
     ChangeLane,
     ChangeSpeed,
@@ -24,26 +25,15 @@ from fogsim.values.script import (
     Stop,
     TrafficAction,
 )
+from tests.traffic.common import DATA, NET, driven, setup_of
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "crossing"
 STEP = 0.1
 TYPE = '<vType id="car" sigma="0" decel="4.5" emergencyDecel="9" accel="2.6" maxSpeed="40" tau="1.0"/>'
 
 
-def setup_in(folder: Path, net: str, *vehicles: str) -> TrafficSetup:
-    routes = folder / "cars.rou.xml"
-    routes.write_text(f"<routes>{TYPE}{''.join(vehicles)}</routes>", encoding="utf-8")
-    return TrafficSetup(
-        net=Path(net) if Path(net).is_absolute() else DATA / net,
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=STEP,
-        keep_lane=("ego", "lead"),
-        warm_up_limit=60.0,
-        advice_deceleration=2.0,
-        reading_radius=3000.0,
-    )
+def setup_in(folder: Path, net: Path, *vehicles: str) -> TrafficSetup:
+    setup = setup_of(folder, f"<routes>{TYPE}{''.join(vehicles)}</routes>", ("ego", "lead"))
+    return replace(setup, net=net)
 
 
 def car(name: str, edges: str, position: float, speed: float, lane: int = 0) -> str:
@@ -51,15 +41,10 @@ def car(name: str, edges: str, position: float, speed: float, lane: int = 0) -> 
     return f'<vehicle id="{name}" type="car" depart="0" {place}><route edges="{edges}"/></vehicle>'
 
 
-MOTORWAY = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
-
-
 @pytest.fixture
 def motorway(tmp_path: Path) -> Iterator[SumoTraffic]:
-    setup = setup_in(
-        tmp_path, str(MOTORWAY), car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25)
-    )
-    traffic = libsumo_traffic(setup)
+    ego, lead = car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25)
+    traffic = libsumo_traffic(setup_in(tmp_path, NET, ego, lead))
     assert isinstance(traffic, SumoTraffic)
     traffic.start(1)
     yield traffic
@@ -69,21 +54,10 @@ def motorway(tmp_path: Path) -> Iterator[SumoTraffic]:
 def drive(traffic: SumoTraffic, steps: int, vehicle: str = "lead") -> list[dict[str, Any]]:
     """What is seen of a vehicle after each step."""
     seen = []
-    for _ in range(steps):
-        traffic.advance(Command())
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        state = snapshot.state
-        row = state.ids.index(vehicle)
-        seen.append(
-            {
-                "speed": float(state.speed[row]),
-                "lane": state.lane[row],
-                "place": state.position[row],
-                "lamps": Lamp(int(state.lamps[row])),
-                "leader": snapshot.leader,
-            }
-        )
+    for snapshot in driven(traffic, steps):
+        state, row = snapshot.state, snapshot.state.ids.index(vehicle)
+        one = {"speed": float(state.speed[row]), "lane": state.lane[row], "place": state.position[row]}
+        seen.append({**one, "lamps": Lamp(int(state.lamps[row])), "leader": snapshot.leader})
     return seen
 
 
@@ -176,7 +150,9 @@ def test_a_vehicle_comes_onto_the_road_near_another(motorway: SumoTraffic, gap: 
 
 
 def lights(tmp_path: Path) -> SumoTraffic:
-    traffic = libsumo_traffic(setup_in(tmp_path, "lights.net.xml", car("ego", "WC CE", 100, 10, lane=1)))
+    traffic = libsumo_traffic(
+        setup_in(tmp_path, DATA / "crossing" / "lights.net.xml", car("ego", "WC CE", 100, 10, lane=1))
+    )
     assert isinstance(traffic, SumoTraffic)
     return traffic
 

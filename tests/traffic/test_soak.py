@@ -7,29 +7,16 @@ from pathlib import Path
 
 from fogsim.traffic import Traffic, TrafficSetup, libsumo_traffic
 from fogsim.values import Command, SpeedAdvice
+from tests.traffic.common import MOTORWAY, setup_of
 
-FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 WARM_UP, RESETS = 10, 40
 KIB = 1024
 
 
 def setup(folder: Path) -> TrafficSetup:
     """The motorway with an ego that departs at once, so that a reset takes little."""
-    text = (FOLDER / "motorway.rou.xml").read_text(encoding="utf-8")
-    routes = folder / "early.rou.xml"
-    routes.write_text(text.replace('"177"', '"2"').replace('"180"', '"5"'), encoding="utf-8")
-    return TrafficSetup(
-        net=FOLDER / "motorway.net.xml",
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=0.1,
-        keep_lane=("ego", "lead"),
-        warm_up_limit=60.0,
-        advice_deceleration=2.0,
-        reading_radius=800.0,
-        events=(),
-    )
+    text = (MOTORWAY / "motorway.rou.xml").read_text(encoding="utf-8")
+    return setup_of(folder, text.replace('"177"', '"2"').replace('"180"', '"5"'), ("ego", "lead"))
 
 
 def reset(traffic: Traffic, seed: int) -> None:

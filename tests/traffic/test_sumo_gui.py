@@ -16,6 +16,7 @@ from fogsim.scenario import build, load_scenario
 from fogsim.traffic import TraciLink, Traffic, libsumo_traffic, traci_traffic
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, SpeedAdvice, TrafficSnapshot
+from tests.traffic.common import driven
 
 SETUP = replace(build.traffic_setup(load_scenario("motorway_fog_bank")), reading_radius=500.0)
 HOST = "127.0.0.1"
@@ -71,12 +72,9 @@ def gui(display: str, free_port: Callable[[], int]) -> Iterator[tuple[int, "subp
 
 
 def drive(traffic: Traffic, steps: int = 30) -> list[TrafficSnapshot]:
-    seen = []
+    seen: list[TrafficSnapshot] = []
     for step in range(steps):
-        traffic.advance(Command(SpeedAdvice(18.0 if step > 10 else 25.0)))
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        seen.append(snapshot)
+        seen += driven(traffic, 1, Command(SpeedAdvice(18.0 if step > 10 else 25.0)))
     return seen
 
 

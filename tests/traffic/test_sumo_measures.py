@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -20,19 +21,20 @@ from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
 from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
-from fogsim.traffic import DriverSetup, TrafficSetup
+from fogsim.traffic import DriverSetup
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Collision, Command, TrafficState
 from tests.recorders.synthetic import make_step, make_traffic_step
+from tests.traffic.common import DATA, SETUP, seen
 
 STEP = 0.1
 STEPS = 400
 LENGTH = 3000.0
 BRAKES_AT = 250
 """Step in which the first vehicle begins to brake."""
-CROSSING = Path(__file__).resolve().parents[1] / "data" / "crossing" / "priority.net.xml"
+CROSSING = DATA / "crossing" / "priority.net.xml"
 CROSSING_STEPS = 260
 NET = (
     f'<net version="1.20"><edge id="road" from="a" to="b" priority="1"><lane id="road_0" index="0" speed="30" '
@@ -136,20 +138,9 @@ def play(
     folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None], additional: tuple[Path, ...] = ()
 ) -> Run:
     """The vehicles of ``road.rou.xml`` on a network, for so many steps before each of which something may happen."""
-    setup = TrafficSetup(
-        net=net,
-        routes=(folder / "road.rou.xml",),
-        additional=additional,
-        ego="ego",
-        step_length=STEP,
-        keep_lane=(),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=LENGTH,
-        events=(),
-        sight=None,
-        drivers=DriverSetup(speed_choice="unaffected"),
-    )
+    drivers = DriverSetup(speed_choice="unaffected")
+    changes = {"routes": (folder / "road.rou.xml",), "additional": additional, "keep_lane": (), "drivers": drivers}
+    setup = replace(SETUP, net=net, reading_radius=LENGTH, **changes)
     link = WithOutputs(folder)
     traffic = SumoTraffic(setup, link)
     states, collisions, emitted = [], [], []
@@ -159,8 +150,7 @@ def play(
             disturb(link.api, number)
             if number:
                 traffic.advance(Command())
-            snapshot = traffic.observe()
-            assert snapshot is not None
+            snapshot = seen(traffic)
             states.append(snapshot.state)
             collisions += snapshot.collisions
             emitted.append(emissions(link.api, snapshot.state))

@@ -5,37 +5,21 @@ import dataclasses
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import traci
-from early_motorway import ROUTES
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
-from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.sumo.libsumo_link import LibsumoLink
-from fogsim.traffic.sumo.link import Api, SumoLink
+from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, libsumo_traffic, traci_traffic
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
+from tests.traffic.common import DATA, SETUP, seen
 
-GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg"
-FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
-SETUP = TrafficSetup(
-    net=FOLDER / "motorway.net.xml",
-    routes=(ROUTES,),
-    additional=(FOLDER / "signs.add.xml",),
-    ego="ego",
-    step_length=0.1,
-    keep_lane=("ego", "lead"),
-    warm_up_limit=600.0,
-    advice_deceleration=2.0,
-    reading_radius=800.0,
-    events=(),
-)
+GRID = DATA / "grid" / "grid.sumocfg"
 HOST = "127.0.0.1"
 
 
@@ -47,13 +31,11 @@ def equal(one: TrafficState, other: TrafficState) -> bool:
 
 def drive(traffic: Traffic, seed: int, steps: int = 40) -> list[TrafficSnapshot]:
     traffic.start(seed)
-    seen = []
+    snapshots = []
     for step in range(steps):
         traffic.advance(Command(SpeedAdvice(18.0 if step > 10 else 25.0), Lamp.REAR_FOG))
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        seen.append(snapshot)
-    return seen
+        snapshots.append(seen(traffic))
+    return snapshots
 
 
 @pytest.fixture(scope="module")
@@ -71,18 +53,6 @@ def link(sumo_process: Callable) -> Iterator[TraciLink]:
         link = TraciLink(HOST, port)
         yield link
         link.end()
-
-
-def test_the_traffic_is_the_same_as_in_process(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:
-    remote = drive(traci_traffic(SETUP, link), 1)
-    for here, there in zip(in_process, remote, strict=True):
-        assert equal(here.state, there.state)
-        assert (here.leader, here.route_position, here.speed_limit) == (
-            there.leader,
-            there.route_position,
-            there.speed_limit,
-        )
-    assert len(in_process[-1].state.ids) > 10
 
 
 def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
@@ -113,6 +83,12 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
     seen = in_fog(traci_traffic(setup, link))
     for one, other in zip(expected, seen, strict=True):
         assert equal(one.state, other.state)
+        assert (one.leader, one.route_position, one.speed_limit) == (
+            other.leader,
+            other.route_position,
+            other.speed_limit,
+        )
+    assert len(seen[-1].state.ids) > 10
     steps = round(seen[-1].state.time / SETUP.step_length)
     assert messages < 25 * steps
 
@@ -126,7 +102,8 @@ def test_beginning_anew_loads_the_scenario_with_the_seed(link: TraciLink, in_pro
     assert equal(again[-1].state, in_process[-1].state)
 
 
-def readers_agree(link: SumoLink, api: Api) -> None:
+def test_getters_and_subscriptions_read_the_same_over_a_connection(link: TraciLink) -> None:
+    api = link.begin(())
     while "ego" not in api.vehicle.getIDList():
         link.step()
     readers: list[VehicleReader] = [kind(api, "ego", 300.0) for kind in (VehicleReader, SubscribedReader)]
@@ -134,18 +111,6 @@ def readers_agree(link: SumoLink, api: Api) -> None:
         plain, subscribed = (reader.state(Lamp.REAR_FOG) for reader in readers)
         assert equal(plain, subscribed)
         link.step()
-
-
-def test_getters_and_subscriptions_read_the_same_over_a_connection(link: TraciLink) -> None:
-    readers_agree(link, link.begin(()))
-
-
-def test_getters_and_subscriptions_read_the_same_in_process() -> None:
-    link = LibsumoLink()
-    try:
-        readers_agree(link, link.begin(command_line(SETUP, 1)))
-    finally:
-        link.end()
 
 
 def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: list[TrafficSnapshot]) -> None:

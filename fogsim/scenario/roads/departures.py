@@ -9,7 +9,7 @@ from fogsim.scenario.schema import Scenario
 from fogsim.scenario.timeline import operations
 from fogsim.scenario.timeline.schema import DepartAction, VehicleActions
 from fogsim.traffic.road.configuration import configured_files
-from fogsim.traffic.road.net_edges import read_net_edges
+from fogsim.traffic.road.network import read_net_edges
 from fogsim.traffic.templates import Actor, Placed, PlacementError, check_placement, read_ways
 from fogsim.traffic.templates.placement import Ways, edge_at
 from fogsim.units import KMH_PER_MPS

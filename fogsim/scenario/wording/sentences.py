@@ -19,9 +19,9 @@ from fogsim.scenario.wording.non_defaults import shown_value
 from fogsim.traffic import FOLLOWING_MODELS, SPEED_CHOICES
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.traffic.road.configuration import configured_demand, configured_files
-from fogsim.traffic.road.flows import read_flows
+from fogsim.traffic.road.demand import read_flows
 from fogsim.traffic.road.network import read_net, route_axis
-from fogsim.traffic.sumo.planned_way import planned_way
+from fogsim.traffic.sumo.loaded_files import planned_way
 from fogsim.traffic.templates import usual_mix
 from fogsim.units import KMH_PER_MPS
 

@@ -9,7 +9,7 @@ import numpy as np
 from fogsim.atmosphere import optical_depth
 from fogsim.lighting.own_sight import headlamp_sight_distance
 from fogsim.scenario import Scenario
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
+from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn, intensity_toward
 from fogsim.traffic.sumo_drivers.oncoming_glare import LAMP_HEIGHT, MIRROR_ANGLE, MIRROR_SHARE
 from fogsim.units import DAY_ILLUMINANCE, visibility_from_extinction

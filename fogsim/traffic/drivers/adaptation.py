@@ -18,9 +18,9 @@ from fogsim.values.eye import flux_root, luminance_root
 from fogsim.values.fog import AIRLIGHT_SHARE
 
 DAY_EYE_THRESHOLD = 1e-3
-"""Illuminance at the eye at which a lamp is noticed by day, before fog of `BRIGHT_LUMINANCE` and more [lx]."""
+"""Illuminance at the eye at which a lamp is noticed by day, before fog of `_BRIGHT_LUMINANCE` and more [lx]."""
 
-BRIGHT_LUMINANCE = 302.0
+_BRIGHT_LUMINANCE = 302.0
 """Luminance before which no lamp needs more light to be noticed than before less [cd/m²]."""
 
 HEAD_LAMP_LUMINANCE = 0.28
@@ -57,7 +57,7 @@ def _roots(luminance: float) -> tuple[float, float]:
 
 _DAY_LUMINANCE = airlight_luminance(DAY_ILLUMINANCE)
 _DAY_FLUX_ROOT, _DAY_LUMINANCE_ROOT = _roots(_DAY_LUMINANCE)
-_BRIGHT_FLUX_ROOT, _ = _roots(BRIGHT_LUMINANCE)
+_BRIGHT_FLUX_ROOT, _ = _roots(_BRIGHT_LUMINANCE)
 
 
 class Adaptation(NamedTuple):
@@ -96,7 +96,7 @@ def adaptation(illuminance: float, glare: float = 0.0, share: float = AIRLIGHT_S
     """
     airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare
-    flux, extended = _roots(min(luminance, BRIGHT_LUMINANCE))
+    flux, extended = _roots(min(luminance, _BRIGHT_LUMINANCE))
     return Adaptation(airlight, luminance, DAY_EYE_THRESHOLD * (flux / _BRIGHT_FLUX_ROOT) ** 2, flux, extended)
 
 

@@ -14,7 +14,7 @@ _HARDEST_BRAKING = 9.0
 """No vehicle brakes harder than this for long [m/s²]."""
 
 
-class VehiclePlaces(Protocol):
+class _VehiclePlaces(Protocol):
     """Where the vehicles of a simulation are."""
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> Mapping[str, float]:
@@ -34,7 +34,7 @@ class AdviceHearing:
     those who come later. All other advice is heard as long as it is in force and the driver is where it is given.
     """
 
-    def __init__(self, places: VehiclePlaces) -> None:
+    def __init__(self, places: _VehiclePlaces) -> None:
         self._places = places
         self._readers: dict[Stretch, dict[str, float]] = {}
         self._last_on: dict[Stretch, Collection[str]] = {}

@@ -101,7 +101,7 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
-class ScriptedActions:
+class _ScriptedActions:
     """What the script asks for in this step."""
 
     orders: Mapping[str, Order]  # Speeds to bring vehicles to
@@ -140,10 +140,10 @@ class Script:
         """True if no event waits and no vehicle brakes, so that `play` would do nothing."""
         return not (self._waiting or self._braking)
 
-    def play(self, situation: Situation) -> ScriptedActions:
+    def play(self, situation: Situation) -> _ScriptedActions:
         """Begin what is due and go on with what has begun."""
         begun = self._begin(situation) if self._waiting else []
-        return ScriptedActions(
+        return _ScriptedActions(
             orders=self._orders(situation) if self._braking else {},
             lane_changes=self._lane_changes(begun, situation),
         )

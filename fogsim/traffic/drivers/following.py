@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fogsim.core.registry import Registry
-from fogsim.traffic.drivers.leader_reach import LeaderReach
+from fogsim.traffic.drivers.sight import LeaderReach
 
 CATCHING_UP = 5.0
 """Who keeps up with a leader is ready to drive so much faster, as IDM must be to hold a gap [m/s]; FogSim's own."""
@@ -73,7 +73,7 @@ class InSight(FollowingModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Careful(FollowingModel):
+class _Careful(FollowingModel):
     """Lengthen the headway in fog, towards the recommended one, where there is no hurry.
 
     Drivers without time pressure keep longer headways where they see less far ahead (van der Hulst, Rothengatter &
@@ -91,11 +91,11 @@ class Careful(FollowingModel):
 
 
 @dataclass(frozen=True, slots=True)
-class OutOfSight(Careful):
+class OutOfSight(_Careful):
     """Fall back out of sight where the recommended headway is longer than one sees (Broughton et al. 2007).
 
     They drive no faster than at a speed at which they see as far ahead as the recommended headway takes them, and let a
-    faster leader go; in sight of a leader they are `Careful`.
+    faster leader go; in sight of a leader they are `_Careful`.
     """
 
     def top_speed(self, reach: LeaderReach) -> float:
@@ -105,7 +105,7 @@ class OutOfSight(Careful):
 
 FOLLOWING_MODELS: Registry[FollowingModel] = Registry(
     "following model",
-    {"unaffected": FollowingModel(), "in_sight": InSight(), "careful": Careful(), "out_of_sight": OutOfSight()},
+    {"unaffected": FollowingModel(), "in_sight": InSight(), "careful": _Careful(), "out_of_sight": OutOfSight()},
 )
 
 OBSERVED_MIXTURE: Mapping[str, float] = {"in_sight": 0.5, "unaffected": 0.2, "careful": 0.15, "out_of_sight": 0.15}

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.traffic.drivers.adaptation import NIGHT_EYE_THRESHOLD, Adaptation, contrast_ratio
 
-FARTHEST = 1e5
+_FARTHEST = 1e5
 """Distance beyond which sight is not distinguished from sight without end [m]."""
 
 DISTANCE_TOLERANCE = 0.01
 """By how much a distance that is searched for may be too small [m]."""
 
-_NEAREST = 0.1
+NEAREST = 0.1
 """No one is nearer than this [m]."""
 
 BODY_MIDDLE = 1.2
@@ -34,9 +34,15 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
 
 
-X, Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
+_X, _Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
 """Columns of what is known of a vehicle: where its front bumper is [m], its speed [m/s], its driver's minimum gap [m],
 the contrast of its body [-], and its driver's eyes above the road [m]."""
+
+
+EYES, END, LINE, BEARING, AHEAD, ASIDE = 0, 3, 6, 7, 8, 9
+"""Columns of lines of sight: where one begins, at the driver's eyes, and where it ends, at the nearest part of another
+vehicle [m], its length [m], its horizontal angle from straight ahead [rad], and where the eyes are, from the middle of
+the other's front bumper: ahead of it and to its left [m]."""
 
 
 class Closing(NamedTuple):
@@ -64,18 +70,18 @@ def face_leaders(
     """
     for i in range(gaps.size):
         own, other = vehicles[behind[i]], vehicles[ahead[i]]
-        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], _NEAREST)
+        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], NEAREST)
         facing[CONTRAST, i] = other[_BODY_CONTRAST]
         facing[_CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
         facing[_DEEPENING, i] = closing.extinction * (facing[_CLOSING, i] if closing.is_even else apart)
-        x, y, z = other[X] - own[X], other[Y] - own[Y], other[Z] - own[Z]
+        x, y, z = other[_X] - own[_X], other[_Y] - own[_Y], other[Z] - own[Z]
         height = own[EYE_HEIGHT]
         z += min(height, BODY_MIDDLE) - height
         share = facing[DISTANCE, i] / math.sqrt(x * x + y * y + z * z)
-        lines[0, i] = own[X], own[Y], own[Z] + height
-        lines[1, i] = own[X] + x * share, own[Y] + y * share, own[Z] + height + z * share
+        lines[0, i] = own[_X], own[_Y], own[Z] + height
+        lines[1, i] = own[_X] + x * share, own[_Y] + y * share, own[Z] + height + z * share
 
 
 @kernel
@@ -101,6 +107,18 @@ def depth_limit(
 
 
 @kernel
+def depth_limits(
+    eyes: Adaptation, threshold: float, reach: float, looks: NDArray[np.float64], limits: NDArray[np.float64]
+) -> None:
+    """Write to `limits` (n,) the optical depth up to which each of many vehicles is seen [-]; see `depth_limit`.
+
+    Takes `reach` [m], and `looks` (4, n): distances [m], contrasts, intensities [cd] and light of own head lamps.
+    """
+    for i in range(limits.size):
+        limits[i] = depth_limit(eyes, threshold, reach, looks[0, i], looks[1, i], looks[2, i], looks[3, i])
+
+
+@kernel
 def seen_distance(
     eyes: Adaptation,
     threshold: float,
@@ -114,7 +132,7 @@ def seen_distance(
 
     Takes `reach` [m], `extinction` [1/m], `contrast`, `intensity`, `head_lamps` [cd].
     """
-    near, far = 0.0, FARTHEST
+    near, far = 0.0, _FARTHEST
     if depth_limit(eyes, threshold, reach, far, contrast, intensity, head_lamps) >= extinction * far:
         return math.inf
     while far - near > DISTANCE_TOLERANCE:
@@ -156,6 +174,41 @@ def judge_leaders(
             judged[0, i] = SEEN if is_certain else DAZZLED
             continue
         # Lamps that are commanded may be commanded otherwise in any step.
-        lit, nearest = facing[BRIGHTEST, i], max(distance - change, _NEAREST)
+        lit, nearest = facing[BRIGHTEST, i], max(distance - change, NEAREST)
         limit = depth_limit(eyes, threshold, reach, nearest, contrast, lit, 1.0)
         judged[0, i], judged[1, i] = HIDDEN, min(max(depth - limit, 0.0) / deepening, horizon)
+
+
+@kernel
+def draw_lines_of_sight(
+    observers: NDArray[np.float64], parts: NDArray[np.float64], ends: NDArray[np.int64], lines: NDArray[np.float64]
+) -> None:
+    """Write to `lines` (n, 10) the straight lines from observers' eyes to the nearest part of what they look at.
+
+    Takes `observers` (n, 5), where front bumpers are [m], headings [rad] and heights of eyes [m], and all straight
+    `parts` (m, 7) of bodies, of whom each observer's end before `ends` (n,): where their front ends are [m], headings
+    [rad], how far behind the front bumper they begin, lengths and widths [m].
+    """
+    first = 0
+    for n in range(ends.size):
+        x, y, height = observers[n, _X], observers[n, _Y], observers[n, 4]
+        nearest = math.inf
+        for i in range(first, ends[n]):
+            front_x, front_y, half = parts[i, _X], parts[i, _Y], 0.5 * parts[i, 6]
+            east, north = math.cos(parts[i, 3]), math.sin(parts[i, 3])
+            ahead = (x - front_x) * east + (y - front_y) * north
+            aside = (y - front_y) * east - (x - front_x) * north
+            along, across = min(max(ahead, -parts[i, 5]), 0.0), min(max(aside, -half), half)
+            end_x, end_y = front_x + along * east - across * north, front_y + along * north + across * east
+            distance = math.hypot(end_x - x, end_y - y)
+            if distance < nearest:
+                nearest = distance
+                lines[n, END], lines[n, END + 1] = end_x, end_y
+                lines[n, END + 2] = parts[i, Z] + min(height, BODY_MIDDLE)
+                lines[n, AHEAD], lines[n, ASIDE] = ahead - parts[i, 4], aside
+        first = ends[n]
+        lines[n, EYES], lines[n, EYES + 1], lines[n, EYES + 2] = x, y, observers[n, Z] + height
+        up = lines[n, END + 2] - lines[n, EYES + 2]
+        lines[n, LINE] = max(math.sqrt(nearest * nearest + up * up), NEAREST)
+        bearing = math.atan2(lines[n, END + 1] - y, lines[n, END] - x) - observers[n, 3]
+        lines[n, BEARING] = bearing - 2.0 * math.pi * np.rint(bearing / (2.0 * math.pi))

@@ -10,15 +10,77 @@ import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.core.registry import Registry
-from fogsim.traffic.drivers.compliance import FULL, Compliance, complied_speed
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.values import Display
+
+
+@dataclass(frozen=True, slots=True)
+class Compliance:
+    """Who follows an advised speed, and how far."""
+
+    # Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1
+    reached_share: float = 1.0
+    rate: float = 1.0  # Share of those who follow it, 0 … 1
+    strength: float = 1.0  # How far they go from their own speed down to the advised one, 0 … 1
+    delay: float = 2.0  # Time before they do [s]
+    # How far those who by themselves drive slower in fog go up to the advised speed, for they take it to be safe, 0 …
+    # 1; never beyond what they drive in clear air
+    trust: float = 0.0
+    foreseen: float = 1.0  # Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1
+
+
+_FULL = Compliance()
+"""Everyone is reached and goes all the way down, and no one up: the best case."""
+
+_SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
+"""Signs with a speed limit for the visibility, above every lane, which drivers know and trust.
+
+A16 (Hogema & van der Horst 1997): 80 km/h for 70 to 140 m, 60 km/h below; mean speeds 8 to 10 km/h lower than without
+signs, and below 35 m 60 km/h in place of 29: drivers took the sign's speed for safe. On I-77 limits for the visibility
+made 2 to 5 mph (Gonzales & Fontaine 2018); in Finland 80 for 100 km/h on slippery roads 3.4 km/h (Rämä 1999).
+"""
+
+_ADVISORY_SIGN = Compliance(rate=0.1, strength=0.35)
+"""Signs next to the road that advise a speed.
+
+Caltrans' CAWS near Stockton (MacCarley, Ackles & Watts 2006): mean speeds fell by 1.1 mph over all fogs, and were
+61 mph where 30 mph were advised in dense fog: 0.035 of the way. In Saudi Arabia an advised speed made 6.5 km/h; the
+word "fog" without a speed 1.8 mph on the M25 (Cooper & Sawyer 1993).
+"""
+
+_IN_CAR = Compliance(strength=0.55)
+"""Advice on a display in the car.
+
+Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the way into the fog and 64.8 in place of
+70.4 in dense fog, lower than with a sign next to. The advised speeds are not in what we have seen: 0.55 supposes
+60 km/h.
+"""
+
+_VEHICLE_TO_VEHICLE = Compliance(reached_share=0.3, strength=0.55)
+"""Advice from vehicle to vehicle, displayed in the car: as `_IN_CAR`, to those who are equipped; FogSim's own share."""
+
+COMPLIANCES: Registry[Compliance] = Registry(
+    "compliance",
+    {
+        "full": _FULL,
+        "speed_limit_sign": _SPEED_LIMIT_SIGN,
+        "advisory_sign": _ADVISORY_SIGN,
+        "in_car": _IN_CAR,
+        "vehicle_to_vehicle": _VEHICLE_TO_VEHICLE,
+    },
+)
+
+
+def complied_speed(own: float, advised: float, strength: float, trust: float = 0.0) -> float:
+    """Speed of a driver who goes some way from the own speed to an advised one [m/s] (`own`, `advised` [m/s])."""
+    return own + strength * min(0.0, advised - own) + trust * max(0.0, advised - own)
+
 
 UNAFFECTED_ABOVE = 200.0
 """Visibility above which drivers do not slow down [m] (White & Jeffery 1980)."""
@@ -26,27 +88,18 @@ UNAFFECTED_ABOVE = 200.0
 CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
-Choice = Callable[[float], float]
-"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter."""
+_Choice = Callable[[float], float]
+"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter.
+
+One with a method `share` also slows drivers relative to the speed that they would drive in clear air, on any road.
+"""
 
 
-@runtime_checkable
-class RelativeChoice(Protocol):
-    """A choice that also slows drivers relative to the speed that they would drive in clear air, on any road."""
-
-    def __call__(self, visibility: float) -> float:
-        """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
-
-    def share(self, visibility: float) -> float:
-        """Share of the speed in clear air that a driver still wants [-] (`visibility` [m])."""
-
-
-def speed_share(choice: Choice, visibility: float) -> float:
+def speed_share(choice: _Choice, visibility: float) -> float:
     """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
 
     Takes `visibility` [m].
     """
-    # Asked thousands of times a second, where isinstance of a protocol takes 50 times as long.
     share: Callable[[float], float] | None = getattr(choice, "share", None)
     return 1.0 if share is None else share(visibility)
 
@@ -128,7 +181,7 @@ def _clipped(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-SPEED_CHOICES: Registry[Choice] = Registry(
+SPEED_CHOICES: Registry[_Choice] = Registry(
     "speed choice",
     {"observed": observed, "unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight},
 )
@@ -140,7 +193,7 @@ class DriverSetup:
 
     speed_choice: str = "observed"  # Name in `SPEED_CHOICES`
     spread: float = 0.1  # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
-    compliance: Compliance = FULL  # How they follow advice
+    compliance: Compliance = _FULL  # How they follow advice
     # By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
     # outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001)
     misjudgement: float = 0.0
@@ -214,7 +267,7 @@ def _drawn_kind(shares: Mapping[str, float], draw: float) -> str:
     return next(reversed(list(shares)))
 
 
-def chosen_speed(choice: Choice, factor: float, own: float, visibility: float) -> float:
+def chosen_speed(choice: _Choice, factor: float, own: float, visibility: float) -> float:
     """Speed that a driver chooses in fog [m/s] (`own` [m/s], `visibility` [m])."""
     return min(factor * choice(visibility), speed_share(choice, visibility) * own)
 

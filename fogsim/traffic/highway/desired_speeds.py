@@ -9,8 +9,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, check_edges, check_start, heard_since
 from fogsim.traffic.drivers.following import CATCHING_UP, FOLLOWING_MODELS, Surroundings, misjudged_headway
-from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
     UNAFFECTED_ABOVE,
@@ -20,15 +19,13 @@ from fogsim.traffic.drivers.speed_choice import (
     desired_speed,
     driver_traits,
 )
-from fogsim.traffic.highway.fleet import Fleet
-from fogsim.traffic.highway.network import edge_id, speed_limit
-from fogsim.traffic.highway.route import lanes_ahead
-from fogsim.traffic.highway.snapshot import front_bumper
+from fogsim.traffic.highway.fleet import Fleet, front_bumper
+from fogsim.traffic.highway.network import edge_id, lanes_ahead, speed_limit
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Stretch
 
 
-class HighwayVehiclePlaces:
+class _HighwayVehiclePlaces:
     """Finds vehicles by their lanes; edges are named as in the road network. See `VehiclePlaces`."""
 
     def __init__(self, fleet: Fleet) -> None:
@@ -95,7 +92,7 @@ class HighwayDesiredSpeeds:
         self._deceleration = advice_deceleration
         self._sight = sight
         self._traits: dict[str, DriverTraits] = {}
-        self._hearing = AdviceHearing(HighwayVehiclePlaces(fleet))
+        self._hearing = AdviceHearing(_HighwayVehiclePlaces(fleet))
         self._advised_since: Heard = {}
         self._desired: dict[Any, float] = {}
         self._own_speed: dict[Any, float] = {}

@@ -11,16 +11,20 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError, SimulationError, suggest
-from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
 from fogsim.traffic.highway.behaviour import DriverControl, control_drivers, hold_at_standstill
-from fogsim.traffic.highway.fleet import LEAD, Fleet
-from fogsim.traffic.highway.network import road_network, same_roads, speed_limit
-from fogsim.traffic.highway.route import RouteProgress, lanes_ahead, planned_route
-from fogsim.traffic.highway.snapshot import read_snapshot
-from fogsim.traffic.setup import UNTOUCHED, AfterCollision
+from fogsim.traffic.highway.fleet import LEAD, Fleet, read_snapshot
+from fogsim.traffic.highway.network import (
+    RouteProgress,
+    lanes_ahead,
+    planned_route,
+    road_network,
+    same_roads,
+    speed_limit,
+)
+from fogsim.traffic.setup import UNTOUCHED, AfterCollision, CollisionLog
 from fogsim.values import Collision, Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 from fogsim.values.script import TrafficAction
 

@@ -87,7 +87,7 @@ def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
 
 
 @dataclass(frozen=True, slots=True)
-class ConfiguredDemand:
+class _ConfiguredDemand:
     """Sources of a SUMO configuration's vehicles: additional and route files, in SUMO's order.
 
     `is_open` if other vehicles may come, from a saved state or a scaled demand; `reroutes` if vehicles may leave their
@@ -99,10 +99,10 @@ class ConfiguredDemand:
     reroutes: bool
 
 
-def configured_demand(config: Path) -> ConfiguredDemand:
+def configured_demand(config: Path) -> _ConfiguredDemand:
     """Sources of a SUMO configuration's vehicles."""
     root = _root(config)
-    return ConfiguredDemand(
+    return _ConfiguredDemand(
         files=(*_named(config, root, _ADDITIONAL), *_named(config, root, _ROUTES)),
         is_open=any(_values(root, _OPENING)),
         reroutes=any(element.tag.startswith(_REROUTING) for element in root.iter()),

@@ -1,17 +1,100 @@
 """Vehicles and persons of a simulation, from its route and additional files, without starting SUMO."""
 
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
 from fogsim.traffic.road.configuration import configured_demand
 
+_HOUR = 3600.0
 _MOST_BYTES = 50_000_000
 """Unpacked bytes of files after which nothing is claimed about a demand."""
 
-MOST_NAMES = 10_000
+
+@dataclass(slots=True)
+class _Flows:
+    """Rates of all flows together by vehicle type [1/h], number of flows, and vehicles that are written one by one.
+
+    `is_whole` is False if a file could not be read to its end.
+    """
+
+    rates: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    flows: int = 0
+    single: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    is_whole: bool = True
+
+
+def read_flows(files: Iterable[Path]) -> _Flows:
+    """Flows and single vehicles of additional and route files, in SUMO's order."""
+    reader = _FlowReader()
+    for file in files:
+        try:
+            reader.found.is_whole &= read_elements(file, reader, _MOST_BYTES) < _MOST_BYTES
+        except InputError:
+            reader.found.is_whole = False
+    return reader.found
+
+
+class _FlowReader:
+    """Adds up flows; the vehicles of a distribution count by their types."""
+
+    is_done = False
+
+    def __init__(self) -> None:
+        self.found = _Flows()
+        self._mixes: dict[str, dict[str, float]] = {}
+        self._mix = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "vTypeDistribution":
+            self._mix = attributes.get("id", "")
+            names, weights = attributes.get("vTypes", "").split(), attributes.get("probabilities", "").split()
+            self._mixes[self._mix] = {n: _number(w) for n, w in zip(names, weights or ["1"] * len(names), strict=False)}
+        elif tag == "vType" and self._mix:
+            self._mixes[self._mix][attributes.get("id", "")] = _number(attributes.get("probability", "1"))
+        elif tag == "flow":
+            self.found.flows += 1
+            self._add(self.found.rates, attributes, _rate(attributes))
+        elif tag in {"vehicle", "trip"}:
+            self._add(self.found.single, attributes, 1)
+
+    def end(self, tag: str) -> None:
+        if tag == "vTypeDistribution":
+            self._mix = ""
+
+    def _add(self, to: dict[str, float], attributes: Mapping[str, str], number: float) -> None:
+        name = attributes.get("type", "DEFAULT_VEHTYPE")
+        mix = self._mixes.get(name) or {name: 1.0}
+        for one, share in mix.items():
+            to[one] += number * share / (sum(mix.values()) or 1.0)
+
+
+def _rate(flow: Mapping[str, str]) -> float:
+    """Vehicles per hour while a flow lasts; 0 where its times are not numbers."""
+    if (each := flow.get("vehsPerHour", flow.get("perHour"))) is not None:
+        return _number(each)
+    period = flow.get("period", "")
+    if period.startswith("exp("):
+        return _HOUR * _number(period[4:-1])
+    if period:
+        return _HOUR / _number(period) if _number(period) else 0.0
+    if "probability" in flow:
+        return _HOUR * _number(flow["probability"])
+    lasts = _number(flow.get("end", "0")) - _number(flow.get("begin", "0"))
+    return _HOUR * _number(flow.get("number", "0")) / lasts if lasts > 0 else 0.0
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+_MOST_NAMES = 10_000
 """Maximum number of ids that are kept to suggest the nearest."""
 
 _OPENING = frozenset(("include", "calibrator", "personTrip"))
@@ -31,8 +114,8 @@ class VehicleRoute:
 class Demand:
     """What route and additional files say about the wanted vehicles.
 
-    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `MOST_NAMES` ids in
-    file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
+    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `_MOST_NAMES` ids
+    in file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
     those that were not found.
     """
 
@@ -55,14 +138,12 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
     return read_demand(configured.files, wanted, reroutes=configured.reroutes)
 
 
-def read_demand(
-    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = _MOST_BYTES, *, reroutes: bool = False
-) -> Demand:
+def read_demand(files: Iterable[Path], wanted: Iterable[str], *, reroutes: bool = False) -> Demand:
     """Search for vehicles in additional and route files, in SUMO's order.
 
-    After `most_bytes` unpacked bytes the demand counts as open.
+    After `_MOST_BYTES` unpacked bytes the demand counts as open.
     """
-    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
+    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), _MOST_BYTES
     for file in files:
         reader.file = file
         try:
@@ -132,7 +213,7 @@ class _DemandReader:
     def _take(
         self, attributes: Mapping[str, str], names: tuple[str, ...], vehicles: Collection[str] | None = None
     ) -> None:
-        if len(self._names) < MOST_NAMES:
+        if len(self._names) < _MOST_NAMES:
             self._names += names
         here = tuple(v for v in (names if vehicles is None else vehicles) if v in self._wanted)
         self._found.update(here)

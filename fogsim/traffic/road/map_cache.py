@@ -9,9 +9,11 @@ import contextlib
 import functools
 import hashlib
 import io
+import itertools
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
@@ -21,16 +23,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.files.user_cache import cache_directory, keep_newest, read_entry, write_entry
-from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
+
+
+@dataclass(frozen=True, slots=True)
+class RoadMap:
+    """A SUMO network.
+
+    `edges` are ranges of lane indices, from the side that vehicles keep to. `drawn` (n,) marks lanes to draw, and
+    `between` (n,) lanes between junctions that are not only for pedestrians. `areas` are junctions. `location` is the
+    offset added to the source's coordinates [m] and their projection, as in the file.
+    """
+
+    edges: Mapping[str, range]
+    lanes: tuple[Lane, ...]
+    drawn: NDArray[np.bool_]
+    between: NDArray[np.bool_]
+    areas: tuple[PavedArea, ...]
+    limit_signs: tuple[Sign, ...]
+    signal_heads: tuple[SignalHead, ...]
+    location: tuple[str, str] | None
+
+    def middle_lane(self, edge: str) -> Lane:
+        """Middle lane of an edge; of two, the inner one."""
+        places = self.edges[edge]
+        return self.lanes[places[len(places) // 2]]
+
+    def speed_limit(self, edge: str) -> float:
+        """Highest speed limit of an edge's lanes [m/s]."""
+        return max(self.lanes[place].speed_limit for place in self.edges[edge])
+
+
+def edge_ranges(edges: Sequence[str], counts: Iterable[int]) -> dict[str, range]:
+    """Lane indices of each edge when lanes are listed edge by edge, from the number of lanes of each."""
+    ends = list(itertools.accumulate(counts, initial=0))
+    return {edge: range(*ends_of) for edge, ends_of in zip(edges, itertools.pairwise(ends), strict=True)}
+
 
 _WORTHWHILE = 1_000_000  # bytes of a network's file, above which reading takes a fifth of a second
 _MOST_FILES = 16  # of the cache; the oldest are removed
-_MADE_BY = ("limit_signs.py", "map_cache.py", "network.py", "road_map.py")
+_MADE_BY = ("map_cache.py", "network.py", "signs.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 
-Arrays = dict[str, NDArray[Any]]
+_Arrays = dict[str, NDArray[Any]]
 
 
 def is_worth_caching(net: Path) -> bool:
@@ -82,7 +118,7 @@ def _version() -> bytes:
     return hashlib.sha256(b"\0".join((*versions, *sources))).digest()
 
 
-def _arrays_of(roads: RoadMap) -> Arrays:
+def _arrays_of(roads: RoadMap) -> _Arrays:
     lanes, areas, signs, heads = roads.lanes, roads.areas, roads.limit_signs, roads.signal_heads
     return {
         "edges": _text(list(roads.edges)),
@@ -148,7 +184,7 @@ def _lane(name: tuple[str, str], line: NDArray[np.float64], sizes: Sequence[floa
     return Lane(*name, line, width, speed_limit, *markings, bool(outermost), _KINDS[kind], _ENDS[end])
 
 
-def _lines(name: str, lines: Sequence[NDArray[np.float64]]) -> Arrays:
+def _lines(name: str, lines: Sequence[NDArray[np.float64]]) -> _Arrays:
     points = np.concatenate([np.zeros((0, 3)), *lines])
     return {name: points, f"{name}_counts": np.array([len(line) for line in lines], np.int64)}
 

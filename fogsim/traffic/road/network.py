@@ -1,7 +1,9 @@
 """Roads of a SUMO network as plain geometry."""
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +16,86 @@ from fogsim.core.files.xml_reader import read_elements, root_tag
 from fogsim.core.garbage import no_garbage_collection
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
-from fogsim.traffic.road.limit_signs import limit_sign
-from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
-from fogsim.traffic.road.road_map import RoadMap, edge_ranges
+from fogsim.traffic.road.map_cache import RoadMap, cached_map, compacted, edge_ranges, is_worth_caching, keep_map
+from fogsim.traffic.road.signs import limit_sign
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, SignalHead, Structure
 from fogsim.values.light import SIGNAL_DIAMETER
+
+_MOST_LISTED_BYTES = 50_000_000
+"""Unpacked bytes of a network file after which reading stops."""
+
+_Point = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NetEdges:
+    """Edges for vehicles: number of lanes, middle lanes [m] of the wanted ones, and ids of traffic lights.
+
+    `gaps` are pairs of wanted edges that were to follow one another and have no lane from one to the next.
+    """
+
+    lanes: Mapping[str, int]
+    axes: Mapping[str, Sequence[_Point]]
+    signals: tuple[str, ...] = ()
+    gaps: Collection[tuple[str, str]] = ()
+
+    def route_length(self, route: Sequence[str]) -> float:
+        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end."""
+        points = [point for edge in route for point in self.axes[edge]]
+        return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
+
+
+def read_net_edges(
+    net: Path, wanted: Sequence[str], most_bytes: int = _MOST_LISTED_BYTES, *, must_follow: bool = False
+) -> NetEdges | None:
+    """Edges of a network, with axes of the wanted ones and gaps between them; None if too large or not a network."""
+    reader = _EdgeReader(wanted, set(itertools.pairwise(wanted)) if must_follow else set())
+    try:
+        size = read_elements(net, reader, most_bytes)
+    except InputError:
+        return None
+    if not reader.lanes or (size == most_bytes and not reader.has_edges):
+        return None
+    axes = {edge: shapes[len(shapes) // 2] for edge, shapes in reader.shapes.items() if shapes}
+    return NetEdges(reader.lanes, axes, tuple(reader.signals), reader.unlinked if size < most_bytes else ())
+
+
+class _EdgeReader:
+    """Counts lanes of edges, and finds which of the pairs `unlinked` no connection links."""
+
+    def __init__(self, wanted: Collection[str], unlinked: set[tuple[str, str]]) -> None:
+        self.is_done = self.has_edges = False
+        self.unlinked = unlinked
+        self.lanes: dict[str, int] = {}
+        self.shapes: dict[str, list[list[_Point]]] = {edge: [] for edge in wanted}
+        self.signals: dict[str, None] = {}
+        self._edge = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "edge":
+            is_road = attributes.get("function", "normal") in {"normal", "connector"}
+            self._edge = attributes.get("id", "") if is_road else ""
+        elif tag == "lane" and self._edge:
+            self.lanes[self._edge] = self.lanes.get(self._edge, 0) + 1
+            if self._edge in self.shapes:
+                self.shapes[self._edge].append(_points(attributes.get("shape", "")))
+        elif tag == "tlLogic":
+            self.signals[attributes.get("id", "")] = None
+        elif tag == "connection":
+            # All edges and programs of traffic lights come before the connections.
+            self.has_edges = True
+            self.unlinked.discard((attributes.get("from", ""), attributes.get("to", "")))
+            self.is_done = not self.unlinked
+
+    def end(self, tag: str) -> None:
+        pass
+
+
+def _points(shape: str) -> list[_Point]:
+    """Points of a shape [m]; those without a height are at 0."""
+    points = [tuple(map(float, point.split(","))) for point in shape.split()]
+    return [(*point, 0.0) if len(point) == 2 else point for point in points]
+
 
 LARGE_DIAMETER = 0.3
 """Diameter of the lenses above roads and next to fast ones [m]."""

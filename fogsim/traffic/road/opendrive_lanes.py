@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError
-from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
-from fogsim.traffic.road.plan_view import PlanView, plan_view
+from fogsim.traffic.road.opendrive import PlanView, is_opendrive, plan_view, read_opendrive
 
 _FARTHEST_ROUTE, _LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
 _ROUNDING = 0.01  # of places across a lane [m]
-NEAR_JUNCTION = 2.0
+_NEAR_JUNCTION = 2.0
 """Distance by which a place inside a junction is moved to its end [m]."""
 
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
@@ -28,7 +27,7 @@ _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
 
 
 @dataclass(frozen=True, slots=True)
-class RoadLane:
+class _RoadLane:
     """A lane by edge and index from the right: length, width [m], limit [m/s] and middle (n, 2) [m].
 
     `lowest` is the height of its lowest point [m]; `origins` are OpenDRIVE's ``road_lane``, several where they form one
@@ -49,7 +48,7 @@ class RoadLane:
 class Spot:
     """A place on a lane, by its distance from the start as SUMO counts it, and to the left of its middle [m]."""
 
-    lane: RoadLane
+    lane: _RoadLane
     position: float
     offset: float = 0.0
 
@@ -72,7 +71,7 @@ class Spot:
         return replace(self, offset=offset)
 
 
-class RoadWidths:
+class _RoadWidths:
     """Widths of all lanes of a road, for driving or not, along it."""
 
     def __init__(self, road: Element) -> None:
@@ -118,13 +117,13 @@ class OpenDriveLanes:
     junctions [m]; `roads` are reference lines; latitude and longitude [rad] are None if the file has none.
     """
 
-    lanes: tuple[RoadLane, ...]
+    lanes: tuple[_RoadLane, ...]
     followers: Mapping[str, Sequence[str]]
     roads: Mapping[str, PlanView]
     latitude: float | None
     longitude: float | None
     crossings: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    widths: Mapping[str, "RoadWidths"] = field(default_factory=dict)
+    widths: Mapping[str, "_RoadWidths"] = field(default_factory=dict)
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
         """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
@@ -164,7 +163,7 @@ class OpenDriveLanes:
         distance, spot = min((_foot(one, x, y) for one in self.lanes), key=lambda one: one[0])
         return spot if distance <= 0.5 * spot.lane.width + _ROUNDING else None
 
-    def foot(self, lane: RoadLane, x: float, y: float) -> Spot:
+    def foot(self, lane: _RoadLane, x: float, y: float) -> Spot:
         """Place in the middle of a lane that is nearest to a point [m]."""
         return _foot(lane, x, y)[1]
 
@@ -190,7 +189,7 @@ class OpenDriveLanes:
     def along(self, spot: Spot, distance: float, route: Sequence[str] = ()) -> Spot:
         """Place `distance` [m] farther along a route, or the road straight on, or back; ValueError if it ends before.
 
-        Junctions count, and no place is inside one but within `NEAR_JUNCTION` of its ends, where it is moved to.
+        Junctions count, and no place is inside one but within `_NEAR_JUNCTION` of its ends, where it is moved to.
         """
         lane, position = spot.lane, spot.position + distance
         for _ in range(len(self.lanes)):
@@ -201,13 +200,13 @@ class OpenDriveLanes:
             if beyond < crossing:
                 before, after = (lane, other) if position > lane.length else (other, lane)
                 left = beyond if position > lane.length else crossing - beyond
-                if min(left, crossing - left) > NEAR_JUNCTION:
+                if min(left, crossing - left) > _NEAR_JUNCTION:
                     raise ValueError(f"{distance:g} m from there is inside a junction, where no vehicle can begin")
                 return Spot(before, before.length) if 2.0 * left < crossing else Spot(after, 0.0)
             position, lane = (beyond - crossing if position > lane.length else other.length - beyond + crossing), other
         raise ValueError(f"{distance:g} m from there is not on the road any more")
 
-    def _neighbour(self, lane: RoadLane, ahead: bool, route: Sequence[str]) -> tuple[RoadLane, float]:
+    def _neighbour(self, lane: _RoadLane, ahead: bool, route: Sequence[str]) -> tuple[_RoadLane, float]:
         """The lane of the next edge, or the one before, and the length of the way across the junction between [m]."""
         edges = self.followers.get(lane.edge, ()) if ahead else [e for e, f in self.followers.items() if lane.edge in f]
         edge = next((one for one in edges if one in route), edges[0] if edges else "")
@@ -287,7 +286,7 @@ class OpenDriveLanes:
         return self.roads[road].at(s)
 
 
-def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
+def _foot(lane: _RoadLane, x: float, y: float) -> tuple[float, Spot]:
     """Distance of a point to a lane [m], and its nearest place on it."""
     starts, steps = lane.shape[:-1], np.diff(lane.shape, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -317,14 +316,14 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     for road in source.iter("road"):
         try:
             roads[road.get("id", "")] = plan_view(road.iterfind("planView/geometry"))
-            widths[road.get("id", "")] = RoadWidths(road)
+            widths[road.get("id", "")] = _RoadWidths(road)
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
     return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root), widths)
 
 
-def _lanes(root: Element) -> Iterator[RoadLane]:
+def _lanes(root: Element) -> Iterator[_RoadLane]:
     location = root.find("location")
     offset = "0,0" if location is None else location.get("netOffset", "0,0")
     moved = np.array([float(part) for part in offset.split(",")])
@@ -335,7 +334,7 @@ def _lanes(root: Element) -> Iterator[RoadLane]:
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
             points = [tuple(map(float, point.split(","))) for point in lane.attrib["shape"].split()]
             length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
-            yield RoadLane(
+            yield _RoadLane(
                 edge.attrib["id"],
                 int(lane.attrib["index"]),
                 length,

@@ -3,22 +3,78 @@
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import sumolib
 
 from fogsim.core.files.readers import FARTHEST, number_in_text
-from fogsim.traffic.road.limit_signs import SIGN_DIAMETER, SIGN_HEIGHT, SPEED_LIMIT
-from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
+from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.opendrive import FASTEST, is_opendrive, opendrive_signs
-from fogsim.traffic.road.road_map import RoadMap
+from fogsim.traffic.road.structures import MarkedShape, marked_shapes
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
+
+_SPEED_LIMIT = "speed_limit"
+"""Type of the signs."""
+_SIGN_CLEARANCE = 3.9
+"""Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
+_OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
+"""Alternative distances where the usual one is on another road; the first free one is used [m]."""
+_SIGN_HEIGHT = 2.6
+"""Height of the middle of a sign's face above the road [m]."""
+_SIGN_DIAMETER = 0.9
+"""Diameter of a round sign outside towns [m]; 0.75–0.9 m for speeds above 80 km/h (German VzKat size 3)."""
+
+
+def limit_sign(edge: Any, side: float) -> Sign | None:
+    """Sign at the start of an edge whose limit differs from that of every edge leading to it.
+
+    It stands on the side that vehicles keep to: left (1) or right (−1).
+    """
+    limit = edge.getSpeed()
+    if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
+        return None
+    lane = edge.getLanes()[0]
+    points = np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
+    ahead = points[np.linalg.norm(points[:, :2] - points[:1, :2], axis=1) > 0.01]
+    if not len(ahead):
+        return None  # A lane of zero length, as in some networks written by hand, has no direction to face.
+    along = ahead[0] - points[0]
+    heading = math.atan2(along[1], along[0])
+    # Ten metres into the edge, so that the sign is on the stretch that it applies to.
+    x, y, z = points[0] + along / math.hypot(*along) * min(10.0, 0.5 * lane.getLength())
+    places = [
+        (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
+        for left in (side * (lane.getWidth() / 2 + away) for away in (_SIGN_CLEARANCE, *_OTHER_CLEARANCES))
+    ]
+    # Another road may be next to it, where roads part or meet.
+    x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])
+    return Sign(
+        f"limit.{edge.getID()}",
+        _SPEED_LIMIT,
+        float(limit),
+        (x, y, float(z) + _SIGN_HEIGHT),
+        heading,
+        _SIGN_DIAMETER,
+    )
+
+
+def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:
+    """Whether a point is on no lane of the edges that meet this one."""
+    nodes = edge.getFromNode(), edge.getToNode()
+    edges = {other.getID(): other for node in nodes for other in (*node.getOutgoing(), *node.getIncoming())}
+    return all(
+        sumolib.geomhelper.distancePointToPolygon(place, lane.getShape()) > 0.5 * lane.getWidth() + 0.5
+        for other in edges.values()
+        for lane in other.getLanes()
+    )
+
 
 _SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
-_LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
+_LIMITS = frozenset((_SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Types whose value is a speed, in km/h in additional files."""
 _GANTRY_HEIGHT = 6.2
 """Height of the middle of a face above a lane [m]: vehicles up to 4.5 m pass below."""
@@ -26,7 +82,7 @@ _GANTRY_HEIGHT = 6.2
 _DIAMETERS, _HEIGHTS = (0.05, 20.0), (0.0, 50.0)
 """Sizes of signs, and heights of their middle above the road [m]."""
 
-LonLat = tuple[float, float]
+_LonLat = tuple[float, float]
 
 
 def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
@@ -40,7 +96,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
     return SignMap(tuple(signs))
 
 
-def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | None:
+def geographic_position(roads: RoadMap) -> Callable[[float, float], _LonLat] | None:
     """Conversion of a network's x, y [m] to longitude and latitude [deg]; None without projection or pyproj."""
     if roads.location is None:
         return None
@@ -52,7 +108,7 @@ def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | No
         return None
     x_offset, y_offset = _net_offset(roads)
 
-    def convert(x: float, y: float) -> LonLat:
+    def convert(x: float, y: float) -> _LonLat:
         longitude, latitude = projection(x - x_offset, y - y_offset, inverse=True)
         return float(longitude), float(latitude)
 
@@ -94,9 +150,9 @@ def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
         value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
     else:
         value = shape.parameter("value", -FARTHEST, FARTHEST, 0.0)
-    diameter = shape.parameter("diameter", *_DIAMETERS, SIGN_DIAMETER)
+    diameter = shape.parameter("diameter", *_DIAMETERS, _SIGN_DIAMETER)
     ground, over_lane = roads.below(x, y)
-    above = shape.parameter("height", *_HEIGHTS, _GANTRY_HEIGHT if over_lane else SIGN_HEIGHT)
+    above = shape.parameter("height", *_HEIGHTS, _GANTRY_HEIGHT if over_lane else _SIGN_HEIGHT)
     return Sign(shape.name, shape.kind, value, (x, y, ground + above), heading, diameter)
 
 

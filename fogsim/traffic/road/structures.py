@@ -1,14 +1,83 @@
 """Structures next to a road or over it: polygons of SUMO additional files."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from fogsim.errors import InputError, suggest
-from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
+from fogsim.core.files.readers import number_in_text
+from fogsim.core.files.xml_reader import XmlFile
+from fogsim.errors import InputError, shown, suggest
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.values import Structure, StructureKind
+
+_MOST_BYTES, _MOST_ELEMENTS = 2_000_000_000, 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class MarkedShape:
+    """A POI or polygon; `kind` is its type after the prefix, and `where` names it in messages."""
+
+    where: str
+    tag: str
+    kind: str
+    attributes: dict[str, str]
+    parameters: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Its id."""
+        return self.attributes.get("id", "")
+
+    def parameter(self, key: str, least: float, most: float, default: float | None = None) -> float:
+        """Number in a ``<param>``; InputError if missing without a default, or not from `least` to `most`."""
+        if default is not None and key not in self.parameters:
+            return default
+        if key not in self.parameters:
+            raise InputError(f'{self.where}: <param key="{key}" value="…"/> is missing')
+        return number_in_text(self.where, key, self.parameters[key], least, most)
+
+    def corners(self) -> list[list[float]]:
+        """Coordinates of its corners [m], two or three each; InputError if it has none."""
+        shape = self.attributes.get("shape", "")
+        corners = [
+            [number_in_text(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()
+        ]
+        if not corners or not all(2 <= len(corner) <= 3 for corner in corners):
+            raise InputError(f"{self.where}: expected a shape of corners x,y or x,y,z, got {shown(shape)}")
+        return corners
+
+
+def marked_shapes(path: Path, prefix: str) -> list[MarkedShape]:
+    """POIs and polygons of an additional file whose type begins with a prefix."""
+    reader = _ShapeReader(path, prefix)
+    reader.file.read_all(reader, _MOST_BYTES, _MOST_ELEMENTS)
+    return reader.found
+
+
+class _ShapeReader:
+    is_done = False
+
+    def __init__(self, path: Path, prefix: str) -> None:
+        self.file = XmlFile(path)
+        self.found: list[MarkedShape] = []
+        self._path = path
+        self._prefix = prefix
+        self._inside: MarkedShape | None = None
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag in {"poi", "poly"} and attributes.get("type", "").startswith(self._prefix):
+            where = f"{self._path}:{self.file.line}: {tag} {shown(attributes.get('id', ''))}"
+            self._inside = MarkedShape(where, tag, attributes["type"].removeprefix(self._prefix), attributes)
+            self.found.append(self._inside)
+        elif tag == "param" and self._inside is not None:
+            self._inside.parameters[attributes.get("key", "")] = attributes.get("value", "")
+
+    def end(self, tag: str) -> None:
+        if tag in {"poi", "poly"}:
+            self._inside = None
+
 
 STRUCTURE_TYPE = "fogsim.structure."
 """Polygons of type ``fogsim.structure.KIND`` in an additional file are structures; their shape is their middle line."""

@@ -23,7 +23,7 @@ _LEAST = 1e-6
 _Value = TypeVar("_Value")
 
 
-Rule = Callable[[float, Collection[float]], float]
+_Rule = Callable[[float, Collection[float]], float]
 """From a vehicle's own value and what sessions claim, which may be nothing, to the value that is in force."""
 
 
@@ -44,7 +44,7 @@ class Attribute:
     name: str  # Its name
     read: Callable[[Api, str], float]  # From SUMO's domain of vehicles and a vehicle's id to the value
     write: Callable[[Api, str, float], None]  # Sets a vehicle's value
-    rule: Rule = lowest  # Which value is in force where sessions claim some
+    rule: _Rule = lowest  # Which value is in force where sessions claim some
 
 
 TOP_SPEED = Attribute("maxSpeed", lambda get, v: float(get.getMaxSpeed(v)), lambda set_, v, x: set_.setMaxSpeed(v, x))

@@ -50,7 +50,7 @@ class LibsumoLink:
             )
         if self._outputs is not None:
             arguments = [*arguments, *self._outputs.open()]
-        with captured_stderr() as words:
+        with _captured_stderr() as words:
             try:
                 if self._sumo is None:
                     sumo.start(["sumo", *arguments])
@@ -105,7 +105,7 @@ class LibsumoLink:
 
 
 @contextlib.contextmanager
-def captured_stderr() -> Iterator[list[str]]:
+def _captured_stderr() -> Iterator[list[str]]:
     """Collect what native code writes to the process's stderr; the list is filled on leaving."""
     lines: list[str] = []
     open_standard_streams()

@@ -91,6 +91,27 @@ def is_off_lanes(api: Api, vehicle: str) -> bool:
     return not api.vehicle.getLaneID(vehicle)
 
 
+def edge_length(api: Api, edge: str) -> float:
+    """Length of an edge [m]."""
+    return float(api.lane.getLength(f"{edge}_0"))
+
+
+def inner_lanes(links: Getter, lane: str) -> Iterator[str]:
+    """A lane inside a junction and those there that follow it; `links` is SUMO's getter of a lane's links."""
+    while lane:
+        yield lane
+        lane = next((link[4] for link in links(lane)), "")
+
+
+def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
+    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
+    if is_off_lanes(api, vehicle):
+        return False
+    edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
+    # Lanes of a junction say nothing about those behind it, where SUMO makes the change.
+    return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))
+
+
 def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
     """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message."""
     simulation = api.simulation
@@ -108,3 +129,50 @@ def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
         return read
 
     return tuple(reader(name, variable) for name, variable in names.items())
+
+
+_VARIABLES = {
+    "getSpeed": 0x40,
+    "getPosition3D": 0x39,
+    "getAngle": 0x43,
+    "getSignals": 0x5B,
+    "getLaneID": 0x51,
+    "getLanePosition": 0x56,
+    "getLateralLanePosition": 0xB8,
+    "getLeader": 0x68,
+    "getNeighbors": 0xBF,
+}
+"""Getters, and their variables in SUMO's TraCI protocol."""
+
+
+def vehicle_getters(
+    api: Api, remote: bool, names: Sequence[str], arguments: Mapping[str, tuple[str, Any]] | None = None
+) -> tuple[Getter, ...]:
+    """Getters of the domain ``vehicle``, by subscription where every call is a message to another process."""
+    if not remote:
+        return tuple(vehicle_getter(api, name) for name in names)
+    numbers = {name: _VARIABLES[name] for name in names}
+    parameters = {numbers[name]: argument for name, argument in (arguments or {}).items()}
+    subscription = _Subscription(api, tuple(numbers.values()), parameters)
+    return tuple(subscription.getter(number) for number in numbers.values())
+
+
+class _Subscription:
+    """Variables of vehicles; each vehicle's are subscribed to when it is first asked for."""
+
+    def __init__(self, api: Api, variables: tuple[int, ...], parameters: Mapping[int, tuple[str, Any]]) -> None:
+        self._vehicles = api.vehicle
+        self._results = api.vehicle.getSubscriptionResults
+        self._variables = variables
+        self._parameters = parameters
+
+    def getter(self, variable: int) -> Getter:
+        def read(vehicle: str, *_: Any) -> Any:
+            results: Mapping[int, Any] = self._results(vehicle)
+            if variable not in results:
+                # SUMO adds them to what the user may have subscribed to.
+                self._vehicles.subscribe(vehicle, self._variables, parameters=self._parameters)
+                results = self._results(vehicle)
+            return results[variable]
+
+        return read

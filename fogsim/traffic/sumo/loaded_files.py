@@ -1,13 +1,21 @@
-"""What a running simulation says of itself."""
+"""What a running simulation reports about itself, and the roads and the ego's route in its files."""
 
 import difflib
 import math
 from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from fogsim.errors import SimulationError
-from fogsim.traffic.road.configuration import NO_LANES
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.road.configuration import NO_LANES, configured_files
+from fogsim.traffic.road.demand import read_configured_demand, read_demand
+from fogsim.traffic.road.map_cache import RoadMap
+from fogsim.traffic.road.network import read_net, road_network
+from fogsim.traffic.road.signs import sign_map
+from fogsim.traffic.road.structures import structures
+from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api
+from fogsim.values import RoadNetwork, SignMap, Structure
 
 CLOCK_TICK = 1e-3
 """Resolution of SUMO's clock [s]."""
@@ -74,3 +82,79 @@ def loaded_additional(api: Api) -> tuple[Path, ...]:
     """Additional files of a running simulation, as far as they are here to be read."""
     names = api.simulation.getOption("additional-files").split(",")
     return tuple(path for name in names if (path := Path(name.strip())).is_file())
+
+
+class _PlannedWay(NamedTuple):
+    """Where the ego drives."""
+
+    net: Path  # Network
+    additional: tuple[Path, ...]  # Files with what stands next to the road
+    edges: tuple[str, ...]  # Ids of the edges that the ego drives on
+
+
+def planned_way(setup: TrafficSetup) -> _PlannedWay | None:
+    """Look for the ego's way in the files; None where it is not written out in them."""
+    if setup.ego is None:
+        return None
+    if setup.config is None:
+        if setup.net is None:
+            return None
+        net, additional = setup.net, setup.additional
+        demand = read_demand((*setup.additional, *setup.routes), (setup.ego,))
+    elif setup.routes or setup.additional:
+        return None
+    else:
+        try:
+            net, additional = configured_files(setup.config)
+            demand = read_configured_demand(setup.config, (setup.ego,))
+        except InputError:
+            return None  # SUMO reports what is wrong with it
+        additional = tuple(path for path in additional if path.is_file())
+        if not net.is_file():
+            return None
+    way = demand.routes.get(setup.ego)
+    return None if way is None else _PlannedWay(net, additional, way.edges)
+
+
+class LoadedRoads:
+    """Roads, signs and what stands next to the roads, by files that are named or that a simulation has loaded."""
+
+    def __init__(self, net: Path | None, additional: tuple[Path, ...]) -> None:
+        self._file, self._additional = net, additional
+        self._net: RoadMap | None = None
+        self._structures: tuple[Structure, ...] | None = None
+        self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
+
+    def plan(self, setup: TrafficSetup) -> tuple[RoadNetwork, SignMap] | None:
+        """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
+        planned = planned_way(setup)
+        if planned is None:
+            return None
+        net = self._net = read_net(planned.net)
+        if not net.edges.keys() >= set(planned.edges):
+            return None
+        self._structures = structures(planned.additional)
+        roads = road_network(net, planned.edges, self._structures), sign_map(net, planned.additional)
+        self._planned = planned.edges, roads
+        return roads
+
+    def along(self, api: Api, route: tuple[str, ...]) -> tuple[RoadNetwork, SignMap]:
+        """Roads and signs along the ego's route in a simulation that runs."""
+        if self._planned is not None and self._planned[0] == route:
+            return self._planned[1]
+        net = self.net(api)
+        signs = sign_map(net, self._additional or loaded_additional(api))
+        return road_network(net, route, self.structures(api)), signs
+
+    def net(self, api: Api) -> RoadMap:
+        """The network."""
+        if self._net is None:
+            self._net = read_net(self._file or loaded_net(api))
+        return self._net
+
+    def structures(self, api: Api) -> tuple[Structure, ...]:
+        """What stands next to the roads."""
+        if self._structures is None:
+            files = self._additional or loaded_additional(api)
+            self._structures = structures(path for path in files if path.is_file())
+        return self._structures

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, UpdateSchedule
+from fogsim.traffic.sumo.roster import MAX_RELATIVE_ACCELERATION, Roster, UpdateSchedule
 
 _TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
@@ -96,18 +95,13 @@ class NearbyVehicles:
 
     def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
         """Those near; the others wait until they could have come near."""
-        now = self._roster.time
-        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), _MAX_WAIT).tolist()
+        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), _MAX_WAIT)
         near: list[str] = []
-        far: list[str] = []
-        for vehicle, wait in zip(vehicles, waits, strict=True):
-            if wait == _MAX_WAIT:
-                far.append(vehicle)
-            elif wait > 0.0:
-                self._far.add((vehicle,), now + wait)
-            else:
-                near.append(vehicle)
-        self._far.add(far, now + _MAX_WAIT)
+        if float(waits.min()) <= 0.0:
+            is_far = waits > 0.0
+            near = list(itertools.compress(vehicles, (~is_far).tolist()))
+            vehicles, waits = list(itertools.compress(vehicles, is_far.tolist())), waits[is_far]
+        self._far.add_each(vehicles, (self._roster.time + waits).tolist())
         return near
 
     def _max_rates(self, vehicles: Sequence[str]) -> NDArray[np.float64]:

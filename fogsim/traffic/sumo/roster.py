@@ -1,6 +1,12 @@
 """Which vehicles are on the road, without asking for all ids in every step."""
 
-from collections.abc import Collection, Sequence
+import itertools
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.traffic.sumo.claims import LoadMark
 from fogsim.traffic.sumo.link import Api, getter, subscribed
@@ -14,7 +20,7 @@ _GETTERS = {
 }
 """Getters, and their variables in SUMO's TraCI protocol."""
 
-CHECK_PERIOD = 1.0
+_CHECK_PERIOD = 1.0
 """Time after which the vehicles are counted [s], should somebody have removed one by hand."""
 
 
@@ -30,7 +36,7 @@ class Roster:
     remote : bool
         True where every call is a message to another process.
     mark : LoadMark or None
-        Checked at every step, or where that is a message, whenever all ids are read again and once a `CHECK_PERIOD`.
+        Checked at every step, or where that is a message, whenever all ids are read again and once a `_CHECK_PERIOD`.
 
     Attributes
     ----------
@@ -79,7 +85,7 @@ class Roster:
         self._leave(self.teleported)
         self._enter(self._returned())
         self._leave(self._arrived())
-        if now - self._checked >= CHECK_PERIOD:
+        if now - self._checked >= _CHECK_PERIOD:
             self._checked = now
             self._check_mark()
             self.check_count()
@@ -118,3 +124,129 @@ class Roster:
         """Vehicles that have entered since an earlier call, and the mark to give to the next call."""
         entered = self._entered
         return (entered[since:], len(entered)) if since < len(entered) else ([], since)
+
+
+MAX_RELATIVE_ACCELERATION = 20.0
+"""One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
+
+_BATCH_PERIOD = 0.5
+"""Vehicles that may wait this long are gathered with others in the steps of this period [s]: a batch costs less than
+many single vehicles."""
+
+_ROUNDING = 1e-6
+"""Share of a step by which clocks may differ from a whole number of steps [-]."""
+
+
+Speed = TypeVar("Speed", float, NDArray[np.float64])
+
+
+def closing_speed_bound(speed: Speed, leader_speed: Speed, horizon: float) -> Speed:
+    """How fast the gap between two vehicles, or each of many gaps, changes at most [m/s].
+
+    Takes `speed`, `leader_speed` (n,) [m/s], `horizon` [s].
+    """
+    return abs(leader_speed - speed) + 0.5 * MAX_RELATIVE_ACCELERATION * horizon
+
+
+class UpdateSchedule:
+    """Vehicles by the step in which each is due; only those due are ever touched (`step` [s], `now` [s])."""
+
+    def __init__(self, step: float, now: float) -> None:
+        self._step = step
+        self._batch = max(1, round(_BATCH_PERIOD / step))
+        self._current = self._number(now)
+        self._due: defaultdict[float, list[str]] = defaultdict(list)
+
+    def _number(self, time: float) -> float:
+        return (time / self._step + _ROUNDING) // 1.0
+
+    def unscheduled(self, vehicles: Sequence[str]) -> list[str]:
+        """Those of some vehicles that wait for no step, each once."""
+        # Seldom asked for any, so that keeping a set of all scheduled vehicles would cost more.
+        if not vehicles:
+            return []
+        scheduled = set(itertools.chain.from_iterable(self._due.values()))
+        return [v for v in dict.fromkeys(vehicles) if v not in scheduled]
+
+    def add(self, vehicles: Sequence[str], time: float) -> None:
+        """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
+        if vehicles:
+            self.add_each(vehicles, itertools.repeat(time, len(vehicles)))
+
+    def add_each(self, vehicles: Sequence[str], times: Iterable[float]) -> None:
+        """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
+        due, step, batch, current = self._due, self._step, self._batch, self._current
+        for vehicle, time in zip(vehicles, times, strict=True):
+            # As in `_number`, without a call for each vehicle.
+            number = (time / step + _ROUNDING) // 1.0
+            if number <= current:
+                number = current + 1
+            if number - current >= batch:
+                number -= number % batch
+            due[number].append(vehicle)
+
+    def bring_forward(self, vehicle: str) -> None:
+        """Make a vehicle that waits due in the next step; one that waits for nothing stays so."""
+        # Seldom asked for, so that keeping where each vehicle waits would cost more.
+        for waiting in self._due.values():
+            if vehicle in waiting:
+                waiting.remove(vehicle)
+                self._due[self._current + 1].append(vehicle)
+                return
+
+    def pop_due(self, now: float) -> list[str]:
+        """Take out the vehicles that are due (`now` [s])."""
+        number, last = self._number(now), self._current
+        self._current = number
+        if number - last == 1:
+            return self._due.pop(number, [])
+        passed = sorted(n for n in self._due if n <= number)
+        return [vehicle for n in passed for vehicle in self._due.pop(n)]
+
+    def clear(self) -> None:
+        """Forget all vehicles."""
+        self._due.clear()
+
+
+class Due(NamedTuple):
+    """Vehicles of one step."""
+
+    vehicles: Sequence[str]  # Those to be looked at; all are on the road
+    new: Sequence[str]  # Those that have entered the road since the last step, or come back to it, and are on it
+    gone: Sequence[str]  # Those that have left it, if they were due, and all new ones, whose ids others may have borne
+
+
+class DueVehicles:
+    """Schedules the vehicles of a roster; a new one is due at once (`step` [s])."""
+
+    def __init__(self, roster: Roster, step: float) -> None:
+        self._roster = roster
+        self._schedule = UpdateSchedule(step, roster.time)
+        self._mark = 0
+
+    def take(self) -> Due:
+        """Take out those that are due, by a roster that is up to date; who is to wait again is scheduled again."""
+        roster = self._roster
+        due = self._schedule.pop_due(roster.time)
+        entered, self._mark = roster.entered_since(self._mark)
+        if not entered and roster.present.issuperset(due):
+            return Due(due, (), ())
+        gone = [v for v in due if v not in roster.present]
+        due = [v for v in due if v in roster.present]
+        new = [v for v in entered if v in roster.present]
+        known = set(due)
+        due += [v for v in self._schedule.unscheduled(new) if v not in known]
+        return Due(due, new, gone + entered)
+
+    def schedule(self, vehicles: Sequence[str], pause: float) -> None:
+        """Schedule vehicles that have been taken out (`pause` [s])."""
+        self._schedule.add(vehicles, self._roster.time + pause)
+
+    def schedule_each(self, vehicles: Sequence[str], pauses: Iterable[float]) -> None:
+        """Schedule vehicles that have been taken out, each for a pause of its own (`pauses` [s])."""
+        now = self._roster.time
+        self._schedule.add_each(vehicles, [now + pause for pause in pauses])
+
+    def bring_forward(self, vehicle: str) -> None:
+        """Let a vehicle that waits be due in the next step."""
+        self._schedule.bring_forward(vehicle)

@@ -49,7 +49,7 @@ _MARGIN = 50.0
 """SUMO gathers vehicles by the lanes near the ego; this much more radius leaves none out [m]."""
 
 
-class DynamicState(NamedTuple):
+class _DynamicState(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
 
     A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
@@ -147,6 +147,7 @@ class VehicleReader:
         self._lane_limits = {"": math.inf}
         self._mark = 0
         self._constants: _Constants | None = None
+        self._free: tuple[tuple[str, ...], _Constants | None, NDArray[np.float64]] = (), None, np.zeros(0)
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
     def state(
@@ -183,17 +184,23 @@ class VehicleReader:
             lamps=lamps,
             paint=constants.paint,
             grade=np.radians(now.slope),
-            free_speed=np.minimum(self._limits(now.lane) * constants.speed_factor, constants.top_speed),
+            free_speed=self._free_speeds(now.lane, constants),
             advised_speed=advised_speeds(now.ids, heard or {}),
             off_lanes=off_lanes,
         )
 
-    def _limits(self, lanes: Sequence[str]) -> NDArray[np.float64]:
-        """Speed limits (n,) [m/s], as they were when the ego first came near: those of signs that change are advice."""
-        known = self._lane_limits
-        for lane in {*lanes}.difference(known):
-            known[lane] = float(self._lane_limit(lane))
-        return np.array([known[lane] for lane in lanes])
+    def _free_speeds(self, lanes: tuple[str, ...], constants: _Constants) -> NDArray[np.float64]:
+        """Speeds that drivers would drive by themselves (n,) [m/s].
+
+        Limits are as they were when the ego first came near: those of signs that change are advice.
+        """
+        if lanes != self._free[0] or constants is not self._free[1]:
+            known = self._lane_limits
+            for lane in {*lanes}.difference(known):
+                known[lane] = float(self._lane_limit(lane))
+            limits = np.array([known[lane] for lane in lanes]) * constants.speed_factor
+            self._free = lanes, constants, np.minimum(limits, constants.top_speed)
+        return self._free[2]
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
         """Lamps of all by their own signals; computed again when a signal has changed."""
@@ -212,14 +219,14 @@ class VehicleReader:
             )
         return self._constants
 
-    def _dynamic_state(self) -> DynamicState:
+    def _dynamic_state(self) -> _DynamicState:
         ids, position = self._nearby_vehicles.find()
         angle, speed, acceleration, signals, lane = self._getters
         # One array for all: for few vehicles making arrays costs more than asking.
         flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
         angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
         lanes, lit, slopes = tuple(map(lane, ids)), list(map(signals, ids)), self._slopes(ids, position[:, 2])
-        return DynamicState(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
+        return _DynamicState(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
 
     def _slopes(self, ids: Sequence[str], heights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Slopes (n,) [°], which are not asked for while all stay on the level."""
@@ -250,7 +257,7 @@ class VehicleReader:
         return math.hypot(hit.colliderSpeed - hit.victimSpeed * math.cos(turn), hit.victimSpeed * math.sin(turn))
 
 
-def _off_lanes(now: DynamicState) -> NDArray[np.bool_]:
+def _off_lanes(now: _DynamicState) -> NDArray[np.bool_]:
     """Who is off the lanes (n,); without the acceleration and slope that SUMO reports of these. Empty if none is."""
     if "" not in now.lane:
         return np.zeros(0, np.bool_)
@@ -270,7 +277,7 @@ class SubscribedReader(VehicleReader):
 
     _read: tuple[str, ...] = ()
 
-    def _dynamic_state(self) -> DynamicState:
+    def _dynamic_state(self) -> _DynamicState:
         if self._ego is None:
             return super()._dynamic_state()
         rows = self._surroundings()
@@ -279,7 +286,7 @@ class SubscribedReader(VehicleReader):
         position = np.array([rows[v][_POSITION_3D] for v in listed])
         near = self._is_near(listed, position)
         ids = self._read = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
-        return DynamicState(
+        return _DynamicState(
             ids=ids,
             position=position[near],
             angle=np.array([rows[v][_ANGLE] for v in ids]),

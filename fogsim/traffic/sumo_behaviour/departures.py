@@ -3,10 +3,10 @@
 import itertools
 from collections.abc import Collection, Sequence
 
-from fogsim.traffic.sumo.link import Api, is_off_lanes
+from fogsim.traffic.sumo.link import Api, edge_length, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
-from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+from fogsim.traffic.templates.placement import VEHICLE_KINDS
 from fogsim.values.script import Depart, Enter
 
 _UNLIMITED = 10.0
@@ -28,15 +28,15 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     edges, at = list(get.getRoute(like)), here.number
     while place < 0.0 and at > 0:
         at -= 1
-        place += _length(api, edges[at])
-    while at < len(edges) - 1 and place > _length(api, edges[at]):
-        place -= _length(api, edges[at])
+        place += edge_length(api, edges[at])
+    while at < len(edges) - 1 and place > edge_length(api, edges[at]):
+        place -= edge_length(api, edges[at])
         at += 1
     # Next to one that overtakes on the oncoming lane is the lane farthest to the left.
     leftmost = int(api.edge.getLaneNumber(edges[at])) - 1
     own = leftmost if LaneDirections(api).is_against(like, get.getLaneID(like)) else int(get.getLaneIndex(like))
     lane = own if action.lane is None else action.lane + _footways(api, edges[at])
-    if not 0.0 <= place <= _length(api, edges[at]) or lane > leftmost:
+    if not 0.0 <= place <= edge_length(api, edges[at]) or lane > leftmost:
         return False
     route = f"fogsim.{action.vehicle}.{api.simulation.getTime():g}"
     api.route.add(route, edges[at:])
@@ -114,7 +114,3 @@ def _type(api: Api, vehicle: str, name: str, steady: float | None = None) -> str
     ):
         setter(made, value)
     return made
-
-
-def _length(api: Api, edge: str) -> float:
-    return float(api.lane.getLength(f"{edge}_0"))

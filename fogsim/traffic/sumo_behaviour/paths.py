@@ -2,13 +2,49 @@
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogsim.traffic.sumo.link import Api, is_off_lanes
-from fogsim.traffic.sumo_behaviour.lane_offsets import Glide
 from fogsim.values.script import FollowPath
+
+
+@dataclass(frozen=True, slots=True)
+class _Glide:
+    """A move across the lane along half a wave of a cosine, from one offset to the left to another [m]."""
+
+    begun: float
+    duration: float
+    first: float
+    last: float
+
+    def offset(self, time: float) -> float:
+        """Offset at a time [m]."""
+        share = min((time - self.begun) / self.duration, 1.0) if self.duration > 0.0 else 1.0
+        return self.first + (0.5 - 0.5 * math.cos(math.pi * share)) * (self.last - self.first)
+
+
+class LaneOffsets:
+    """Moves vehicles within their lanes; SUMO keeps each where it is, also in the next lane."""
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        self._glides: dict[str, _Glide] = {}
+
+    def begin(self, vehicle: str, offset: float, duration: float, time: float) -> None:
+        """Begin a move to an offset to the left of the lane's middle [m]."""
+        now = 0.0 if is_off_lanes(self._api, vehicle) else float(self._api.vehicle.getLateralLanePosition(vehicle))
+        self._glides[vehicle] = _Glide(time, duration, now, offset)
+
+    def play(self, time: float, present: Collection[str]) -> None:
+        """Move those under way to where they are at a time [s]."""
+        for vehicle, glide in list(self._glides.items()):
+            if vehicle in present and not is_off_lanes(self._api, vehicle):
+                self._api.vehicle.setLateralLanePosition(vehicle, glide.offset(time))
+            if time >= glide.begun + glide.duration:
+                del self._glides[vehicle]
+
 
 _ANYWHERE = 2
 """SUMO's `keepRoute` for a vehicle that is exactly where it is put, on a lane or off the lanes."""
@@ -27,7 +63,7 @@ class _Path:
 
     def __init__(self, action: FollowPath, begun: float, speed: float) -> None:
         self.action, self.begun, self.speed, self.driven = action, begun, speed, 0.0
-        self.aside = Glide(begun, 0.0, 0.0, 0.0)
+        self.aside = _Glide(begun, 0.0, 0.0, 0.0)
         points = np.array(action.points, dtype=np.float64)
         self._points, steps = points[:, :2], np.diff(points[:, :2], axis=0)
         self._ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
@@ -152,7 +188,7 @@ class Paths:
     def shift(self, vehicle: str, aside: float, duration: float, time: float) -> None:
         """Let one move to the left of its path [m], along half a wave of a cosine."""
         path = self._paths[vehicle]
-        path.aside = Glide(time, duration, path.aside.offset(time), aside)
+        path.aside = _Glide(time, duration, path.aside.offset(time), aside)
 
     def leave(self, vehicle: str) -> None:
         """Forget one that leaves the road."""

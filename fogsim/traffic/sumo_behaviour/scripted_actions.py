@@ -1,23 +1,75 @@
 """Actions of a script in SUMO: imposed speeds, changes of lane, lamps, traffic lights and persons who walk."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api, is_off_lanes
+from fogsim.traffic.sumo.link import Api, has_lane
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
-from fogsim.traffic.sumo_behaviour.lane_offsets import LaneOffsets
-from fogsim.traffic.sumo_behaviour.paths import Paths
+from fogsim.traffic.sumo_behaviour.paths import LaneOffsets, Paths
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
+from fogsim.values import Lamp
+from fogsim.values.light import lamp_names
 from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TakeRoute, TrafficAction, Walk
 
+_NO_LANE_CHANGES = 0
 
-class SignalControl:
+
+class LaneKeeping:
+    """Keeps some vehicles in their lanes."""
+
+    def __init__(self, api: Api, vehicles: Iterable[str], roster: Roster, session: str) -> None:
+        self._wanted = frozenset(vehicles)
+        self._modes = Claims(api, LANE_CHANGE_MODE, session)
+        self._kept: set[str] = set()
+        self._roster = roster
+        # Vehicles that are there already keep the owner's lane changing.
+        _, self._mark = roster.entered_since(0)
+
+    def update(self) -> None:
+        """Forbid lane changes to vehicles that have entered the road."""
+        new, self._mark = self._roster.entered_since(self._mark)
+        for vehicle in self._wanted.intersection(new) if new else ():
+            self._modes.claim(vehicle, _NO_LANE_CHANGES)
+            self._kept.add(vehicle)
+
+    def release(self, present: Collection[str]) -> None:
+        """Let vehicles change lanes again as they did before."""
+        for vehicle in self._kept.intersection(present):
+            self._modes.withdraw(vehicle)
+        self._kept.clear()
+
+
+_LAMPS_PARAMETER = "fogsim-lamps"
+"""Parameter of a vehicle that names its lit lamps, joined by "+"."""
+
+
+class LampPublisher:
+    """Publishes changes of vehicles' lamps to SUMO, for sumo-gui's parameter window, outputs and other clients.
+
+    A parameter says it and not SUMO's own signals of the vehicle: who sets those takes braking and turning out of
+    SUMO's hands, so that its stop lamps would stay dark.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        self._published: dict[str, Lamp] = {}
+
+    def publish(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
+        """Publish the lamps that have changed."""
+        for vehicle, lit in lamps.items():
+            if lit != self._published.get(vehicle) and vehicle in present:
+                self._api.vehicle.setParameter(vehicle, _LAMPS_PARAMETER, lamp_names(lit))
+                self._published[vehicle] = lit
+
+
+class _SignalControl:
     """Sets traffic lights; remembers which, to give them back."""
 
     def __init__(self, api: Api) -> None:
@@ -98,10 +150,11 @@ class ScriptedActions:
         self._speeds = speeds
         self._playing = Playing(lamps)
         self._lane_changes = lane_changes
-        self._signals = SignalControl(api)
+        self._signals = _SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
         self._offsets = LaneOffsets(api)
         self._paths = Paths(api)
+        self._directions = LaneDirections(api)
         self._changing: dict[str, float] = {}
         self._oncoming: set[str] = set()
 
@@ -170,7 +223,7 @@ class ScriptedActions:
             signed = GapToEgo(self._api, leader).measure(follower)
             return None if signed is None or signed > 0.0 else -signed
 
-        return Motion(time, self._step, present, LaneDirections(self._api).driven, vehicle.getSpeed, gap)
+        return Motion(time, self._step, present, self._directions.driven, vehicle.getSpeed, gap)
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Go on with what has begun, for the next step (`time` [s])."""
@@ -227,12 +280,3 @@ class ScriptedActions:
         for vehicle in self._changing.keys() & set(present):
             self._modes.withdraw(vehicle)
         self._changing.clear()
-
-
-def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
-    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
-    if is_off_lanes(api, vehicle):
-        return False
-    edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
-    # Lanes of a junction say nothing about those behind it, where SUMO makes the change.
-    return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))

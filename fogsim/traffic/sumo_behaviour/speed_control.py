@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from fogsim.core.kinematics import decelerated_speed
 from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, advised_by_name, heard_since
-from fogsim.traffic.drivers.compliance import Compliance
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.following import FollowingModel
-from fogsim.traffic.drivers.leader_reach import LeaderReach, drivers_visibility, leader_reach
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess, LeaderReach, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
     SPEED_CHOICES,
+    Compliance,
     DriverSetup,
     speed_by_compliance,
     speed_share,
@@ -27,17 +26,15 @@ from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
-from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
-from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
-from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
-from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
+from fogsim.traffic.sumo_behaviour.headways import HeadwayControl, KeepingUp
+from fogsim.traffic.sumo_behaviour.top_speeds import SpeedShareControl, TopSpeedControl
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Display
 
 
-class FogChoices:
+class _FogChoices:
     """Writes into the table what drivers choose."""
 
     def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
@@ -201,6 +198,10 @@ class SumoDesiredSpeeds:
         self._api = api
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
+        self._allowed_speed, self._top_speed = (
+            vehicle_getter(api, "getAllowedSpeed"),
+            vehicle_getter(api, "getMaxSpeed"),
+        )
         self._step = float(api.simulation.getDeltaT())
         self._compliance = {display: setup.drivers.compliance_with(display) for display in Display}
         self._fog = fog
@@ -208,7 +209,7 @@ class SumoDesiredSpeeds:
         self._ego = setup.ego
         self._roster = roster
         table = self._table = DriverTable(api, setup.drivers, seed, session)
-        self._choices = FogChoices(table, setup.drivers, setup.sight)
+        self._choices = _FogChoices(table, setup.drivers, setup.sight)
         self._keeping_up = KeepingUp(api, table, setup.sight, remote)
         self._headways = HeadwayControl(api, table, setup.drivers.misjudgement, setup.sight)
         self._top_speeds = TopSpeedControl(api, table, table.top_speeds, setup.advice_deceleration, roster.time)
@@ -292,7 +293,7 @@ class SumoDesiredSpeeds:
         keepers = self._keeping_up.keepers(rows)
         if len(keepers):
             kept = self._keeping_up.kept_speeds([ids[i] for i in keepers], rows[keepers])
-            in_clear_air = [self._allowed(ids[i]) for i in keepers] / values[keepers, Column.SHARE_SET]
+            in_clear_air = self._all_allowed([ids[i] for i in keepers]) / values[keepers, Column.SHARE_SET]
             desired[keepers] = np.maximum(desired[keepers], np.minimum(kept, values[keepers, Column.TOP_SPEED]))
             shares[keepers] = np.maximum(shares[keepers], np.minimum(kept / in_clear_air, 1.0))
         own = desired.copy()
@@ -340,17 +341,22 @@ class SumoDesiredSpeeds:
         visibility = float(self._table.values[row, Column.VISIBILITY])
         return speed_by_compliance(compliance, min(own, self._allowed(vehicle)), advised, visibility)
 
+    def _all_allowed(self, ids: Sequence[str]) -> NDArray[np.float64]:
+        """What the road allows drivers (n,) [m/s]; see `_allowed`."""
+        both = zip(ids, map(self._allowed_speed, ids), map(self._top_speed, ids), strict=True)
+        return np.array([allowed if UNKNOWN < allowed < top else self._allowed(v) for v, allowed, top in both])
+
     def _allowed(self, vehicle: str) -> float:
         """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given.
 
         Off the lanes it is ``inf``.
         """
-        get = self._api.vehicle
-        allowed = float(get.getAllowedSpeed(vehicle))
+        allowed = float(self._allowed_speed(vehicle))
         if allowed == UNKNOWN:
             return math.inf
-        if allowed < get.getMaxSpeed(vehicle):
+        if allowed < self._top_speed(vehicle):
             return allowed
+        get = self._api.vehicle
         # The top speed is the lower one, and SUMO gives only that.
         return float(self._api.lane.getMaxSpeed(get.getLaneID(vehicle)) * get.getSpeedFactor(vehicle))
 

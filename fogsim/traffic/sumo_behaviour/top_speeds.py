@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from fogsim.core.kinematics import decelerated_speed
 from fogsim.traffic.sumo.claims import Claims
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 
 _UNNOTICED_SPEED = 0.3
 """Change of a desired speed [m/s] that is not noticed; setting it costs calls."""
 
-MAX_INTERVAL = 1.0
+_MAX_INTERVAL = 1.0
 """However long ago the last update was, a top speed falls by no more than it does in this time [s]."""
 
 
@@ -65,7 +65,7 @@ class TopSpeedControl:
 
     def update(self, time: float, present: Collection[str]) -> None:
         """Lower further the top speeds that are being lowered (`time` [s])."""
-        passed, self._updated_at = min(max(time - self._updated_at, 0.0), MAX_INTERVAL), time
+        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
         for vehicle, row in list(self._falling.items()) if self._falling else ():
             if vehicle not in present:
                 del self._falling[vehicle]
@@ -92,3 +92,83 @@ class TopSpeedControl:
         for i in np.flatnonzero(self._table.values[rows, Column.SPEED_SET] != own).tolist():
             self._set(vehicles[i], int(rows[i]), float(own[i]))
         self._table.values[rows, Column.SPEED_DESIRED] = own
+
+
+_UNNOTICED_SHARE = 0.01
+"""Change of a share [-] that is not noticed; setting it costs calls."""
+
+_SLOWEST = 1.0
+
+
+class SpeedShareControl:
+    """Sets shares, and lowers them gradually (`deceleration` [m/s²], `now` [s])."""
+
+    def __init__(self, api: Api, table: DriverTable, deceleration: float, now: float) -> None:
+        self._vehicles = api.vehicle
+        self._speed = vehicle_getter(api, "getSpeed")
+        self._allowed = vehicle_getter(api, "getAllowedSpeed")
+        self._table = table
+        self._deceleration = deceleration
+        self._updated_at = now
+        self._falling: dict[str, tuple[int, float]] = {}
+
+    def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
+        """Set the shares that drivers want (`rows` (n,) int, `desired` (n,))."""
+        table = self._table
+        for i in np.flatnonzero(_is_noticed(desired, table.values[rows, Column.SHARE_DESIRED])).tolist():
+            vehicle, row, share = vehicles[i], int(rows[i]), float(desired[i])
+            table.values[row, Column.SHARE_DESIRED] = share
+            if share >= table.values[row, Column.SHARE_SET]:
+                self._falling.pop(vehicle, None)
+                self._set(vehicle, row, share)
+            else:
+                in_clear_air = max(float(self._allowed(vehicle)) / table.values[row, Column.SHARE_SET], _SLOWEST)
+                # What is left between the speed and the wanted one need not be braked away.
+                start = min(float(table.values[row, Column.SHARE_SET]), float(self._speed(vehicle)) / in_clear_air)
+                table.values[row, Column.SHARE_SET] = max(start, share)
+                self._falling[vehicle] = (row, self._deceleration / in_clear_air)
+
+    def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
+        """Let vehicles that have just departed drive no faster than the share that their drivers want."""
+        for i in np.flatnonzero(_is_noticed(desired, np.ones(len(desired)))).tolist():
+            vehicle, row = vehicles[i], int(rows[i])
+            self._table.values[row, Column.SHARE_DESIRED] = desired[i]
+            self._set(vehicle, row, float(desired[i]))
+            allowed = float(self._allowed(vehicle))
+            if UNKNOWN < allowed < self._speed(vehicle):
+                # It has not braked for that: its acceleration is 0.
+                self._vehicles.setPreviousSpeed(vehicle, allowed, 0.0)
+
+    def update(self, time: float, present: Collection[str]) -> None:
+        """Lower further the shares that are being lowered (`time` [s])."""
+        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
+        for vehicle, (row, rate) in list(self._falling.items()) if self._falling else ():
+            if vehicle not in present:
+                del self._falling[vehicle]
+                continue
+            desired = float(self._table.values[row, Column.SHARE_DESIRED])
+            share = max(float(self._table.values[row, Column.SHARE_SET]) - rate * passed, desired)
+            self._set(vehicle, row, share)
+            if share <= desired:
+                del self._falling[vehicle]
+
+    def _set(self, vehicle: str, row: int, share: float) -> None:
+        table = self._table
+        if share < 1.0:
+            table.speed_factors.claim(vehicle, share * float(table.values[row, Column.SPEED_FACTOR]))
+        else:
+            table.speed_factors.withdraw(vehicle)
+        table.values[row, Column.SHARE_SET] = share
+
+    def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
+        """Give vehicles their own speed factors back (`rows` (n,) int)."""
+        self._falling.clear()
+        for i in np.flatnonzero(self._table.values[rows, Column.SHARE_DESIRED] != 1.0).tolist():
+            self._set(vehicles[i], int(rows[i]), 1.0)
+        self._table.values[rows, Column.SHARE_DESIRED] = 1.0
+
+
+def _is_noticed(desired: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether shares differ; whoever is to be as in clear air is, to the last digit."""
+    noticed: NDArray[np.bool_] = (np.abs(desired - known) > _UNNOTICED_SHARE) | ((desired == 1.0) & (known != 1.0))
+    return noticed

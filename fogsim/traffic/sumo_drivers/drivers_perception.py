@@ -1,27 +1,21 @@
 """All that SUMO's drivers perceive only as far as it can be seen, through fog and past what stands next to roads."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.playing import Lamps
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
-from fogsim.traffic.sumo_drivers.junctions.junction_sight import JunctionSight
-from fogsim.traffic.sumo_drivers.junctions.pedestrian_sight import PedestrianSight
-from fogsim.traffic.sumo_drivers.junctions.signal_sight import SignalSight
+from fogsim.traffic.sumo_drivers.junction_sight import JunctionFoes, JunctionSight
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
+from fogsim.traffic.sumo_drivers.pedestrian_sight import PedestrianSight
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.signal_sight import SignalSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
 
 
-class PerceivedPart(Protocol):
+class _PerceivedPart(Protocol):
     """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
 
     def update(self, own_lamps: OwnLamps) -> None:
@@ -34,11 +28,20 @@ class PerceivedPart(Protocol):
 class DriversPerception:
     """Updates and releases the parts in turn."""
 
-    def __init__(self, parts: Sequence[PerceivedPart]) -> None:
-        self._parts = tuple(parts)
+    def __init__(self, view: DriversView, net: Path | None = None) -> None:
+        self._roster = view.roster
+        leaders, sight = Perception(view), VehicleSight(view)
+        self._parts: tuple[_PerceivedPart, ...] = (
+            leaders,
+            LaneChanging(view, leaders, sight),
+            JunctionSight(view, JunctionFoes(view.api, net), sight),
+            SignalSight(view),
+            PedestrianSight(view),
+        )
 
     def update(self, lamps_of: Mapping[str, Lamp], lamps: Lamps) -> None:
         """Pass to SUMO's drivers, before a step, what they do not see."""
+        self._roster.update()
         own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in lamps_of.items()}
         own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:
@@ -48,27 +51,3 @@ class DriversPerception:
         """Let everyone on the road see everything again."""
         for part in self._parts:
             part.release()
-
-
-def drivers_perception(
-    api: Api,
-    fog: FogAccess,
-    sight: DriverSight,
-    roster: Roster,
-    remote: bool,
-    session: str,
-    net: Path | None = None,
-    obstructions: Obstructions = CLEAR_SIGHT,
-) -> DriversPerception:
-    """All parts."""
-    leaders = Perception(api, fog, sight, roster, remote, session, obstructions)
-    vehicle_sight = VehicleSight(api, fog, sight, remote, obstructions)
-    return DriversPerception(
-        (
-            leaders,
-            LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session),
-            JunctionSight(api, fog, sight, roster, JunctionFoes(api, net), vehicle_sight, remote, session),
-            SignalSight(api, fog, sight, roster, session, obstructions),
-            PedestrianSight(api, fog, sight, roster, session, obstructions),
-        )
-    )

@@ -11,14 +11,14 @@ SUMO's lane-change models look through any fog. Here, for the drivers for whom t
   on the right is forbidden (``lcOvertakeRight``).
 - No one makes room for somebody who is out of sight (``lcCooperative``, ``lcCooperativeSpeed``).
 
-Drivers look each `LOOK_PERIOD`; who has no one unseen about is not touched.
+Drivers look each `_LOOK_PERIOD`; who has no one unseen about is not touched.
 """
 
 import contextlib
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import (
     COOPERATIVE,
     COOPERATIVE_SPEED,
@@ -28,14 +28,15 @@ from fogsim.traffic.sumo.claims import (
     STRATEGIC,
     Claims,
 )
-from fogsim.traffic.sumo.due_vehicles import DueVehicles
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch, refusal_of
+from fogsim.traffic.sumo.roster import DueVehicles
 from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, Neighbours, NeighbourSight, WantedChange
 from fogsim.traffic.sumo_drivers.perception import REACH, Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.unseen import LaneChangeSwitch, refusal_of
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
+
+_LOOK_PERIOD = 0.5
+"""Time between two looks of a driver [s]."""
 
 _THRESHOLD = 0.2
 """Sum of relative gains at which the wish begins, over the driver's eagerness [s]."""
@@ -63,14 +64,13 @@ def _safe_speed(gap: float, leader_speed: float, deceleration: float, headway: f
     return math.sqrt(delay**2 + leader_speed**2 + 2.0 * deceleration * max(gap, 0.0)) - delay
 
 
-class OvertakingWishes:
-    """Adds up what drivers gain in a lane to the left that looks free to them (`period` [s])."""
+class _OvertakingWishes:
+    """Adds up what drivers gain in a lane to the left that looks free to them."""
 
-    def __init__(self, api: Api, leaders: Perception, period: float) -> None:
+    def __init__(self, api: Api, leaders: Perception) -> None:
         self._vehicles = api.vehicle
         self._leader, self._speed = leaders.leader, leaders.speed
         self._refusal = refusal_of(api)
-        self._period = period
         self._gains: dict[str, float] = {}
 
     def update(self, drivers: Iterable[str]) -> list[str]:
@@ -82,9 +82,9 @@ class OvertakingWishes:
                 # There is nothing to add up before the first look; who has just entered knows of no neighbours yet.
                 kept = 0.0
             elif gain > 0.0:
-                kept = before[driver] + gain * self._period
+                kept = before[driver] + gain * _LOOK_PERIOD
             else:
-                kept = before[driver] * _FORGOTTEN**self._period
+                kept = before[driver] * _FORGOTTEN**_LOOK_PERIOD
             self._gains[driver] = kept
         return [driver for driver, gain in self._gains.items() if self._is_wish(driver, gain)]
 
@@ -114,9 +114,6 @@ class OvertakingWishes:
         return bool(offset == 0 and length > _SHORTEST_STAY * float(self._speed(driver)))
 
 
-LOOK_PERIOD = 0.5
-"""Time between two looks of a driver [s]."""
-
 _CERTAIN_PERIOD = 1.0
 """Who has somebody in sight for certain ahead in the lane to the left, or no one, looks there again after this [s]."""
 
@@ -137,7 +134,7 @@ _RESPECT = 0x300
 _NO_OVERLAP = 0x100
 
 
-class StandingLeaders:
+class _StandingLeaders:
     """Keeps drivers in their lanes behind leaders that stand out of sight."""
 
     def __init__(self, api: Api, leaders: Perception, session: str) -> None:
@@ -147,22 +144,19 @@ class StandingLeaders:
 
     def update(self, drivers: Sequence[str], present: set[str]) -> None:
         """Decide again for some drivers."""
+        hidden, speed = self._leaders.hidden, self._leaders.speed
         # A hidden leader may have left since the driver's last look ahead.
-        behind = [(v, leader) for v in drivers if (leader := self._leaders.hidden.get(v)) in present]
-        self._strategic.decide(drivers, [v for v, leader in behind if leader and self._would_be_left_for(v, leader)])
+        behind = [(v, hidden[v]) for v in drivers if v in hidden and hidden[v] in present]
+        soon_standing = [pair for pair in behind if speed(pair[1]) < _SOON_STANDING]
+        self._strategic.decide(drivers, [pair[0] for pair in soon_standing if self._would_be_left_for(*pair)])
 
     def expect_unseen(self, driver: str, leader: str) -> None:
         """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there."""
-        if self._may_soon_stand(leader):
+        if self._leaders.speed(leader) < _SOON_STANDING:
             self._strategic.turn_on(driver)
 
-    def _may_soon_stand(self, vehicle: str) -> bool:
-        return float(self._leaders.speed(vehicle)) < _SOON_STANDING
-
     def _would_be_left_for(self, driver: str, hidden: str) -> bool:
-        """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
-        if not self._may_soon_stand(hidden):
-            return False
+        """Whether a hidden leader is so near that SUMO's driver would leave a lane that leads on."""
         leader, gap = self._leaders.leader(driver, REACH) or ("", 0.0)
         if leader != hidden or gap > _STANDING_REACH:
             return False
@@ -179,7 +173,7 @@ class StandingLeaders:
         self._strategic.release(present)
 
 
-class RequestedChanges:
+class _RequestedChanges:
     """Changes of lane that are asked of SUMO, each for one step; in the sublane model for as long as a change takes."""
 
     def __init__(self, api: Api, session: str) -> None:
@@ -215,33 +209,22 @@ class RequestedChanges:
 class LaneChanging:
     """What drivers perceive of the neighbouring lanes, and of leaders that stand; a part of their perception."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        leaders: Perception,
-        vehicle_sight: VehicleSight,
-        remote: bool,
-        session: str,
-    ) -> None:
-        self._roster = roster
+    def __init__(self, view: DriversView, leaders: Perception, vehicle_sight: VehicleSight) -> None:
+        api, session, self._roster = view.api, view.session, view.roster
         self._leaders = leaders
-        self._vehicle_sight = vehicle_sight
         self._certainly_seen = max(vehicle_sight.certainly_seen, NEAR)
-        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
-        self._neighbours = Neighbours(api, REACH, remote)
-        self._sight = NeighbourSight(vehicle_sight, sight.reaction_time)
-        self._wishes = OvertakingWishes(api, leaders, LOOK_PERIOD)
-        self._requests = RequestedChanges(api, session)
-        self._standing = StandingLeaders(api, leaders, session)
+        self._certainly_hidden = view.sight.hidden_distance(view.fog.minimum_extinction)
+        self._neighbours = Neighbours(view)
+        self._sight = NeighbourSight(vehicle_sight, view.sight.reaction_time)
+        self._wishes = _OvertakingWishes(api, leaders)
+        self._requests = _RequestedChanges(api, session)
+        self._standing = _StandingLeaders(api, leaders, session)
         self._overtake_right = LaneChangeSwitch(api, OVERTAKE_RIGHT, -_ALWAYS, session)
         self._unhelpful = tuple(
             LaneChangeSwitch(api, attribute, value, session)
             for attribute, value in ((COOPERATIVE, _NEVER), (COOPERATIVE_SPEED, 0.0))
         )
-        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._due = DueVehicles(view.roster, float(api.simulation.getDeltaT()))
         self._certain_until: dict[str, float] = {}
 
     def update(self, own_lamps: OwnLamps) -> None:
@@ -251,7 +234,7 @@ class LaneChanging:
         due, _, gone = self._due.take()
         self._requests.end(self._roster.present, self._roster.time)
         self._restart(gone)
-        self._due.schedule(due, LOOK_PERIOD)
+        self._due.schedule(due, _LOOK_PERIOD)
         if due:
             self._standing.update(due, self._roster.present)
             free_to_their_eyes = self._free_to_the_left(due, own_lamps)
@@ -263,7 +246,6 @@ class LaneChanging:
     def _restart(self, drivers: Sequence[str]) -> None:
         """Forget drivers that have left, and whom those who have entered may be taken for."""
         if drivers:
-            self._vehicle_sight.forget(drivers)
             for driver in drivers:
                 self._certain_until.pop(driver, None)
             self._standing.restart(drivers, self._roster.present)
@@ -274,29 +256,26 @@ class LaneChanging:
         """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
-        left_leader, speed, sure = self._neighbours.left_leader, self._leaders.speed, self._certainly_seen
-        soon, later = self._roster.time + 0.5 * LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
+        speed, sure = self._leaders.speed, self._certainly_seen
+        soon, later = self._roster.time + 0.5 * _LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
         certain_until = self._certain_until
-        for driver in drivers:
-            if certain_until.get(driver, 0.0) > soon:
-                continue
-            ahead = left_leader(driver)
-            if ahead is None or ahead[1] <= sure:
+        until = map(certain_until.get, drivers, itertools.repeat(0.0))
+        looking = [driver for driver, certain in zip(drivers, until, strict=True) if certain <= soon]
+        for driver, (leader, gap) in zip(looking, self._neighbours.left_leaders(looking), strict=True):
+            if gap <= sure or gap > REACH:
                 certain_until[driver] = later
+            elif speed(leader) > speed(driver) + _MUCH_FASTER:
                 continue
-            if speed(ahead[0]) > speed(driver) + _MUCH_FASTER:
-                continue
-            if ahead[1] > self._certainly_hidden:
+            elif gap > self._certainly_hidden:
                 unseen[driver] = None
             else:
-                doubtful.append((driver, ahead[0]))
+                doubtful.append((driver, leader))
         perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
         return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}
 
     def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
         """Let those change lanes who are blocked by no one whom they perceive, and whom no one helps whom they see."""
-        wanted = self._neighbours.wanted_changes(drivers, wishes)
-        doubtful = [change for change in wanted if not self._is_held_back_for_certain(change)]
+        doubtful = self._neighbours.wanted_changes(drivers, wishes, self._is_held_back_for_certain)
         ahead = [self._neighbours.ahead(change) for change in doubtful]
         pairs = [pair for change, leader in zip(doubtful, ahead, strict=True) for pair in _sights(change, leader)]
         perceived = self._sight.perceive(pairs, own_lamps, self._roster.time)
@@ -310,12 +289,12 @@ class LaneChanging:
         for switch in self._unhelpful:
             switch.decide(drivers, unhelpful)
 
-    def _is_held_back_for_certain(self, change: WantedChange) -> bool:
-        """Whether a vehicle in the way is near enough to be seen in any case."""
-        return any(
-            gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(change.driver, other))
-            for other, gap in change.blockers
-        )
+    def _is_held_back_for_certain(self, driver: str, others: Iterable[tuple[str, float]]) -> bool:
+        """Whether one of those in a driver's way is near enough to be seen in any case."""
+        for other, gap in others:
+            if gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(driver, other)):
+                return True
+        return False
 
     def _change(self, change: WantedChange, leader: str | None, perceived: Mapping[tuple[str, str], bool]) -> None:
         if not self._requests.ask(change.driver, change.side.offset, self._roster.time):

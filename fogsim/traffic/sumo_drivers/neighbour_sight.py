@@ -1,12 +1,14 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
-from collections.abc import Iterable, Sequence
+import itertools
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo.link import vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 
 NEAR = 5.0
 """A vehicle next to, or with less gap than this along the road, is seen in any fog [m]."""
@@ -17,22 +19,28 @@ _TRACI, _URGENT = 128, 256
 _LEADERS, _BLOCKING = 2, 4
 _LEFT_LEADERS = _LEADERS
 
+_NO_ONE = "", math.inf
 
-@dataclass(frozen=True, slots=True)
-class Side:
+
+_Others = tuple[tuple[str, float], ...]
+"""Vehicles in another lane, and the gaps to them [m]."""
+
+
+class _Side(NamedTuple):
     """One side of a vehicle, in SUMO's numbers."""
 
     offset: int  # From the vehicle's lane to the neighbouring one
-    # wanted, leader, follower: bits of the lane-change state: the driver wants to go there, is blocked there by a
-    # vehicle ahead, or behind
+    # wanted, leader, follower, blocked: bits of the lane-change state: the driver wants to go there, is blocked there
+    # by a vehicle ahead, or behind, or by any
     wanted: int
     leader: int
     follower: int
+    blocked: int
     neighbours: int  # What to ask for its followers by
 
 
-LEFT = Side(1, 2, 512, 1024, 0)
-RIGHT = Side(-1, 4, 2048, 4096, 1)
+_LEFT = _Side(1, 2, 512, 1024, 512 | 1024, 0)
+_RIGHT = _Side(-1, 4, 2048, 4096, 2048 | 4096, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,52 +48,66 @@ class WantedChange:
     """A change of lane that a driver wants."""
 
     driver: str  # Id of the vehicle
-    side: Side  # Where to
+    side: _Side  # Where to
     is_urgent: bool  # True if the route needs it, for which drivers ask others to make room
-    # leaders, followers (str, float): vehicles that are in the way in the other lane, and the gaps to them [m]
-    leaders: tuple[tuple[str, float], ...]
-    followers: tuple[tuple[str, float], ...]
+    # leaders, followers: who is in the way in the other lane
+    leaders: _Others
+    followers: _Others
 
     @property
-    def blockers(self) -> tuple[tuple[str, float], ...]:
+    def blockers(self) -> _Others:
         """All vehicles that are in the way, and the gaps to them [m]."""
         return self.leaders + self.followers
 
 
 class Neighbours:
-    """Asks SUMO for neighbours and for changes that are blocked (`reach` [m])."""
+    """Asks SUMO for neighbours and for changes that are blocked."""
 
-    def __init__(self, api: Api, reach: float, remote: bool) -> None:
+    def __init__(self, view: DriversView) -> None:
         names = ("getSignals", "getNeighbors")
-        self._signals, self._left_leaders = vehicle_getters(api, remote, names, {"getNeighbors": ("b", _LEFT_LEADERS)})
-        self._neighbours = vehicle_getter(api, "getNeighbors")
-        self._state = vehicle_getter(api, "getLaneChangeState")
-        self._reach = reach
-
-    def left_leader(self, vehicle: str) -> tuple[str, float] | None:
-        """Next vehicle ahead in the lane to the left, and the gap to it [m]; None if there is none within reach."""
-        found = self._left_leaders(vehicle, _LEFT_LEADERS)
-        if not found:
-            return None
-        nearest = _nearest(found)
-        return nearest if nearest[1] <= self._reach else None
-
-    def wanted_changes(self, vehicles: Iterable[str], wishing: Iterable[str]) -> list[WantedChange]:
-        """Changes that drivers want by their own model and that others block, and some more to the left."""
-        # Who wants to change lanes blinks.
-        blinking = [v for v in vehicles if self._signals(v) & _BLINKERS]
-        states = ((v, side, int(self._state(v, side.offset)[1])) for v in blinking for side in (LEFT, RIGHT))
-        wanted = [self._change(*change) for change in states if _is_blocked(*change[1:])]
-        there = {change.driver for change in wanted}
-        more = ((v, LEFT, int(self._state(v, LEFT.offset)[1])) for v in wishing if v not in there)
-        return wanted + [self._change(*change) for change in more if not change[2] & _TRACI]
-
-    def _change(self, vehicle: str, side: Side, state: int) -> WantedChange:
-        leaders, followers = (
-            tuple(self._neighbours(vehicle, side.neighbours | mode)) if state & bit else ()
-            for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING))
+        self._signals, self._left_leaders = vehicle_getters(
+            view.api, view.remote, names, {"getNeighbors": ("b", _LEFT_LEADERS)}
         )
-        return WantedChange(vehicle, side, bool(state & _URGENT), leaders, followers)
+        self._neighbours = vehicle_getter(view.api, "getNeighbors")
+        self._state = vehicle_getter(view.api, "getLaneChangeState")
+
+    def left_leaders(self, vehicles: Iterable[str]) -> Iterator[tuple[str, float]]:
+        """Next vehicle ahead of each in the lane to the left, and the gap to it [m]; ``inf`` if there is none."""
+        for found in map(self._left_leaders, vehicles, itertools.repeat(_LEFT_LEADERS)):
+            yield (found[0] if len(found) == 1 else _nearest(found)) if found else _NO_ONE
+
+    def wanted_changes(
+        self, vehicles: Sequence[str], wishing: Iterable[str], is_held_back: Callable[[str, _Others], bool]
+    ) -> list[WantedChange]:
+        """Changes that drivers want by their own model and that others block, and some more to the left.
+
+        Those are left out in which a driver is held back for certain by some of the others.
+        """
+        wanted: dict[tuple[str, _Side], int] = {}
+        for vehicle, signals in zip(vehicles, map(self._signals, vehicles), strict=True):
+            # Who wants to change lanes blinks.
+            for side in (_LEFT, _RIGHT) if signals & _BLINKERS else ():
+                state = int(self._state(vehicle, side.offset)[1])
+                # Another vehicle blocks what the driver's own model wants.
+                if state & side.wanted and state & side.blocked and not state & _TRACI:
+                    wanted[vehicle, side] = state
+        there = {vehicle for vehicle, _ in wanted}
+        for vehicle in wishing:
+            if vehicle not in there and not (state := int(self._state(vehicle, _LEFT.offset)[1])) & _TRACI:
+                wanted[vehicle, _LEFT] = state
+        changes = (self._change(*which, state, is_held_back) for which, state in wanted.items())
+        return [change for change in changes if change is not None]
+
+    def _change(
+        self, vehicle: str, side: _Side, state: int, is_held_back: Callable[[str, _Others], bool]
+    ) -> WantedChange | None:
+        blockers: list[_Others] = []
+        for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING)):
+            others = tuple(self._neighbours(vehicle, side.neighbours | mode)) if state & bit else ()
+            if others and is_held_back(vehicle, others):
+                return None
+            blockers.append(others)
+        return WantedChange(vehicle, side, bool(state & _URGENT), *blockers)
 
     def ahead(self, change: WantedChange) -> str | None:
         """Next vehicle ahead in the other lane, in the way or not."""
@@ -93,13 +115,8 @@ class Neighbours:
         return str(_nearest(found)[0]) if found else None
 
 
-def _nearest(neighbours: Sequence[tuple[str, float]]) -> tuple[str, float]:
-    return neighbours[0] if len(neighbours) == 1 else min(neighbours, key=lambda neighbour: neighbour[1])
-
-
-def _is_blocked(side: Side, state: int) -> bool:
-    """Whether a state says that another vehicle blocks what the driver's own model wants."""
-    return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & _TRACI
+def _nearest(neighbours: Iterable[tuple[str, float]]) -> tuple[str, float]:
+    return min(neighbours, key=operator.itemgetter(1))
 
 
 class NeighbourSight:

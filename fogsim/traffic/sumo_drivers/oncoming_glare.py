@@ -6,12 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn
-from fogsim.traffic.drivers.own_beams import uses_high_beam
-from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn, uses_high_beam
+from fogsim.traffic.sumo.link import getter, vehicle_getter
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import disability_glare
@@ -47,15 +44,13 @@ def most_glare(illuminance: float) -> float:
 class OncomingGlare:
     """Computes the veil that oncoming head lamps lay over drivers' eyes."""
 
-    def __init__(self, api: Api, fog: FogAccess, vehicles: SeenVehicles, remote: bool = False) -> None:
-        self._fog = fog
-        self._vehicles = vehicles
-        self._farthest = min(_FARTHEST_SOURCE, _DEEPEST_SOURCE / max(fog.minimum_extinction, 1e-6))
+    def __init__(self, view: DriversView) -> None:
+        api, self._fog, self._vehicles, self._extinction = view.api, view.fog, view.vehicles, view.extinction
+        self._farthest = min(_FARTHEST_SOURCE, _DEEPEST_SOURCE / max(view.fog.minimum_extinction, 1e-6))
         self._opposite, self._directions = OppositeEdges(api), LaneDirections(api)
-        self._lane = vehicle_getter(api, "getLaneID")
-        self._road = vehicle_getter(api, "getRoadID")
+        self._lane, self._road = vehicle_getter(api, "getLaneID"), vehicle_getter(api, "getRoadID")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
-        self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
+        self._position, self._angle = view.getters("getPosition3D", "getAngle")
 
     def veil(self, observer: str, target: str, own_lamps: OwnLamps) -> float:
         """Veil inside an observer's eyes who looks at a target [cd/m²], at most `MOST_GLARE`."""
@@ -74,7 +69,7 @@ class OncomingGlare:
     def _veil_in_mirrors(self, observer: str, dazzling: Sequence[str], own_lamps: OwnLamps) -> float:
         """Veil of high beams that follow an observer on the same road [cd/m²]."""
         x, y, z = self._position(observer)
-        eyes, heading = (x, y, z + self._vehicles.eye_height(observer)), math.radians(90.0 - self._angle(observer))
+        eyes, heading = (x, y, z + self._vehicles.body(observer).eye_height), math.radians(90.0 - self._angle(observer))
         total = 0.0
         for vehicle in dazzling:
             if vehicle not in self._on_edge(self._road(observer)):
@@ -93,7 +88,7 @@ class OncomingGlare:
 
     def _veil_of(self, observer: str, target: str, oncoming: Sequence[str], own_lamps: OwnLamps) -> float:
         x, y, z = self._position(observer)
-        height = self._vehicles.eye_height(observer)
+        height = self._vehicles.body(observer).eye_height
         target_x, target_y, _ = self._position(target)
         looking = math.atan2(target_y - y, target_x - x)
         ends: list[_Point] = []
@@ -119,6 +114,6 @@ class OncomingGlare:
         return min(float(disability_glare(dimmed, angles).sum()), MOST_GLARE)
 
     def _optical_depths(self, eyes: _Point, ends: Sequence[_Point]) -> NDArray[np.float64]:
-        if self._fog.minimum_extinction == self._fog.maximum_extinction:
-            return self._fog.maximum_extinction * np.array([math.dist(eyes, end) for end in ends])
+        if self._extinction is not None:
+            return self._extinction * np.array([math.dist(eyes, end) for end in ends])
         return self._fog.optical_depth([eyes] * len(ends), ends)

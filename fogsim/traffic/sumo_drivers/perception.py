@@ -2,7 +2,7 @@
 
 SUMO's own car-following models get the leader to ignore (``carFollowModel.ignoreIDs``), and only when that changes; so
 Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road. Lane changing is changed with
-it; see `IgnoredLeaders`.
+it; see `_IgnoredLeaders`.
 
 Sight is computed only in steps in which what a driver sees could have changed. Between two computations a gap changes
 at most by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a
@@ -12,24 +12,157 @@ is new (one of the two has changed lane, or somebody came within `REACH`) is not
 looked for in each step.
 """
 
+import functools
 import itertools
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from types import MappingProxyType
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
-from fogsim.traffic.appearance import TRAINS
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
-from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
-from fogsim.traffic.sumo_drivers.oncoming_glare import most_glare
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.appearance import OTHERS_LAMPS, TRAINS, lamps_from_signals
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST as BRIGHTEST_LAMP
+from fogsim.traffic.drivers.lamp_intensity import high_beam_veil, rear_intensity, uses_high_beam
+from fogsim.traffic.drivers.sight_kernels import (
+    BRIGHTEST,
+    CONTRAST,
+    DAZZLED,
+    DEPTH,
+    DISTANCE,
+    EYE_HEIGHT,
+    INTENSITY,
+    MINIMUM_GAP,
+    OWN,
+    OWN_STEADY,
+    SEEN,
+    SPEED,
+    STEADY,
+    Closing,
+    Z,
+    face_leaders,
+)
+from fogsim.traffic.sumo.claims import SPEED_GAIN, SessionValues
+from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo.roster import DueVehicles, closing_speed_bound
+from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
+from fogsim.traffic.sumo_drivers.unseen import LaneChangeSwitch
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.leaders import Leaders
+from fogsim.values import Lamp
+
+_LEAST_EXTINCTION = 1e-6
+"""Below this, fog hides nothing that matters [1/m]."""
+
+_FASTEST_DRIFT = 30.0
+"""Fog drifts and changes no faster than if a wind of this speed carried it [m/s]."""
+
+_STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
+"""Of the rear lamps that other drivers always light [cd]."""
+
+_Pair = tuple[str, str, float]
+"""Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
+
+
+class LeaderSight:
+    """Computes sight along the fog between drivers and the vehicles ahead of them (`speed` [m/s], `horizon` [s])."""
+
+    def __init__(self, view: DriversView, speed: Getter, horizon: float) -> None:
+        self._speed, self._horizon = speed, horizon
+        self._fog, self._sight, self._vehicles, self._extinction = view.fog, view.sight, view.vehicles, view.extinction
+        self._position = vehicle_getter(view.api, "getPosition3D")
+        (self._signals,) = view.getters("getSignals")
+        self._glare = OncomingGlare(view)
+        self._most_glare = most_glare(view.sight.illuminance)
+        is_even, most = view.extinction is not None, view.fog.maximum_extinction
+        densest, change = max(most, _LEAST_EXTINCTION) if is_even else most, closing_speed_bound(0.0, 0.0, horizon)
+        self._closing = Closing(change, _FASTEST_DRIFT, densest, is_even)
+
+    def assess(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> tuple[list[bool], list[float]]:
+        """Whether each leader is seen, and for how long that is sure to stay so [s]."""
+        facing = self._facing(pairs)
+        if own_lamps:
+            self._add_own_lamps(facing, pairs, own_lamps)
+        judged, pauses = self._sight.judge_leaders(facing, self._most_glare, self._horizon)
+        if own_lamps and self._most_glare > 0.0:
+            self._doubt_own_beams(judged, pauses, pairs, own_lamps)
+        seen: list[bool] = (judged == SEEN).tolist()
+        for i in np.flatnonzero(judged == DAZZLED).tolist() if self._most_glare > 0.0 else ():
+            seen[i] = self._is_seen(pairs[i], facing[:, i], own_lamps)
+        return seen, pauses.tolist()
+
+    def _facing(self, pairs: Sequence[_Pair]) -> NDArray[np.float64]:
+        """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
+        followers, leaders, gaps = zip(*pairs, strict=True)
+        both = followers + leaders
+        # Mostly who leads one follows another.
+        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
+        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
+        facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
+        face_leaders(
+            self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), self._closing, facing, lines
+        )
+        known = self._extinction
+        facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
+        facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
+        facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
+        return facing
+
+    def _read(self, vehicles: Collection[str]) -> NDArray[np.float64]:
+        """What is known of vehicles (n, 7), where they are and how fast first."""
+        read = np.empty((len(vehicles), EYE_HEIGHT + 1))
+        flat = itertools.chain.from_iterable(map(self._position, vehicles))
+        read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+        read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
+        read[:, MINIMUM_GAP:] = self._vehicles.traits(vehicles)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
+        return read
+
+    @staticmethod
+    def _doubt_own_beams(
+        judged: NDArray[np.float64], pauses: NDArray[np.float64], pairs: Sequence[_Pair], own_lamps: OwnLamps
+    ) -> None:
+        """Look again, one by one, for drivers with high beams, which veil the fog; and soon, for those who may have."""
+        for i, (follower, _, _) in enumerate(pairs):
+            if follower in own_lamps:
+                pauses[i] = 0.0
+                if uses_high_beam(own_lamps[follower]):
+                    judged[i] = DAZZLED
+
+    def _add_own_lamps(self, facing: NDArray[np.float64], pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
+        for i, (follower, leader, _) in enumerate(pairs):
+            if leader in own_lamps:
+                facing[INTENSITY, i] = rear_intensity(self._vehicles.lamps(leader, own_lamps))
+                # Lamps that are commanded may be commanded otherwise in any step.
+                facing[STEADY, i], facing[BRIGHTEST, i] = 0.0, BRIGHTEST_LAMP
+            if follower in own_lamps:
+                facing[OWN_STEADY, i] = 0.0
+                facing[OWN, i] = self._vehicles.head_lamps(follower, own_lamps)
+
+    def _is_seen(self, pair: _Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
+        """Whether a leader is seen who is unless glare hides it, which costs more than all the rest to know."""
+        follower, leader, _ = pair
+        glare = self._glare.veil(follower, leader, own_lamps)
+        if uses_high_beam(own_lamps.get(follower, 0)):
+            glare += high_beam_veil(self._extinction_at(follower))
+        elif glare == 0.0:
+            # Without glare the kernel has looked already.
+            return True
+        distance, contrast, intensity, own = facing[[DISTANCE, CONTRAST, INTENSITY, OWN]].tolist()
+        return bool(facing[DEPTH] <= self._sight.depth_limit(distance, contrast, intensity, own, glare))
+
+    def _extinction_at(self, vehicle: str) -> float:
+        """Extinction coefficient where a vehicle is [1/m]."""
+        if self._extinction is not None:
+            return self._extinction
+        x, y, z = self._position(vehicle)
+        return float(self._fog.extinction((x, y, z + self._vehicles.body(vehicle).eye_height)))
+
+
+@functools.lru_cache(maxsize=1024)
+def _rear_light(signals: int) -> tuple[float, float]:
+    """Luminous intensity of the brightest rear lamp that SUMO's signals light, and that may soon be lit [cd]."""
+    lit = int(OTHERS_LAMPS) | lamps_from_signals(signals)
+    return rear_intensity(lit), rear_intensity(lit | int(Lamp.STOP))
+
 
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
@@ -48,7 +181,7 @@ _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
 
 
-class IgnoredLeaders:
+class _IgnoredLeaders:
     """Makes drivers ignore the vehicle ahead, and not leave the lane because of it.
 
     SUMO's lane changing takes no notice of `_IGNORED`: it would avoid a slow leader that its driver cannot see. To a
@@ -84,23 +217,6 @@ class IgnoredLeaders:
 class Perception:
     """Decides in each step which leaders are seen.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster or None
-        Who is on the road; None for one of its own.
-    remote : bool
-        True where every call is a message to another process: leaders and speeds are subscribed to.
-    session : str
-        Name of the session.
-    obstructions : Obstructions
-        What stands next to the roads.
-
     Attributes
     ----------
     leader, speed : Getter
@@ -109,26 +225,16 @@ class Perception:
         Leaders that are not reacted to, by follower, as they are at any time.
     """
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster | None = None,
-        remote: bool = False,
-        session: str = SOLE_SESSION,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
-        self._ignored_leaders = IgnoredLeaders(api, session)
-        self.leader = Leaders(api, remote).within(REACH)
-        (self.speed,) = vehicle_getters(api, remote, ("getSpeed",))
-        self._roster = Roster(api) if roster is None else roster
+    def __init__(self, view: DriversView) -> None:
+        api, fog, sight, self._roster = view.api, view.fog, view.sight, view.roster
+        self._view, self._hidden_vehicles = view, view.hidden_vehicles
+        self._ignored_leaders = _IgnoredLeaders(api, view.session)
+        self.leader = Leaders(api, view.remote).within(REACH)
+        (self.speed,) = view.getters("getSpeed")
         self._reaction_time = sight.reaction_time
-        self._leader_sight = LeaderSight(api, fog, sight, self.speed, remote)
-        self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._leader_sight = LeaderSight(view, self.speed, MAX_PAUSE)
+        self._due = DueVehicles(self._roster, float(api.simulation.getDeltaT()))
         self._vehicle_class = api.vehicle.getVehicleClass
-        self._mark = 0
         self._ignored: dict[str, str] = {}
         self.hidden = MappingProxyType(self._ignored)
         self._emerging: dict[str, tuple[str, float]] = {}
@@ -141,78 +247,60 @@ class Perception:
         margin = _FASTEST_APPROACH * MAX_PAUSE
         self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
-    @property
-    def ignored(self) -> dict[str, str]:
-        """Leaders that are not reacted to, by follower."""
-        return dict(self._ignored)
-
     def expect_unseen(self, follower: str, leader: str) -> None:
         """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step."""
         self._hide(follower, leader)
-        self._schedule.bring_forward(follower)
+        self._due.bring_forward(follower)
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore a leader that they do not see."""
-        due = self._due()
+        due, new, gone = self._due.take()
+        if gone:
+            self._view.vehicles.forget(gone)
+            for follower in gone:
+                self._ignored.pop(follower, None)
+                self._emerging.pop(follower, None)
+            # A vehicle that comes back from a teleport still ignores its leader.
+            for follower in new:
+                self._ignored_leaders.stop_ignoring(follower)
+            trains = {v for v in new if self._vehicle_class(v) in TRAINS}
+            due = [v for v in due if v not in trains]
         doubtful = self._decide_by_gap(due) if due else ()
         if doubtful:
             self._decide_by_sight(doubtful, own_lamps)
 
-    def _due(self) -> list[str]:
-        roster, schedule = self._roster, self._schedule
-        roster.update()
-        due = schedule.pop_due(roster.time)
-        if not roster.present.issuperset(due):
-            self._forget(v for v in due if v not in roster.present)
-            due = [v for v in due if v in roster.present]
-        new, self._mark = roster.entered_since(self._mark)
-        self._forget(new)
-        self._leader_sight.forget(new)
-        if self._hidden_vehicles is not None:
-            self._hidden_vehicles.forget(new)
-        # A vehicle that comes back from a teleport still ignores its leader.
-        for follower in roster.present.intersection(new) if new else ():
-            self._ignored_leaders.stop_ignoring(follower)
-        if not new:
-            return due
-        unscheduled = [v for v in schedule.unscheduled(new) if v in roster.present and v not in due]
-        return due + [v for v in unscheduled if self._vehicle_class(v) not in TRAINS]
-
-    def _forget(self, vehicles: Iterable[str]) -> None:
-        for follower in vehicles:
-            self._ignored.pop(follower, None)
-            self._emerging.pop(follower, None)
-
-    def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
+    def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
         ignored, emerging = self._ignored, self._emerging
         # Most vehicles are far from any doubt, and pause for the longest time.
         certain: list[str] = []
-        doubtful: list[Pair] = []
+        near_edge: list[_Pair] = []
+        doubtful: list[_Pair] = []
         ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
         obstructed = self._obstructed(due, ahead)
         for follower, (leader, gap) in zip(due, ahead, strict=True):
             if follower in obstructed:
                 self._hide(follower, leader)
-                self._pause((follower,), 0.0)
+                near_edge.append((follower, leader, 0.0))
                 continue
             if not leader:
                 if follower in ignored:
                     self._reveal(follower)
             elif gap > self._certainly_hidden:
-                if ignored.get(follower) != leader or follower in emerging:
+                if follower not in ignored or ignored[follower] != leader or follower in emerging:
                     self._hide(follower, leader)
                 if gap <= self._hidden_for_long:
-                    self._pause_near_edge(follower, leader, gap - self._certainly_hidden)
+                    near_edge.append((follower, leader, gap - self._certainly_hidden))
                     continue
             elif gap > self._certainly_seen or follower in ignored:
                 doubtful.append((follower, leader, gap))
                 continue
             elif gap > self._seen_for_long:
-                self._pause_near_edge(follower, leader, self._certainly_seen - gap)
+                near_edge.append((follower, leader, self._certainly_seen - gap))
                 continue
             certain.append(follower)
-        self._pause(certain, MAX_PAUSE)
+        self._pause_near_edge(near_edge)
+        self._due.schedule(certain, MAX_PAUSE)
         return doubtful
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
@@ -223,26 +311,27 @@ class Perception:
         hidden = self._hidden_vehicles.are_hidden(pairs)
         return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
-    def _pause_near_edge(self, follower: str, leader: str, distance: float) -> None:
-        """Leave a follower alone until the gap could have changed by a distance [m]."""
-        closing = closing_speed_bound(float(self.speed(follower)), float(self.speed(leader)), MAX_PAUSE)
-        self._pause((follower,), min(distance / closing, MAX_PAUSE))
+    def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
+        """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
+        if waiting:
+            followers, leaders, distances = zip(*waiting, strict=True)
+            flat = map(self.speed, followers + leaders)
+            speed = np.fromiter(flat, np.float64, 2 * len(waiting)).reshape(2, -1)
+            pauses = np.minimum(distances / closing_speed_bound(speed[0], speed[1], MAX_PAUSE), MAX_PAUSE)
+            self._due.schedule_each(followers, pauses.tolist())
 
-    def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
-        assessed = self._leader_sight.assess(pairs, own_lamps, MAX_PAUSE)
-        now, ignored, emerging = self._roster.time, self._ignored, self._emerging
-        due: list[float] = []
-        for (follower, leader, _), (is_seen, pause) in zip(pairs, assessed, strict=True):
+    def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
+        seen, pauses = self._leader_sight.assess(pairs, own_lamps)
+        ignored, emerging = self._ignored, self._emerging
+        waits: list[float] = []
+        for (follower, leader, _), is_seen, pause in zip(pairs, seen, pauses, strict=True):
             if not is_seen:
-                if follower in emerging or ignored.get(follower) != leader:
+                if follower in emerging or follower not in ignored or ignored[follower] != leader:
                     self._hide(follower, leader)
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-            due.append(now if follower in emerging else now + pause)
-        self._schedule.add_each([follower for follower, _, _ in pairs], due)
-
-    def _pause(self, followers: Sequence[str], pause: float) -> None:
-        self._schedule.add(followers, self._roster.time + pause)
+            waits.append(0.0 if follower in emerging else pause)
+        self._due.schedule_each([follower for follower, _, _ in pairs], waits)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

@@ -1,40 +1,187 @@
 """Whether one vehicle's driver sees another vehicle, wherever it is and whichever side it shows."""
 
+import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
-from fogsim.traffic.drivers.lamp_intensity import head_lamp_share, intensity_toward
-from fogsim.traffic.drivers.own_beams import high_beam_veil, uses_high_beam
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
-from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, Part
+from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, eye_height, lamps_from_signals, paint
+from fogsim.traffic.drivers.lamp_intensity import (
+    head_lamp_light,
+    head_lamp_share,
+    high_beam_veil,
+    intensity_toward,
+    uses_high_beam,
+)
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
+from fogsim.traffic.drivers.sight_kernels import AHEAD, ASIDE, BEARING, END, EYES, LINE, draw_lines_of_sight
+from fogsim.traffic.sumo.claims import SOLE_SESSION
+from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, Part
+from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
 
-NEAREST = 0.1
-"""Distances are at least this [m]."""
-
-FARTHEST = 2000.0
-"""No one is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
+OwnLamps = dict[str, int]
+"""Lamps, as `TrafficState.lamps` has them, of vehicles whose lamps are not SUMO's; with the sides that have failed."""
 
 _Point = tuple[float, float, float]
 
+_NO_THIRD_STOP_LAMP = frozenset({"truck", "motorcycle"})
+"""Body kinds without a stop lamp in the middle next to two others."""
 
-class LineOfSight(NamedTuple):
-    """The straight line from a driver's eyes to the nearest part of another vehicle."""
+_CORNERS = np.array(list(itertools.product((-1.0, 0.0), (-0.5, 0.5), (0.5, 1.0))))
+"""From the middle of the front bumper ahead, to the left and up, in lengths, widths and heights."""
 
-    # eyes, end: where it begins and ends [m]
-    eyes: _Point
-    end: _Point
-    distance: float  # Its length [m]
-    bearing: float  # Its horizontal angle from straight ahead [rad]
-    # ahead, aside: where the eyes are, from the middle of the other's front bumper: ahead of it and to its left [m]
-    ahead: float
-    aside: float
+
+class _SeenBody(NamedTuple):
+    """A vehicle's body, and how its driver sits in it."""
+
+    minimum_gap: float  # The driver's [m]
+    contrast: float  # To the airlight without fog between, 0 … 1
+    eye_height: float  # Of the driver's eyes above the road [m]
+    # length, width, height: [m]
+    length: float
+    width: float
+    height: float
+    missing: int  # Bits of sides on which there is no lamp
+
+
+class _SeenVehicles:
+    """Bodies, each read once, and lit lamps of vehicles."""
+
+    def __init__(self, api: Api, remote: bool, airlight_share: float) -> None:
+        self._airlight_share = airlight_share
+        (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
+        names = ("getColor", "getMinGap", "getLength", "getWidth", "getHeight", "getVehicleClass", "getShapeClass")
+        self._getters = tuple(vehicle_getter(api, name) for name in names)
+        self._bodies: dict[str, _SeenBody] = {}
+        self._rows: dict[str, int] = {}
+        self._traits = np.empty((64, len(_SeenBody._fields)))
+
+    def forget(self, vehicles: Iterable[str]) -> None:
+        """Forget vehicles whose ids others may bear now."""
+        for vehicle in vehicles:
+            self._bodies.pop(vehicle, None)
+
+    def body(self, vehicle: str) -> _SeenBody:
+        """Body of a vehicle."""
+        return self._bodies.get(vehicle) or self._read(vehicle)
+
+    def traits(self, vehicles: Collection[str]) -> NDArray[np.float64]:
+        """Bodies of vehicles (n, 7), in the order of the fields of `_SeenBody`."""
+        rows = self._rows
+        if not self._bodies.keys() >= set(vehicles):
+            for vehicle in vehicles:
+                self.body(vehicle)
+        return self._traits[[rows[vehicle] for vehicle in vehicles]]
+
+    def _read(self, vehicle: str) -> _SeenBody:
+        colour, gap, length, width, height, vehicle_class, shape = (get(vehicle) for get in self._getters)
+        contrast = inherent_contrast(paint(vehicle, colour), self._airlight_share)
+        kind = body_kind(vehicle_class, shape, length)
+        missing = dark_on(int(MIDDLE_LAMPS), Side.MIDDLE) if kind in _NO_THIRD_STOP_LAMP else 0
+        eyes = eye_height(vehicle_class, shape, length)
+        body = _SeenBody(gap, contrast, eyes, length, width, height, missing)
+        row = self._rows.setdefault(vehicle, len(self._rows))
+        if row == len(self._traits):
+            self._traits = np.concatenate((self._traits, np.empty_like(self._traits)))
+        self._traits[row] = self._bodies[vehicle] = body
+        return body
+
+    def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
+        """Lit lamps of a vehicle, with sides that are dark."""
+        own = own_lamps.get(vehicle)
+        usual = lamps_from_signals(self._signals(vehicle))
+        return usual | int(OTHERS_LAMPS) if own is None else usual | own | self.body(vehicle).missing
+
+    @staticmethod
+    def head_lamps(vehicle: str, own_lamps: OwnLamps) -> float:
+        """Light of a vehicle's head lamps over that of low beams [-]; SUMO's vehicles have these, by `OTHERS_LAMPS`."""
+        own = own_lamps.get(vehicle)
+        return 1.0 if own is None else head_lamp_light(own)
+
+
+class _HiddenVehicles:
+    """Finds vehicles hidden by obstructions: no corner of the body is in sight, neither halfway up nor at the top."""
+
+    def __init__(self, api: Api, vehicles: _SeenVehicles, obstructions: Obstructions, remote: bool) -> None:
+        self._obstructions = obstructions
+        self._vehicles = vehicles
+        self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
+        self._bodies = LongBodies(api)
+
+    def are_hidden(self, pairs: Sequence[tuple[str, str]]) -> list[bool]:
+        """Whether each observer's target is hidden, however clear the air is (`pairs` (str, str))."""
+        if not pairs:
+            return []
+        # Mostly who leads one follows another.
+        places = {vehicle: self._position(vehicle) for pair in pairs for vehicle in pair}
+        angles = {target: math.radians(90.0 - self._angle(target)) for _, target in pairs}
+        bodies = [self._vehicles.body(target) for _, target in pairs]
+        parts = [
+            self._bodies.parts(t, body.length, places[t], angles[t]) for (_, t), body in zip(pairs, bodies, strict=True)
+        ]
+        eyes = np.array([places[observer] for observer, _ in pairs])
+        eyes[:, 2] += [self._vehicles.body(observer).eye_height for observer, _ in pairs]
+        counts = [len(own) for own in parts]
+        sizes = [
+            (part.length, body.width, body.height) for body, own in zip(bodies, parts, strict=True) for part in own
+        ]
+        corners = _corners(list(itertools.chain.from_iterable(parts)), np.array(sizes))
+        hidden = self._obstructions.hide(eyes.repeat(counts, axis=0), corners)
+        each: list[bool] = np.logical_and.reduceat(hidden, np.cumsum([0, *counts[:-1]])).tolist()
+        return each
+
+
+def _corners(parts: Sequence[Part], sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of parts of bodies (n, 8, 3) [m]; the lower ones are halfway up."""
+    heading = np.array([part.heading for part in parts])
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None]
+    left = forward[..., ::-1] * (-1.0, 1.0)
+    offsets = sizes[:, None] * _CORNERS
+    corners = np.array([part.front for part in parts])[:, None] + np.zeros((1, len(_CORNERS), 1))
+    corners[..., :2] += offsets[..., :1] * forward + offsets[..., 1:2] * left
+    corners[..., 2] += offsets[..., 2]
+    return corners
+
+
+class DriversView:
+    """What all parts of drivers' perception go by.
+
+    Takes `remote`, true where every call is a message to another process, and `obstructions`, what stands next to the
+    roads.
+    """
+
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster,
+        session: str = SOLE_SESSION,
+        remote: bool = False,
+        obstructions: Obstructions = CLEAR_SIGHT,
+    ) -> None:
+        self.api, self.fog, self.sight, self.roster = api, fog, sight, roster
+        self.session, self.remote, self.obstructions = session, remote, obstructions
+        self.extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
+        """Extinction coefficient of fog that is the same everywhere [1/m]; None of other fog."""
+        self.vehicles = _SeenVehicles(api, remote, sight.airlight_share)
+        self.hidden_vehicles = _HiddenVehicles(api, self.vehicles, obstructions, remote) if obstructions else None
+
+    def getters(self, *names: str) -> tuple[Getter, ...]:
+        """Getters of what is asked of vehicles often."""
+        return vehicle_getters(self.api, self.remote, names)
+
+
+_FARTHEST = 2000.0
+"""No one is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
+
+_Pairs = Sequence[tuple[str, str]]
 
 
 class VehicleSight:
@@ -43,95 +190,88 @@ class VehicleSight:
     Other vehicles hide no one.
     """
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        remote: bool = False,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
-        self._fog = fog
-        self._sight = sight
-        self._vehicles = SeenVehicles(api, remote, sight.airlight_share)
-        self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
-        self._bodies = LongBodies(api)
-        self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
-        self._seen_through_fog = sight.sure_distance(fog.maximum_extinction)
+    def __init__(self, view: DriversView) -> None:
+        self._hidden_vehicles = view.hidden_vehicles
+        self._fog, self._sight, self._vehicles, self._extinction = view.fog, view.sight, view.vehicles, view.extinction
+        self._position, self._angle = view.getters("getPosition3D", "getAngle")
+        self._bodies = LongBodies(view.api)
+        self._seen_through_fog = view.sight.sure_distance(view.fog.maximum_extinction)
 
     @property
     def certainly_seen(self) -> float:
         """Distance up to which every vehicle is seen, wherever it is and whatever its lamps [m]."""
         return self._seen_through_fog if self._hidden_vehicles is None else 0.0
 
-    def forget(self, vehicles: Iterable[str]) -> None:
-        """Forget vehicles whose ids others may bear now."""
-        self._vehicles.forget(vehicles)
-        if self._hidden_vehicles is not None:
-            self._hidden_vehicles.forget(vehicles)
-
-    def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
+    def sees(self, pairs: _Pairs, own_lamps: OwnLamps) -> list[bool]:
         """Whether each observer sees its target."""
-        lines = [self.line_of_sight(observer, target) for observer, target in pairs]
-        seen = [line.distance <= self._seen_through_fog for line in lines]
-        doubtful = [n for n, line in enumerate(lines) if not seen[n] and line.distance <= FARTHEST]
-        for n, depth in zip(doubtful, self._optical_depths([lines[n] for n in doubtful]), strict=True):
-            seen[n] = depth <= self._depth_limit(pairs[n], lines[n], own_lamps)
-        if self._hidden_vehicles is None:
-            return seen
-        hidden = self._hidden_vehicles.are_hidden(pairs)
-        return [is_seen and not is_hidden for is_seen, is_hidden in zip(seen, hidden, strict=True)]
+        if not pairs:
+            return []
+        lines = self.lines_of_sight(pairs)
+        distance = lines[:, LINE]
+        seen = distance <= self._seen_through_fog
+        doubtful = np.flatnonzero(~seen & (distance <= _FARTHEST))
+        if len(doubtful):
+            seen[doubtful] = self._are_seen([pairs[n] for n in doubtful.tolist()], lines[doubtful], own_lamps)
+        if self._hidden_vehicles is not None:
+            seen &= ~np.array(self._hidden_vehicles.are_hidden(pairs))
+        answer: list[bool] = seen.tolist()
+        return answer
 
-    def line_of_sight(self, observer: str, target: str) -> LineOfSight:
-        """The straight line from an observer's eyes, above the front bumper, to the nearest part of a target."""
-        # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
-        x, y, z = self._position(observer)
-        body, heading = self._vehicles.body(target), math.radians(90.0 - self._angle(target))
-        parts = self._bodies.parts(target, body.length, self._position(target), heading)
-        seen = [_nearest_point(x, y, part, body.width) for part in parts]
-        end_x, end_y, front_z, ahead, aside = min(seen, key=lambda point: math.dist(point[:2], (x, y)))
-        forward = math.radians(90.0 - self._angle(observer))
-        bearing = math.remainder(math.atan2(end_y - y, end_x - x) - forward, math.tau)
-        height = self._vehicles.eye_height(observer)
-        eyes, end = (x, y, z + height), (end_x, end_y, front_z + min(height, BODY_MIDDLE))
-        return LineOfSight(eyes, end, max(math.dist(eyes, end), NEAREST), bearing, ahead, aside)
+    def lines_of_sight(self, pairs: _Pairs) -> NDArray[np.float64]:
+        """Straight lines (n, 10) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
+        observers, targets = zip(*pairs, strict=True)
+        both = observers + targets
+        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
+        read, count = np.empty((len(place), 7)), len(place)
+        flat = itertools.chain.from_iterable(map(self._position, place))
+        read[:, :3] = np.fromiter(flat, np.float64, 3 * count).reshape(-1, 3)
+        read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, place), np.float64, count))
+        _, _, eyes, length, width, _, _ = self._vehicles.traits(place).T
+        read[:, 4], read[:, 5], read[:, 6] = eyes, length, width
+        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
+        bodies, ends = read[rows[1]], np.arange(1, len(pairs) + 1)
+        bodies[:, 4] = 0.0
+        if length.max() > LONGEST_RIGID:
+            bodies, ends = self._bend(targets, bodies)
+        lines = np.empty((len(pairs), 10))
+        draw_lines_of_sight(read[rows[0], :5], bodies, ends, lines)
+        return lines
+
+    def _bend(
+        self, targets: Sequence[str], bodies: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Straight parts (m, 7) of bodies, and where those of each end (n,)."""
+        parts, ends = list[Sequence[float]](), list[int]()
+        for target, body in zip(targets, bodies.tolist(), strict=True):
+            x, y, z, heading, _, length, width = body
+            if length > LONGEST_RIGID:
+                bent = self._bodies.parts(target, length, (x, y, z), heading)
+                parts += [(*one.front, one.heading, one.behind, one.length, width) for one in bent]
+            else:
+                parts.append(body)
+            ends.append(len(parts))
+        return np.array(parts), np.array(ends)
 
     def length(self, vehicle: str) -> float:
         """Length of a vehicle [m]; no part of it is farther from its front."""
         return self._vehicles.body(vehicle).length
 
-    def _depth_limit(self, pair: tuple[str, str], line: LineOfSight, own_lamps: OwnLamps) -> float:
-        observer, target = pair
-        body = self._vehicles.body(target)
-        intensity = intensity_toward(self._vehicles.lamps(target, own_lamps), body.length, line.ahead, line.aside)
-        head_lamps = self._vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line.bearing)
-        glare = 0.0
-        if uses_high_beam(own_lamps.get(observer, 0)):
-            known = self._extinction
-            glare = high_beam_veil(float(self._fog.extinction(line.eyes)) if known is None else known)
-        return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps, glare)
-
-    def _optical_depths(self, lines: Sequence[LineOfSight]) -> Sequence[float]:
-        if self._extinction is not None:
-            return [self._extinction * line.distance for line in lines]
-        if not lines:
-            return []
-        eyes, ends = [line.eyes for line in lines], [line.end for line in lines]
-        depths: list[float] = self._fog.optical_depth(eyes, ends).tolist()
-        return depths
-
-
-def _nearest_point(x: float, y: float, part: Part, width: float) -> tuple[float, float, float, float, float]:
-    """Point of a part of a body that is nearest to a place, the height of its road, and where the place is [m].
-
-    For the last two see `LineOfSight`; the distance along the body up to where the part begins is added.
-    """
-    front_x, front_y, front_z = part.front
-    east, north = math.cos(part.heading), math.sin(part.heading)
-    ahead = (x - front_x) * east + (y - front_y) * north
-    aside = (y - front_y) * east - (x - front_x) * north
-    along = min(max(ahead, -part.length), 0.0)
-    across = min(max(aside, -0.5 * width), 0.5 * width)
-    point_x, point_y = front_x + along * east - across * north, front_y + along * north + across * east
-    return point_x, point_y, front_z, ahead - part.behind, aside
+    def _are_seen(self, pairs: _Pairs, lines: NDArray[np.float64], own_lamps: OwnLamps) -> NDArray[np.bool_]:
+        """Whether targets are seen through the fog (n,)."""
+        vehicles, looks = self._vehicles, np.empty((4, len(pairs)))
+        looks[0] = lines[:, LINE]
+        for n, ((observer, target), line) in enumerate(zip(pairs, lines.tolist(), strict=True)):
+            body = vehicles.body(target)
+            looks[1, n] = body.contrast
+            looks[2, n] = intensity_toward(vehicles.lamps(target, own_lamps), body.length, line[AHEAD], line[ASIDE])
+            looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
+        limits = self._sight.depth_limits(looks)
+        eyes, known = np.ascontiguousarray(lines[:, EYES:END]), self._extinction
+        for n, (observer, _) in enumerate(pairs) if own_lamps else ():
+            if uses_high_beam(own_lamps.get(observer, 0)):
+                glare = high_beam_veil(float(self._fog.extinction(eyes[n])) if known is None else known)
+                distance, contrast, intensity, own = looks[:, n].tolist()
+                limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
+        ends = np.ascontiguousarray(lines[:, END:LINE])
+        depths = self._fog.optical_depth(eyes, ends) if known is None else known * looks[0]
+        return np.asarray(depths <= limits)

@@ -7,22 +7,24 @@ two drive side by side, and one that comes toward it while it overtakes on the o
 import bisect
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from operator import attrgetter
 from typing import NamedTuple
 
-from fogsim.traffic.sumo.link import Api, Getter, getter, vehicle_getter
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+import numpy as np
+
+from fogsim.traffic.sumo.link import Api, Getter, getter, inner_lanes, vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
-from fogsim.values import Leader
+from fogsim.values import Leader, TrafficState
 
 _EGO_REACH = 500.0
 """How far ahead a leader of the ego is searched [m]."""
 
-LONGEST = 25.0
+_LONGEST = 25.0
 """Vehicles that are longer than this may be missed where another is nearer by its front [m]."""
 
 
-class LaneSpots:
+class _LaneSpots:
     """Where vehicles are across their edge, in SUMO's measure of lanes.
 
     Parameters
@@ -75,7 +77,7 @@ class Leaders:
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._api, self._remote = api, remote
-        self._spots, self._directions = LaneSpots(api, remote), LaneDirections(api)
+        self._spots, self._directions = _LaneSpots(api, remote), LaneDirections(api)
         self._lane, self._station = vehicle_getters(api, remote, ("getLaneID", "getLanePosition"))
         self._now = getter(api, "simulation", "getTime")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
@@ -124,12 +126,12 @@ class Leaders:
         own = self._spot(vehicle, lane)
         best, gap = "", reach
         for begin, current in self._lanes_ahead(own, reach):
-            if begin - own.station - LONGEST > gap:
+            if begin - own.station - _LONGEST > gap:
                 break
             across = own.across - self._spots.middle(lane) + self._spots.middle(current)
             least = own.station if begin == 0.0 else -1.0
             for other in self._from(current.rpartition("_")[0], least):
-                if begin + other.station - own.station - LONGEST > gap:
+                if begin + other.station - own.station - _LONGEST > gap:
                     break
                 is_beside = abs(other.across - across) >= 0.5 * (other.width + own.width)
                 if is_beside or other.is_against != own.is_against or other.vehicle == vehicle:
@@ -169,12 +171,7 @@ class Leaders:
         return known
 
     def _way_of(self, link: Sequence[str]) -> tuple[str, ...]:
-        inner: list[str] = []
-        lane = link[4]
-        while lane:
-            inner.append(lane)
-            lane = next((further[4] for further in self._links(lane)), "")
-        return (*inner, link[0])
+        return (*inner_lanes(self._links, link[4]), link[0])
 
     def _from(self, edge: str, station: float) -> Iterator[_Spot]:
         """Vehicles on an edge whose fronts are past a station [m], in their order."""
@@ -203,3 +200,39 @@ class Leaders:
 def _leads_to(link: Sequence[str], edge: str) -> bool:
     """Whether a link of a lane leads to an edge."""
     return link[0].rpartition("_")[0] == edge
+
+
+class Courses:
+    """Adds to a state what vehicles drive along where that is not their lane alone."""
+
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        self._spots = _LaneSpots(api, remote)
+        self._directions = LaneDirections(api)
+        self._two_way: dict[str, bool] = {}
+        self._last: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
+        self._against: tuple[int, ...] = ()
+
+    def add(self, state: TrafficState) -> TrafficState:
+        """The state with `TrafficState.course` and `TrafficState.across`; as it is where all just keep to lanes."""
+        if (state.ids, state.lane) != self._last:
+            self._last = state.ids, state.lane
+            self._against = self._find_against(state)
+        if not self._against and not self._spots.is_divided:
+            return state
+        course, across = list(state.lane), state.across
+        if self._spots.is_divided:
+            course = [lane.rpartition("_")[0] for lane in course]
+            spots = (
+                self._spots.across(v, lane) if lane else 0.0 for v, lane in zip(state.ids, state.lane, strict=True)
+            )
+            across = np.fromiter(spots, np.float64, len(state.ids))
+        for row in self._against:
+            course[row] = f"-{course[row]}"
+        return replace(state, course=tuple(course), across=across)
+
+    def _find_against(self, state: TrafficState) -> tuple[int, ...]:
+        """Rows of those who drive against their lane's direction."""
+        known = self._two_way
+        known.update((lane, self._directions.is_two_way(lane)) for lane in {*state.lane}.difference(known))
+        rows = [row for row, lane in enumerate(state.lane) if known[lane]]
+        return tuple(row for row in rows if self._directions.is_against(state.ids[row], state.lane[row]))

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.sumo.link import Api, Getter
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo.link import Api, Getter, inner_lanes, vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
-from fogsim.values import TrafficState
+from fogsim.values import Collision, TrafficState
 from fogsim.values.traffic import BodyPieces
 
 LONGEST_RIGID = 15.0
@@ -180,17 +179,12 @@ class LongBodies:
         target, best = lane.rpartition("_")[0], list[str]()
         for number in range(int(self._api.edge.getLaneNumber(edge))):
             for link in self._api.lane.getLinks(f"{edge}_{number}"):
-                way = [f"{edge}_{number}", *self._inner(link[4]), link[0]]
+                way = [f"{edge}_{number}", *inner_lanes(self._api.lane.getLinks, link[4]), link[0]]
                 if lane in way:
                     return way[: way.index(lane)][::-1]
                 if way[-1].rpartition("_")[0] == target:
                     best = way[:-1][::-1]
         return best
-
-    def _inner(self, lane: str) -> Iterator[str]:
-        while lane:
-            yield lane
-            lane = next((link[4] for link in self._api.lane.getLinks(lane)), "")
 
     def _point(self, lanes: Sequence[str], station: float) -> _Point:
         """Place along lanes, from the beginning of the first one on [m]; straight on behind the last one."""
@@ -273,3 +267,64 @@ def _joined(bodies: "Sequence[tuple[int, tuple[_Section, ...], Sequence[_Point]]
         grade=np.arctan2(way[:, 2], np.hypot(way[:, 0], way[:, 1])),
         length=np.array(lengths),
     )
+
+
+_CARRIAGE = "carriage"
+
+
+def rail_collisions(state: TrafficState) -> Iterator[Collision]:
+    """Road vehicles whose rectangles overlap with those of pieces of a train or tram, in every step while they do."""
+    pieces = state.pieces
+    if _CARRIAGE not in pieces.kind:
+        return
+    # A bus is a bus and a carriage; a body of carriages alone is on rails.
+    bent = set(pieces.row.tolist())
+    on_rails = bent.difference(r for r, kind in zip(pieces.row.tolist(), pieces.kind, strict=True) if kind != _CARRIAGE)
+    road = np.array([row for row in range(len(state.ids)) if row not in on_rails], np.intp)
+    middle = _middles(state.position[road], state.heading[road], state.length[road])
+    carriages = _middles(pieces.position, pieces.heading, pieces.length)
+    struck = dict[tuple[int, int], int]()
+    for piece, train in enumerate(pieces.row.tolist()):
+        if train not in on_rails:
+            continue
+        reach = 0.5 * (pieces.length[piece] + state.length[road]) + state.width[train] + state.width[road]
+        near = np.flatnonzero(np.hypot(*(middle - carriages[piece]).T) < reach)
+        own = (carriages[piece], float(pieces.heading[piece]), float(pieces.length[piece]), float(state.width[train]))
+        for number in near.tolist():
+            row = int(road[number])
+            size = float(state.length[row]), float(state.width[row])
+            if _overlap(own, (middle[number], float(state.heading[row]), *size)):
+                struck.setdefault((row, train), piece)
+    for (row, train), piece in sorted(struck.items()):
+        turn = float(state.heading[row] - pieces.heading[piece])
+        one, other = float(state.speed[row]), float(state.speed[train])
+        impact = math.hypot(one - other * math.cos(turn), other * math.sin(turn))
+        yield Collision(state.time, state.ids[row], state.ids[train], impact)
+
+
+def _middles(
+    front: NDArray[np.float64], heading: NDArray[np.float64], length: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    ahead = np.stack((np.cos(heading), np.sin(heading)), axis=1)
+    return np.asarray(front[:, :2] - 0.5 * length[:, None] * ahead)
+
+
+_Rectangle = tuple[NDArray[np.float64], float, float, float]
+"""Middle [m], heading [rad], length and width [m]."""
+
+
+def _overlap(one: _Rectangle, other: _Rectangle) -> bool:
+    """Whether two rectangles overlap: no axis of either lies between them."""
+    away = other[0] - one[0]
+    for heading in (one[1], one[1] + 0.5 * math.pi, other[1], other[1] + 0.5 * math.pi):
+        apart = abs(away[0] * math.cos(heading) + away[1] * math.sin(heading))
+        reach = sum(_extent(rectangle, heading) for rectangle in (one, other))
+        if apart >= 0.5 * reach:
+            return False
+    return True
+
+
+def _extent(rectangle: _Rectangle, heading: float) -> float:
+    """How long a rectangle is along a direction [m]."""
+    _, own, length, width = rectangle
+    return abs(length * math.cos(own - heading)) + abs(width * math.sin(own - heading))

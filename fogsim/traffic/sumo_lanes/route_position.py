@@ -6,22 +6,18 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from fogsim.traffic.drivers.events import signed_gap
-from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, is_off_lanes
+from fogsim.traffic.sumo.link import UNKNOWN, Api, edge_length, getter, inner_lanes, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
 _MOVE_TOLERANCE = 5.0
 """Driven and straight distance between two updates may differ by this much more than a bend explains [m]."""
 
 
-class RouteLengths:
-    """Lengths of edges, and of the ways across the junctions between them."""
+class _RouteLengths:
+    """Lengths of routes, with the ways across the junctions between their edges."""
 
     def __init__(self, api: Api) -> None:
         self._api = api
-
-    def of_edge(self, edge: str) -> float:
-        """Length of an edge [m]."""
-        return float(self._api.lane.getLength(f"{edge}_0"))
 
     def across(self, edge: str, following: str) -> float:
         """Length of the way across the junction between two edges [m]; 0 in a net without inner lanes."""
@@ -32,9 +28,9 @@ class RouteLengths:
 
     def starts(self, route: Sequence[str]) -> tuple[list[float], float]:
         """Where each edge of a route starts, and where the last one ends [m]."""
-        steps = [self.of_edge(a) + self.across(a, b) for a, b in itertools.pairwise(route)]
+        steps = [edge_length(self._api, a) + self.across(a, b) for a, b in itertools.pairwise(route)]
         starts = [0.0, *itertools.accumulate(steps)]
-        return starts, starts[-1] + self.of_edge(route[-1])
+        return starts, starts[-1] + edge_length(self._api, route[-1])
 
 
 class Place(NamedTuple):
@@ -52,7 +48,7 @@ class RoutePlaces:
 
     def __init__(self, api: Api) -> None:
         self._api = api
-        self._lengths = RouteLengths(api)
+        self._lengths = _RouteLengths(api)
         self.directions = LaneDirections(api)
 
     def find(self, vehicle: str) -> Place:
@@ -62,7 +58,7 @@ class RoutePlaces:
         station = 0.0 if station == UNKNOWN else station
         route, index = get.getRoute(vehicle), max(int(get.getRouteIndex(vehicle)), 0)
         edge, is_inside = route[index], lane.startswith(":")
-        length = self._lengths.of_edge(edge)
+        length = edge_length(self._api, edge)
         if self.directions.is_against(vehicle, lane):
             # SUMO counts from where the oncoming lane begins.
             left = float(self._api.lane.getLength(lane)) - station
@@ -115,7 +111,7 @@ class RoutePosition:
         self._api = api
         self._vehicle = vehicle
         self._current_route = getter(api, "vehicle", "getRouteID")
-        self._lengths, self._places = RouteLengths(api), RoutePlaces(api)
+        self._lengths, self._places = _RouteLengths(api), RoutePlaces(api)
         self._last: tuple[float, float, float] | None = None
         self._begin()
 
@@ -178,12 +174,6 @@ class GapToEgo:
 def connections(api: Api, edge: str) -> Iterator[tuple[str, Iterator[str]]]:
     """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there."""
     links = api.lane.getLinks
-
-    def inner(lane: str) -> Iterator[str]:
-        while lane:
-            yield lane
-            lane = next((link[4] for link in links(lane)), "")
-
     for index in range(api.edge.getLaneNumber(edge)):
         for link in links(f"{edge}_{index}"):
-            yield link[0].rpartition("_")[0], inner(link[4])
+            yield link[0].rpartition("_")[0], inner_lanes(links, link[4])

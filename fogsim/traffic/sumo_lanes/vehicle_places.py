@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api, edge_length, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.traffic.sumo_lanes.route_position import connections
@@ -98,7 +98,7 @@ class SumoVehiclePlaces:
     def _pieces_along(self, edges: Sequence[str], must_follow: bool) -> Iterator[_Piece]:
         begin = 0.0
         for edge, following in itertools.pairwise((*edges, "")):
-            end = begin + float(self._api.lane.getLength(f"{edge}_0"))
+            end = begin + edge_length(self._api, edge)
             yield _Piece(edge, begin, end, self._opposite.of(edge))
             begin = end
             ways = self._ways(edge, following)

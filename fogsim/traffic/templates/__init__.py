@@ -1,15 +1,22 @@
 """Roads by template, and who drives on them, written to SUMO's files: no netconvert is needed."""
 
 from fogsim.traffic.templates.beside import Obstruction, additional_text
-from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
+from fogsim.traffic.templates.catalogue import RAMP, ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
 from fogsim.traffic.templates.demand import Demand, actors_text, cuts_around, routes_text
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_writer import net_text
 from fogsim.traffic.templates.on_foot import WALKING_SPEED, Footfall, Walker
-from fogsim.traffic.templates.own_net import KnownWays, read_ways
-from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
-from fogsim.traffic.templates.ramp import RAMP
-from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+from fogsim.traffic.templates.placement import (
+    VEHICLE_KINDS,
+    Actor,
+    KnownWays,
+    Placed,
+    PlacementError,
+    Relation,
+    check_placement,
+    place_actors,
+    read_ways,
+)
 
 __all__ = [
     "RAMP",

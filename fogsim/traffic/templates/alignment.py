@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.road.plan_view import Piece
+from fogsim.traffic.road.opendrive import Piece
 
 Points = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ _BESIDE_ZEBRA = 15.0  # cuts are no nearer to one [m]
 _BETWEEN_ZEBRAS = 40.0  # [m]
 
 
-def chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "AlongRoad", lanes: int) -> tuple[Edge, ...]:
+def _chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "_AlongRoad", lanes: int) -> tuple[Edge, ...]:
     """Edges of one direction, end to end: ``name``, ``name.1`` and so on."""
     names = [name, *(f"{name}.{number}" for number in range(1, len(nodes) - 1))]
     return tuple(
@@ -43,7 +43,7 @@ def straight_links(edges: Sequence[Edge]) -> list[Link]:
 
 
 @dataclass(frozen=True, slots=True)
-class AlongRoad:
+class _AlongRoad:
     """A road with one curve and one grade at most; what a template leaves open is a straight, level country road.
 
     Attributes
@@ -114,7 +114,7 @@ class AlongRoad:
         axis = self.axis()
         parts = [axis.part(*span) for span in spans]
         nodes = ["begin", *(f"cut{number}" for number in range(1, len(parts))), "end"]
-        edges = list(chain(SAME_WAY, [part.moved(-0.5 * self.median) for part in parts], nodes, self, self.lanes))
+        edges = list(_chain(SAME_WAY, [part.moved(-0.5 * self.median) for part in parts], nodes, self, self.lanes))
         ways = [(SAME_WAY, tuple(edge.name for edge in edges))]
         links = straight_links(edges)
         if self.oncoming_lanes:
@@ -128,7 +128,7 @@ class AlongRoad:
         if self.median:
             parts, nodes = [axis], [f"{ONCOMING}.end", f"{ONCOMING}.begin"]
         axes = [part.moved(0.5 * self.median).reversed() for part in reversed(parts)]
-        return chain(ONCOMING, axes, nodes[::-1], self, self.oncoming_lanes)
+        return _chain(ONCOMING, axes, nodes[::-1], self, self.oncoming_lanes)
 
     @property
     def beyond(self) -> float:
@@ -192,7 +192,7 @@ def spirals_and_arc(radius: float, turn: float) -> list[Bend]:
 
 
 @dataclass(frozen=True, slots=True)
-class Motorway(AlongRoad):
+class Motorway(_AlongRoad):
     """A motorway with two carriageways."""
 
     length: float = 3000.0
@@ -204,7 +204,7 @@ class Motorway(AlongRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class WalkedRoad(AlongRoad):
+class _WalkedRoad(_AlongRoad):
     """A road that may have footways and zebra crossings.
 
     Attributes
@@ -222,7 +222,7 @@ class WalkedRoad(AlongRoad):
     zebra_crossings: tuple[float, ...] = ()
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road; see `AlongRoad.layout`.
+        """The road; see `_AlongRoad.layout`.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class WalkedRoad(AlongRoad):
         zebras = sorted(self.zebra_crossings)
         self._check_zebras(zebras)
         if not self.footways:
-            return AlongRoad.layout(self, cuts)
+            return _AlongRoad.layout(self, cuts)
         # Where persons cross the road is cut anyhow.
         far = [cut for cut in cuts if all(abs(cut - zebra) > _BESIDE_ZEBRA for zebra in zebras)]
         gaps = sorted([*((zebra, _ZEBRA_GAP) for zebra in zebras), *((cut, _CUT_GAP) for cut in far)])
@@ -268,12 +268,12 @@ class WalkedRoad(AlongRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class Straight(WalkedRoad):
+class Straight(_WalkedRoad):
     """A straight, level road of two lanes."""
 
 
 @dataclass(frozen=True, slots=True)
-class Curve(WalkedRoad):
+class Curve(_WalkedRoad):
     """A road of two lanes with a curve to the left."""
 
     curve_radius: float = 250.0
@@ -281,14 +281,14 @@ class Curve(WalkedRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class Grade(WalkedRoad):
+class Grade(_WalkedRoad):
     """A road of two lanes that climbs."""
 
     grade: float = 0.04
 
 
 @dataclass(frozen=True, slots=True)
-class Rural(WalkedRoad):
+class Rural(_WalkedRoad):
     """A country road that winds, to the right and to the left in turn, and goes up and down.
 
     Its curves and grades follow one another along the whole road, and have the measures of one curve and one grade.
@@ -325,7 +325,7 @@ class Rural(WalkedRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class Tunnel(AlongRoad):
+class Tunnel(_AlongRoad):
     """A road of two lanes with a tunnel.
 
     Attributes
@@ -340,7 +340,7 @@ class Tunnel(AlongRoad):
     tunnel_height: float = 5.2
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road; see `AlongRoad.layout`.
+        """The road; see `_AlongRoad.layout`.
 
         Parameters
         ----------
@@ -357,6 +357,6 @@ class Tunnel(AlongRoad):
             raise InputError(
                 f"the tunnel ends {end - self.length:.0f} m beyond the road, which is {self.length:g} m long"
             )
-        plain = AlongRoad.layout(self, cuts)
+        plain = _AlongRoad.layout(self, cuts)
         inside = self.axis().moved(-0.5 * self.median).part(self.tunnel_at, end)
         return replace(plain, tunnel=(inside, self.tunnel_height))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_plan import Edge
 from fogsim.traffic.templates.on_foot import Footfall, Walker, walkers_text
-from fogsim.traffic.templates.placement import Placed, Ways, edge_at
-from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
+from fogsim.traffic.templates.placement import SLOW, VEHICLE_KINDS, Placed, VehicleKind, Ways, edge_at
 from fogsim.traffic.templates.xml_text import element, opening
 
 _END = 1_000_000  # of flows [s]

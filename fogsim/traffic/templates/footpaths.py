@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogsim.traffic.templates.alignment import Points
-from fogsim.traffic.templates.crossing_ways import CrossingWay, curve, distances
+from fogsim.traffic.templates.layout import CrossingWay, curve, distances
 from fogsim.traffic.templates.net_plan import Edge
 
 ZEBRA_WIDTH = 4.0

@@ -3,23 +3,71 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
+from fogsim.core.files.xml_reader import read_elements
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError, suggest
-from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleKind:
+    """A kind of vehicle."""
+
+    vehicle_class: str  # SUMO's ``vClass``
+    # length, width, height: size [m]
+    length: float
+    width: float
+    height: float
+    top_speed: float  # What it can drive at most [m/s]
+    # Share of the limit that its drivers want to drive, as SUMO has it: ``normc(mean,deviation,least,most)``
+    speed_factor: str
+    headway: float  # Time that they keep to who is ahead (Krauss' tau) [s]
+    # acceleration, deceleration: what they use at most [m/s²]
+    acceleration: float = 2.6
+    deceleration: float = 4.5
+    imperfection: float = 0.4  # How imperfectly they drive (Krauss' sigma) [-]
+
+
+_CAR = VehicleKind("passenger", 4.6, 1.85, 1.5, 55.0, "normc(0.95,0.10,0.75,1.20)", 1.4)
+
+VEHICLE_KINDS: Registry[VehicleKind] = Registry(
+    "vehicle type",
+    {
+        "car": _CAR,
+        "van": VehicleKind("delivery", 5.9, 2.05, 2.4, 36.1, "normc(0.90,0.08,0.70,1.10)", 1.5),
+        "lorry": VehicleKind("truck", 9.2, 2.5, 3.4, 25.0, "normc(0.95,0.05,0.80,1.05)", 1.6, 1.2, 4.0, 0.3),
+        "truck": VehicleKind("truck", 15.5, 2.5, 3.8, 24.7, "normc(0.98,0.03,0.90,1.05)", 1.8, 0.8, 4.0, 0.3),
+        "coach": VehicleKind("coach", 12.5, 2.55, 3.55, 27.8, "normc(1.00,0.02,0.95,1.05)", 1.7, 1.2, 4.0, 0.3),
+        "motorcycle": VehicleKind("motorcycle", 2.2, 0.9, 1.5, 55.0, "normc(1.00,0.10,0.80,1.25)", 1.3, 4.0, 6.0),
+        "bicycle": VehicleKind("bicycle", 1.8, 0.65, 1.7, 7.0, "normc(0.90,0.10,0.70,1.00)", 1.0, 1.2, 3.0),
+    },
+)
+"""Vehicles by the name of their type."""
+
+USUAL_MIX = (("car", 0.68), ("van", 0.14), ("truck", 0.15), ("coach", 0.03))
+"""Default shares of types in traffic."""
+
+TOWN_MIX = (("car", 0.84), ("van", 0.10), ("lorry", 0.06))
+"""Shares of types in the traffic of streets."""
+
+SLOW = ("truck", "coach", "bicycle")
+"""Types that keep to the right lane."""
+
 
 _LEAST_GAP = 0.5  # between two vehicles of a lane [m]
 
 
-class EdgeMeasures(Protocol):
+class _EdgeMeasures(Protocol):
     """What actors need to know of an edge: how many lanes it has, its length [m] and its limit [m/s]."""
 
     @property
-    def lanes(self) -> int: ...  # noqa: D102 - described above
+    def lanes(self) -> int: ...
     @property
-    def length(self) -> float: ...  # noqa: D102
+    def length(self) -> float: ...
     @property
-    def limit(self) -> float: ...  # noqa: D102
+    def limit(self) -> float: ...
 
     def index(self, number: int) -> int:
         """Number of a lane in SUMO; lanes are counted from the right, from 0."""
@@ -38,7 +86,7 @@ class Ways(Protocol):
         """Edges of a way."""
         ...
 
-    def edge(self, name: str) -> EdgeMeasures:
+    def edge(self, name: str) -> _EdgeMeasures:
         """An edge by its id."""
         ...
 
@@ -171,3 +219,78 @@ def way_length(layout: Ways, way: str) -> float:
     names = layout.way(way)
     across = (layout.between(one, other) for one, other in itertools.pairwise(names))
     return sum(layout.edge(name).length for name in names) + sum(across)
+
+
+_MOST_BYTES = 2_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class _KnownEdge:
+    """What is known of an edge."""
+
+    lanes: int  # How many lanes it has, next to footways
+    length: float  # Its length [m]
+    limit: float  # Its speed limit [m/s]
+    footways: int = 0  # How many footways lie to the right of its lanes
+
+    def index(self, number: int) -> int:
+        """Number of a lane in SUMO, which counts footways, too."""
+        return number + self.footways
+
+
+@dataclass(frozen=True, slots=True)
+class KnownWays:
+    """Ways on a network."""
+
+    ways: tuple[tuple[str, tuple[str, ...]], ...]  # The ways by name
+    edges: Mapping[str, _KnownEdge]  # What is known of their edges; those that the network does not have are missing
+
+    def way(self, name: str) -> tuple[str, ...]:
+        """Edges of a way; none where there is no such way."""
+        return dict(self.ways).get(name, ())
+
+    def edge(self, name: str) -> _KnownEdge:
+        """An edge by its id."""
+        return self.edges[name]
+
+    def between(self, one: str, other: str) -> float:  # noqa: ARG002 - as of `Ways`
+        """Length of the way across the junction between two edges, which is not looked up: 0."""
+        return 0.0
+
+
+def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:
+    """Read what a network says of the edges of ways."""
+    reader = _Reader(frozenset(edge for edges in ways.values() for edge in edges))
+    try:
+        read_elements(net, reader, _MOST_BYTES)
+    except InputError:
+        # SUMO reports what is wrong with it.
+        return KnownWays(tuple(ways.items()), {})
+    return KnownWays(tuple(ways.items()), reader.edges)
+
+
+class _Reader:
+    """Reads edges as they come."""
+
+    def __init__(self, wanted: frozenset[str]) -> None:
+        self.is_done = False
+        self.edges: dict[str, _KnownEdge] = {}
+        self._wanted = wanted
+        self._edge = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "edge":
+            self._edge = attributes.get("id", "")
+        elif tag == "lane" and self._edge in self._wanted:
+            before = self.edges.get(self._edge, _KnownEdge(0, 0.0, 0.0))
+            is_footway = attributes.get("allow") == "pedestrian"
+            measures = (float(attributes.get("length", "")), float(attributes.get("speed", "")))
+            self.edges[self._edge] = _KnownEdge(
+                before.lanes + (not is_footway), *measures, before.footways + is_footway
+            )
+        elif tag == "connection":
+            # All edges stand before the connections between them.
+            self.is_done = True
+
+    def end(self, tag: str) -> None:
+        pass

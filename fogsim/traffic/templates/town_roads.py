@@ -16,7 +16,7 @@ from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, Phase, ZebraP
 _NORTH, _SOUTH = "north", "south"
 """Names of the ways that come from the other roads; the ego comes from the west."""
 
-ARMS = (SAME_WAY, _SOUTH, ONCOMING, _NORTH)
+_ARMS = (SAME_WAY, _SOUTH, ONCOMING, _NORTH)
 """Names of the ways by where they come from: west, south, east, north, counterclockwise."""
 
 _DIRECTIONS = (math.pi, 1.5 * math.pi, 0.0, 0.5 * math.pi)
@@ -64,7 +64,7 @@ class Streets:
         Parameters
         ----------
         number : int
-            Which of `ARMS`; its edges are called like that, and ``.back``.
+            Which of `_ARMS`; its edges are called like that, and ``.back``.
         inner : float
             Distance from the middle at which it ends [m].
         nodes : tuple of str
@@ -72,7 +72,7 @@ class Streets:
         priorities : sequence of int
             Of the ego's road and of the other.
         """
-        name, away = ARMS[number], _straight_axis(_DIRECTIONS[number], (inner, 0.5 * self.length))
+        name, away = _ARMS[number], _straight_axis(_DIRECTIONS[number], (inner, 0.5 * self.length))
         is_side = number % 2
         measures = (1, self.lane_width, self.side_limit if is_side else self.limit, priorities[is_side])
         end = f"{name}.end"
@@ -116,12 +116,12 @@ class Crossing(Streets):
         inner, node = self.lane_width + (ZEBRA_LEAD + _KERB_CORNER if self.footways else _CORNER), "middle"
         edges = [edge for number in range(4) for edge in self.arm(number, inner, (node, node), (_MAIN, _SIDE))]
         links, ways = list[Link](), list[tuple[str, tuple[str, ...]]]()
-        for (number, name), (turn, steps) in itertools.product(enumerate(ARMS), _TURNS.items()):
-            target = f"{ARMS[(number + steps) % 4]}.back"
+        for (number, name), (turn, steps) in itertools.product(enumerate(_ARMS), _TURNS.items()):
+            target = f"{_ARMS[(number + steps) % 4]}.back"
             links.append(Link(name, target, direction=turn[0]))
             ways.append((name if turn == "straight" else f"{name}.{turn}", (name, target)))
         signals = ((node, _two_phases(self.footways)),) if self.lights else ()
-        zebras = tuple(ZebraPlan(node, name, f"{name}.back") for name in ARMS) if self.footways else ()
+        zebras = tuple(ZebraPlan(node, name, f"{name}.back") for name in _ARMS) if self.footways else ()
         if self.footways:
             edges = [replace(edge, footway=self.footway_width) for edge in edges]
         return Layout(NetPlan(tuple(edges), tuple(links), signals, zebras), tuple(ways), self.lane_width)
@@ -160,7 +160,7 @@ class Roundabout(Streets):
             None.
         """
         edges, links = list[Edge](), list[Link]()
-        for number, name in enumerate(ARMS):
+        for number, name in enumerate(_ARMS):
             into, away = self.arm(number, self.radius + _APPROACH, (f"{name}.in", f"{name}.out"), (_SIDE, _SIDE))
             before, past, after = self._ring(number - 1), self._past(number), self._ring(number)
             edges += [into, away, past, after]
@@ -168,27 +168,27 @@ class Roundabout(Streets):
             links += [Link(past.name, after.name), Link(into.name, after.name, direction="r")]
         ways = [
             (name if turn == "straight" else f"{name}.{turn}", self._way(number, steps))
-            for number, name in enumerate(ARMS)
+            for number, name in enumerate(_ARMS)
             for turn, steps in _TURNS.items()
         ]
         return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways), self.lane_width)
 
     def _way(self, number: int, steps: int) -> tuple[str, ...]:
         """Edges from an arm to one so many arms on."""
-        names = [ARMS[number % 4]]
+        names = [_ARMS[number % 4]]
         for arm in range(number, number + steps):
             names += [self._ring(arm).name, *([self._past(arm + 1).name] if arm + 1 < number + steps else [])]
-        return (*names, f"{ARMS[(number + steps) % 4]}.back")
+        return (*names, f"{_ARMS[(number + steps) % 4]}.back")
 
     def _ring(self, number: int) -> Edge:
         """The ring from behind an arm's entry to before the next arm's exit."""
-        name, following = ARMS[number % 4], ARMS[(number + 1) % 4]
+        name, following = _ARMS[number % 4], _ARMS[(number + 1) % 4]
         between = (_DIRECTIONS[number % 4] + _ASIDE + _HALF_NODE, _DIRECTIONS[number % 4] + 0.5 * math.pi - _ASIDE)
         return self._part(f"{name}.ring", (f"{name}.in", f"{following}.out"), (between[0], between[1] - _HALF_NODE))
 
     def _past(self, number: int) -> Edge:
         """The ring past an arm, from its exit to its entry."""
-        name, middle = ARMS[number % 4], _DIRECTIONS[number % 4]
+        name, middle = _ARMS[number % 4], _DIRECTIONS[number % 4]
         between = (middle - _ASIDE + _HALF_NODE, middle + _ASIDE - _HALF_NODE)
         return self._part(f"{name}.past", (f"{name}.out", f"{name}.in"), between)
 

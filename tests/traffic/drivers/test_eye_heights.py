@@ -1,7 +1,6 @@
 """Eye heights by vehicle type."""
 
-from fogsim.traffic.appearance import BODY_KINDS, SHAPE_KINDS
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS, eye_height
+from fogsim.traffic.appearance import BODY_KINDS, EYE_HEIGHTS, SHAPE_KINDS, eye_height
 
 
 def test_published_heights() -> None:

@@ -14,7 +14,7 @@ from fogsim.traffic.drivers.following import (
     Surroundings,
     misjudged_headway,
 )
-from fogsim.traffic.drivers.leader_reach import CLEAR, LeaderReach, drivers_visibility, leader_reach
+from fogsim.traffic.drivers.sight import CLEAR, LeaderReach, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.speed_choice import driver_traits
 
 DAY = DriverSight(10_000.0)

@@ -7,7 +7,7 @@ import pytest
 
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.lighting.own_sight import own_veil
-from fogsim.traffic.drivers.own_beams import HIGH_BEAM_LIGHT, head_lamp_light, high_beam_veil, uses_high_beam
+from fogsim.traffic.drivers.lamp_intensity import HIGH_BEAM_LIGHT, head_lamp_light, high_beam_veil, uses_high_beam
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam, Lamp

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from fogsim.core.kinematics import safe_speed
-from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance, complied_speed
 from fogsim.traffic.drivers.speed_choice import (
+    COMPLIANCES,
     SPEED_CHOICES,
+    Compliance,
     DriverSetup,
     DriverTraits,
     HeardAdvice,
     chosen_speed,
+    complied_speed,
     desired_speed,
     driver_traits,
     observed,

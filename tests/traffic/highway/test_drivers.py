@@ -9,25 +9,20 @@ import highway_env  # noqa: F401 - registers its environments
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.core.kinematics import safe_speed
 from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
-from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import leader_reach
 from fogsim.traffic.drivers.speed_choice import HeardAdvice, desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, Display, FogField, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import Command, Display, SpeedAdvice, Stretch, StretchAdvice
+from tests.traffic.common import even, heard, seen
 
 DAY = 10_000.0
 FAST = 30.0
 MPH = 0.44704
 # Far apart, so that nobody is held up by anybody.
 CONFIG = {"vehicles_count": 12, "lanes_count": 4, "vehicles_density": 0.3}
-
-
-def fog_of(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), airlight_from_illuminance(DAY)))
 
 
 class Road:
@@ -39,7 +34,7 @@ class Road:
         self.environment: Any = gymnasium.make("highway-v0", config=CONFIG).unwrapped
         self.traffic = HighwayTraffic(self.environment, sight, drivers=setup)
         if math.isfinite(visibility):
-            self.traffic.enter_fog(fog_of(visibility))
+            self.traffic.enter_fog(even(visibility))
         self.traffic.start(seed)
         for vehicle in self.others:
             vehicle.target_speed = FAST
@@ -50,16 +45,7 @@ class Road:
 
     @property
     def ids(self) -> list[str]:
-        snapshot = self.traffic.observe()
-        assert snapshot is not None
-        return [v for v in snapshot.state.ids if v != "ego"]
-
-    def heard(self) -> dict[str, float]:
-        """What those have heard who have heard anything."""
-        snapshot = self.traffic.observe()
-        assert snapshot is not None
-        state = snapshot.state
-        return {v: s for v, s in zip(state.ids, state.advised_speed.tolist(), strict=False) if s < math.inf}
+        return [v for v in seen(self.traffic).state.ids if v != "ego"]
 
     def drive(self, seconds: float, command: Command | None = None) -> "Road":
         for _ in range(round(seconds / self.traffic.step_length)):
@@ -100,7 +86,7 @@ def test_the_unaffected_drive_as_in_clear_air() -> None:
 
 def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
     road = Road(exact("within_sight"), 10_000.0).drive(15.0)
-    road.traffic.enter_fog(fog_of(60.0))
+    road.traffic.enter_fog(even(60.0))
     hardest = 0.0
     for _ in range(300):
         road.drive(road.traffic.step_length)
@@ -108,7 +94,7 @@ def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
     assert max(road.speeds()) == pytest.approx(safe_speed(60.0, 2.5, 3.4), abs=0.3)
     # Some follow one another, so that IDM itself brakes a little harder.
     assert -3.0 < hardest < -1.8
-    road.traffic.enter_fog(fog_of(10_000.0))
+    road.traffic.enter_fog(even(10_000.0))
     assert road.drive(1.0).targets() == [FAST] * len(road.others)
 
 
@@ -129,7 +115,7 @@ def advised(road: Road, speed: float = 15.0) -> Command:
 def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, float]) -> None:
     road = Road(exact(**nobody))
     assert road.drive(10.0, advised(road)).targets() == [FAST] * len(road.others)
-    assert road.heard() == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
+    assert heard(seen(road.traffic).state) == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
 
 
 def test_advice_that_all_follow_sets_every_target_speed() -> None:
@@ -193,9 +179,9 @@ def test_the_egos_advice_reaches_those_near_it() -> None:
     ego = road.environment.vehicle.position
     apart = [float(np.linalg.norm(v.position - ego)) for v in road.others]
     reach = sorted(apart)[5] + 1.0
-    heard = road.drive(0.1, Command(SpeedAdvice(15.0), advice_reach=reach)).targets()
-    assert [target < FAST for target in heard] == [distance <= reach for distance in apart]
-    assert road.heard() == dict.fromkeys(
+    targets = road.drive(0.1, Command(SpeedAdvice(15.0), advice_reach=reach)).targets()
+    assert [target < FAST for target in targets] == [distance <= reach for distance in apart]
+    assert heard(seen(road.traffic).state) == dict.fromkeys(
         ["ego", *(v for v, d in zip(road.ids, apart, strict=True) if d <= reach)], 15.0
     )
 
@@ -235,7 +221,7 @@ def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
     wanted = [(gap - 10.0) / v for gap, v in zip(kept, speeds, strict=True)]
     assert [v.TIME_WANTED for v in road.others] == pytest.approx(wanted, rel=0.01)
     assert max(wanted) < 1.0
-    road.traffic.enter_fog(fog_of(math.inf))
+    road.traffic.enter_fog(even(math.inf))
     assert [v.TIME_WANTED for v in road.drive(1.5).others] == pytest.approx([1.5] * len(road.others))
     assert road.environment.vehicle.TIME_WANTED == 1.5
 

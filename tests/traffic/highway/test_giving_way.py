@@ -11,17 +11,12 @@ from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import RoadNetwork as HighwayRoads
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.traffic import DriverSight
 from fogsim.traffic.highway import Fleet, HighwayTraffic, limit_sight
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, FogField
+from fogsim.values import Collision, Command
+from tests.traffic.common import even
 
 DAY = 10_000.0
-
-
-def fog_of(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), airlight_from_illuminance(DAY)))
 
 
 def crossing(apart: float) -> tuple[Any, Any, Any]:
@@ -47,7 +42,7 @@ def gives_way(apart: float, visibility: float, waited: int = 0) -> bool:
     """Whether the vehicle on the minor road gives way, having looked some steps ago."""
     road, main, minor = crossing(apart)
     environment = _Environment(road)
-    limit_sight(fog_of(visibility), Fleet(environment, main), DriverSight(DAY))
+    limit_sight(even(visibility), Fleet(environment, main), DriverSight(DAY))
     assert RegulatedRoad.respect_priorities(main, minor) is minor
     road.respect_priorities(main, minor)
     environment.steps = waited
@@ -65,7 +60,7 @@ def test_nobody_gives_way_to_whom_they_do_not_see() -> None:
 def test_who_comes_into_view_is_given_way_to_after_the_reaction_time() -> None:
     road, main, minor = crossing(30.0)
     environment = _Environment(road)
-    limit_sight(fog_of(20.0), Fleet(environment, main), DriverSight(DAY))
+    limit_sight(even(20.0), Fleet(environment, main), DriverSight(DAY))
     assert road.respect_priorities(main, minor) is None
     main.position, minor.position = np.array([-5.0, 0.0]), np.array([0.0, 5.0])
     answers = []
@@ -88,7 +83,7 @@ def test_who_crosses_unseen_is_hit(visibility: float, collides: bool) -> None:
     other = IDMVehicle.make_on_lane(road, ("o1", "ir1", 0), longitudinal=111.0 - ego.position[1], speed=10.0)
     other.plan_route_to("o3")
     road.vehicles[:] = [ego, other]
-    traffic.enter_fog(fog_of(visibility))
+    traffic.enter_fog(even(visibility))
     hits: list[Collision] = []
     for _ in range(8 * 15):
         traffic.advance(Command())

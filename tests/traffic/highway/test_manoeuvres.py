@@ -16,9 +16,10 @@ from fogsim.errors import InputError
 from fogsim.traffic import AfterCollision, BrakeEvent, DriverSight, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField, TrafficSnapshot
+from fogsim.values import FogField, TrafficSnapshot
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import ChangeLane, ChangeSpeed, SetLamps, SetSignal
+from tests.traffic.common import driven, seen
 
 ONE_LANE = {"vehicles_count": 1, "lanes_count": 1}
 THREE_LANES = {"vehicles_count": 1, "lanes_count": 3, "initial_lane_id": 1}
@@ -32,22 +33,12 @@ def traffic_of(
     return HighwayTraffic(environment, None, events=events, **options), environment
 
 
-def seen(traffic: HighwayTraffic) -> TrafficSnapshot:
-    snapshot = traffic.observe()
-    assert snapshot is not None
-    return snapshot
-
-
 def of(snapshot: TrafficSnapshot, vehicle: str) -> int:
     return snapshot.state.ids.index(vehicle)
 
 
 def drive(traffic: HighwayTraffic, seconds: float) -> list[TrafficSnapshot]:
-    snapshots = []
-    for _ in range(round(seconds / traffic.step_length)):
-        traffic.advance(Command())
-        snapshots.append(seen(traffic))
-    return snapshots
+    return driven(traffic, round(seconds / traffic.step_length))
 
 
 def course(snapshots: Sequence[TrafficSnapshot], vehicle: str = "lead") -> tuple[Any, Any, Any]:

@@ -12,7 +12,7 @@ from highway_env.road.road import RoadNetwork as HighwayRoads
 from highway_env.vehicle.kinematics import Vehicle
 
 from fogsim.traffic.highway import HighwayTraffic, RouteProgress, road_network
-from fogsim.traffic.highway.route import FASTEST_GAIN
+from fogsim.traffic.highway.network import FASTEST_GAIN
 from fogsim.values import Command, SpeedAdvice
 
 FEW = {"vehicles_count": 4}

@@ -13,14 +13,14 @@ from highway_env.road.road import RoadNetwork as HighwayRoads
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError, SimulationError
 from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, FogField, Lamp, LaneMarking, SpeedAdvice, TrafficSnapshot
+from fogsim.values import Collision, Command, Lamp, LaneMarking, SpeedAdvice, TrafficSnapshot
+from tests.traffic.common import even
 
 DAY = 10_000.0
 EMPTY = {"vehicles_count": 0, "initial_lane_id": 2}
@@ -35,10 +35,6 @@ def seen(traffic: HighwayTraffic) -> TrafficSnapshot:
     snapshot = traffic.observe()
     assert snapshot is not None
     return snapshot
-
-
-def fog_of(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), airlight_from_illuminance(DAY)))
 
 
 def network_of(*lanes: tuple[str, str, Any]) -> Any:
@@ -125,7 +121,7 @@ def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
     stopped = Vehicle(road, beside(ego, 200.0, 4.0))
     driver = IDMVehicle(road, beside(ego, 0.0, 4.0), speed=25.0, target_speed=25.0, enable_lane_change=False)
     road.vehicles += [driver, stopped]
-    traffic.enter_fog(fog_of(visibility))
+    traffic.enter_fog(even(visibility))
     hits: list[Collision] = []
     for _ in range(15 * 15):
         traffic.advance(Command())
@@ -154,7 +150,7 @@ def test_in_fog_they_hit_what_they_see_too_late(visibility: float) -> None:
 
 def test_collisions_are_those_that_the_library_knows() -> None:
     traffic, environment = traffic_on({"vehicles_count": 12, "lanes_count": 2})
-    traffic.enter_fog(fog_of(30.0))
+    traffic.enter_fog(even(30.0))
     traffic.start(4)
     vehicles = environment.road.vehicles
     for first in vehicles[-2:]:
@@ -174,7 +170,7 @@ def test_collisions_are_those_that_the_library_knows() -> None:
 def test_the_egos_driver_is_as_blind_as_the_others() -> None:
     def ends_in_collision(visibility: float) -> bool:
         traffic, environment = traffic_on(EMPTY)
-        traffic.enter_fog(fog_of(visibility))
+        traffic.enter_fog(even(visibility))
         traffic.start(1)
         ego = environment.vehicle
         environment.road.vehicles.append(Vehicle(environment.road, beside(ego, 200.0, 0.0)))
@@ -199,7 +195,7 @@ def test_who_comes_from_behind_unseen_holds_no_overtaker_back(visibility: float,
     driver = IDMVehicle(road, beside(ego, 100.0, 4.0), speed=20.0, target_speed=30.0)
     fast = IDMVehicle(road, beside(ego, 55.0, 0.0), speed=32.0, target_speed=32.0, enable_lane_change=False)
     road.vehicles += [slow, driver, fast]
-    traffic.enter_fog(fog_of(visibility))
+    traffic.enter_fog(even(visibility))
     lane = driver.lane_index
     for _ in range(20):
         traffic.advance(Command())
@@ -212,7 +208,7 @@ def test_fog_of_one_environment_stays_there() -> None:
     clear, in_clear_air = traffic_on(EMPTY)
     foggy.start(1)
     clear.start(1)
-    foggy.enter_fog(fog_of(30.0))
+    foggy.enter_fog(even(30.0))
     for environment in (in_fog, in_clear_air):
         road, ego = environment.road, environment.vehicle
         road.vehicles.append(Vehicle(road, beside(ego, 100.0, 0.0)))
@@ -228,7 +224,7 @@ def test_a_copied_environment_keeps_its_fog() -> None:
     """Planners copy highway-env's environments; a copy's drivers must look at the copy's vehicles."""
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)
-    traffic.enter_fog(fog_of(60.0))
+    traffic.enter_fog(even(60.0))
     copied = copy.deepcopy(environment)
     far, near = (Vehicle(copied.road, beside(copied.vehicle, ahead, 0.0)) for ahead in (150.0, 20.0))
     copied.road.vehicles.append(far)
@@ -282,7 +278,7 @@ def test_others_follow_advice_of_their_own() -> None:
 
 def test_the_same_seed_replays_exactly() -> None:
     traffic, _ = traffic_on({"vehicles_count": 12})
-    traffic.enter_fog(fog_of(80.0))
+    traffic.enter_fog(even(80.0))
 
     def run(seed: int) -> TrafficSnapshot:
         traffic.start(seed)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.traffic.road.flows import read_flows
+from fogsim.traffic.road.demand import read_flows
 
 ROUTES = """<routes>
   <vTypeDistribution id="mix"><vType id="car" probability="3"/><vType id="truck" probability="1"/></vTypeDistribution>

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fogsim.traffic.road import map_cache, network
+from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net
-from fogsim.traffic.road.road_map import RoadMap
 
 ROOT = Path(__file__).resolve().parents[3]
 GRID = ROOT / "tests" / "data" / "grid" / "grid.net.xml"

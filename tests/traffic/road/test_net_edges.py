@@ -4,8 +4,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.scenario import catalogue
-from fogsim.traffic.road.net_edges import read_net_edges
-from fogsim.traffic.road.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, read_net_edges, road_network
 
 MOTORWAY = catalogue()["motorway_fog_bank"].parent / "motorway.net.xml"
 ROUTE = ["approach", "bank", "exit"]

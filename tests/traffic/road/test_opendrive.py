@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.opendrive import opendrive_signs
-from fogsim.traffic.road.plan_view import PlanView, plan_view
+from fogsim.traffic.road.opendrive import PlanView, opendrive_signs, plan_view
 
 CURVE = (
     '<geometry s="0" x="10" y="20" hdg="0" length="100"><line/></geometry>'

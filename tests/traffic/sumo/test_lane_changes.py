@@ -1,43 +1,25 @@
 """SUMO's vehicles change lane in one step; the camera sees them glide."""
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.traffic import AttachedTraffic, TraciLink, TrafficSetup
+from fogsim.traffic import AttachedTraffic, TraciLink
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState
+from tests.traffic.common import MOTORWAY, SETUP, seen
 
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
-SETUP = TrafficSetup(
-    net=FOLDER / "motorway.net.xml",
-    routes=(FOLDER / "motorway.rou.xml",),
-    additional=(),
-    ego="ego",
-    step_length=0.1,
-    keep_lane=(),
-    warm_up_limit=600.0,
-    advice_deceleration=2.0,
-    reading_radius=800.0,
-)
+BUSY = replace(SETUP, routes=(MOTORWAY / "motorway.rou.xml",), additional=(), keep_lane=())
 LARGEST_STEP = 0.2
 """Farther than this nobody is to move sideways within 0.1 s [m]."""
-
-
-@pytest.fixture
-def link() -> Iterator[LibsumoLink]:
-    link = LibsumoLink()
-    yield link
-    link.end()
 
 
 def to_the_left(
@@ -72,26 +54,24 @@ def attached_run(api: Any, steps: int) -> list[tuple[TrafficState, TrafficState]
     """Shown and true states in a simulation that its owner steps."""
     while "ego" not in api.vehicle.getIDList():
         api.simulationStep()
-    traffic = AttachedTraffic(SETUP, api)
+    traffic = AttachedTraffic(BUSY, api)
     traffic.start(1)
-    truth = VehicleReader(api, "ego", SETUP.reading_radius)
+    truth = VehicleReader(api, "ego", BUSY.reading_radius)
     states = []
     for _ in range(steps):
         traffic.obey(Command(SpeedAdvice(28.0)))
         api.simulationStep()
         traffic.look()
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        states.append((snapshot.state, truth.state(Command().lamps)))
+        states.append((seen(traffic).state, truth.state(Command().lamps)))
     traffic.release()
     return states
 
 
 def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> None:
-    states = attached_run(link.begin(command_line(SETUP, 1)), 500)
+    states = attached_run(link.begin(command_line(BUSY, 1)), 500)
     assert_smooth(states)
     arrived = 0
-    longest = round(DURATION / SETUP.step_length) + 3
+    longest = round(DURATION / BUSY.step_length) + 3
     for i in range(longest, len(states)):
         now, true = states[i]
         for row, vehicle in enumerate(now.ids):
@@ -105,14 +85,14 @@ def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> Non
 
 
 def test_nobody_jumps_over_a_connection(sumo_process: Callable) -> None:
-    with sumo_process(command_line(SETUP, 1)) as (port, _):
+    with sumo_process(command_line(BUSY, 1)) as (port, _):
         distant = TraciLink("127.0.0.1", port)
         assert_smooth(attached_run(distant.begin(()), 250))
         distant.end()
 
 
 def test_without_changes_of_lane_states_are_untouched(link: LibsumoLink) -> None:
-    api = link.begin(command_line(SETUP, 1))
+    api = link.begin(command_line(BUSY, 1))
     while "ego" not in api.vehicle.getIDList():
         step_without_changes(api)
     smoothing, reader = LaneChangeSmoothing(), VehicleReader(api, "ego", 800.0)

@@ -4,9 +4,8 @@ import fogsim
 from fogsim.errors import InputError
 from fogsim.scenario import attached_scenario, override, resolved
 from fogsim.scenario.build import traffic_setup
-from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.traffic.sumo.options import OWN_OPTIONS, known_options, option_mistakes
+from fogsim.traffic.sumo.options import OWN_OPTIONS, command_line, known_options, option_mistakes
 
 ROAD = fogsim.load_scenario("motorway_fog_bank")
 

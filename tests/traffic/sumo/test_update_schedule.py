@@ -2,7 +2,7 @@
 
 import pytest
 
-from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
+from fogsim.traffic.sumo.roster import UpdateSchedule, closing_speed_bound
 
 
 def test_who_is_scheduled_is_due_in_time_and_once() -> None:

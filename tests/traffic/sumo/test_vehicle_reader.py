@@ -1,6 +1,5 @@
 """Reading as little as possible gives what reading everything gives."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,23 +11,11 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
 from fogsim.traffic.sumo.vehicle_reader import OTHERS_LAMPS, SubscribedReader, VehicleBodies, VehicleReader
 from fogsim.values import Lamp, TrafficState
-
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
-ARGUMENTS = (
-    *("--net-file", str(FOLDER / "motorway.net.xml"), "--route-files", str(FOLDER / "motorway.rou.xml")),
-    *("--step-length", "0.1", "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
-)
-
-
-@pytest.fixture
-def link() -> Iterator[LibsumoLink]:
-    link = LibsumoLink()
-    yield link
-    link.end()
+from tests.traffic.common import CROWD, MOTORWAY
 
 
 def begun(link: LibsumoLink) -> Any:
-    api = link.begin(ARGUMENTS)
+    api = link.begin(CROWD)
     while "ego" not in api.vehicle.getIDList():
         link.step()
     return api
@@ -93,7 +80,7 @@ def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_p
         '<vehicle id="v" type="c" route="r" depart="0" departPos="280" departSpeed="25"/></routes>',
         encoding="utf-8",
     )
-    net = FOLDER.parent / "graded_motorway" / "graded.net.xml"
+    net = MOTORWAY.parent / "graded_motorway" / "graded.net.xml"
     files = ("--net-file", str(net), "--route-files", str(tmp_path / "few.rou.xml"), "--step-length", "0.1")
     api = link.begin([*files, "--no-step-log", "true"])
     link.step()

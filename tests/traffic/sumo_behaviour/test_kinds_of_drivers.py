@@ -1,21 +1,19 @@
 """Kinds of drivers behind a leader in SUMO: who stays in sight, who falls back, and what is given back."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import leader_reach
 from fogsim.traffic.drivers.speed_choice import observed
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField
+from tests.traffic.common import driven, even, setup_of
 
-NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 SLOW, FAST = 13.4, 22.4
 VISIBILITY = 40.0
 SIGHT = DriverSight(10_000.0)
@@ -30,42 +28,21 @@ ROUTES = """<routes>
 </routes>"""
 
 
-def fog(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0, 3000.0, 3000.0)))
-
-
-def setup_of(folder: Path, speed: float, drivers: DriverSetup) -> TrafficSetup:
-    routes = folder / "pair.rou.xml"
-    routes.write_text(ROUTES.format(speed=speed), encoding="utf-8")
-    return TrafficSetup(
-        net=NET,
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=STEP,
-        keep_lane=("ego", "behind"),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=5000.0,
-        sight=SIGHT,
-        drivers=drivers,
-    )
+def pair(folder: Path, speed: float, drivers: DriverSetup) -> TrafficSetup:
+    setup = setup_of(folder, ROUTES.format(speed=speed), ("ego", "behind"), STEP)
+    return replace(setup, sight=SIGHT, drivers=drivers)
 
 
 def gap_after(traffic: Traffic, seconds: float) -> float:
     """Gap from the follower to its leader [m]."""
-    for _ in range(round(seconds / STEP)):
-        traffic.advance(Command())
-    snapshot = traffic.observe()
-    assert snapshot is not None
-    state = snapshot.state
+    state = driven(traffic, round(seconds / STEP))[-1].state
     front, behind = (state.position[state.row(v)][0] for v in ("ego", "behind"))
     return float(front - behind) - 5.0
 
 
 def gap_of(kind: str, setup: TrafficSetup) -> float:
     traffic = libsumo_traffic(setup)
-    traffic.enter_fog(fog(VISIBILITY))
+    traffic.enter_fog(even(VISIBILITY))
     try:
         traffic.start(1)
         return gap_after(traffic, 60.0)
@@ -79,7 +56,7 @@ def test_fog_parts_drivers_behind_a_fast_leader_and_not_behind_a_slow_one(tmp_pa
     drivers = DriverSetup(spread=0.0, following={kind: 1.0})
     seen = leader_reach(SIGHT, VISIBILITY).farthest
     assert SLOW < observed(VISIBILITY) < FAST
-    slow, fast = (gap_of(kind, setup_of(tmp_path, speed, drivers)) for speed in (SLOW, FAST))
+    slow, fast = (gap_of(kind, pair(tmp_path, speed, drivers)) for speed in (SLOW, FAST))
     assert slow < seen
     if kind == "in_sight":
         assert 0.5 * FAST < fast < min(seen, 2.0 * FAST)
@@ -93,8 +70,8 @@ def conduct(vehicle: str = "behind") -> tuple[float, ...]:
 
 
 def test_headways_grow_and_are_given_back(tmp_path: Path) -> None:
-    traffic: Any = libsumo_traffic(setup_of(tmp_path, SLOW, DriverSetup(following={"careful": 1.0})))
-    traffic.enter_fog(fog(VISIBILITY))
+    traffic: Any = libsumo_traffic(pair(tmp_path, SLOW, DriverSetup(following={"careful": 1.0})))
+    traffic.enter_fog(even(VISIBILITY))
     try:
         traffic.start(1)
         gap_after(traffic, 4.0)
@@ -102,10 +79,10 @@ def test_headways_grow_and_are_given_back(tmp_path: Path) -> None:
         assert headway == pytest.approx(2.0)
         assert factor == pytest.approx(observed.share(VISIBILITY))
         assert top_speed < 25.0
-        traffic.enter_fog(fog(10_000.0))
+        traffic.enter_fog(even(10_000.0))
         gap_after(traffic, 3.0)
         assert conduct()[:2] == (1.2, 1.0)
-        traffic.enter_fog(fog(VISIBILITY))
+        traffic.enter_fog(even(VISIBILITY))
         gap_after(traffic, 3.0)
         assert conduct()[0] == pytest.approx(2.0)
         traffic._release()
@@ -115,12 +92,12 @@ def test_headways_grow_and_are_given_back(tmp_path: Path) -> None:
 
 
 def test_over_a_connection_kinds_of_drivers_do_the_same(tmp_path: Path, sumo_process: Any) -> None:
-    setup = setup_of(tmp_path, FAST, DriverSetup(spread=0.0, following={"in_sight": 1.0}))
+    setup = pair(tmp_path, FAST, DriverSetup(spread=0.0, following={"in_sight": 1.0}))
     here = gap_of("in_sight", setup)
     with sumo_process(command_line(setup, 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)
         traffic = traci_traffic(setup, link)
-        traffic.enter_fog(fog(VISIBILITY))
+        traffic.enter_fog(even(VISIBILITY))
         traffic.start(1)
         assert gap_after(traffic, 60.0) == pytest.approx(here, abs=1e-6)
         link.end()
@@ -128,8 +105,8 @@ def test_over_a_connection_kinds_of_drivers_do_the_same(tmp_path: Path, sumo_pro
 
 def test_in_clear_air_nothing_is_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drivers = DriverSetup(misjudgement=0.5, following={"in_sight": 0.5, "out_of_sight": 0.5})
-    traffic = libsumo_traffic(setup_of(tmp_path, FAST, drivers))
-    traffic.enter_fog(fog(math.inf))
+    traffic = libsumo_traffic(pair(tmp_path, FAST, drivers))
+    traffic.enter_fog(even(math.inf))
     vehicles = load_libsumo().vehicle
     try:
         traffic.start(1)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import fogsim
-from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
+from fogsim.traffic.sumo_behaviour.scripted_actions import LampPublisher
 from fogsim.values import Lamp
 
 

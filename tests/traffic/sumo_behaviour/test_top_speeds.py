@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import Compliance, DriverSetup, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField
+from fogsim.values import Command
+from tests.traffic.common import driven, even, seen, setup_of, speeds_of
 
-NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 STEP, FAST = 0.1, 30.0
 ADVISED = 15.0
 # On a free road, and one more car that enters after the first two have been advised for a while.
@@ -30,25 +28,8 @@ ROUTES = """<routes>
 </routes>"""
 
 
-def fog(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0, 3000.0, 3000.0)))
-
-
-def setup_of(folder: Path, drivers: DriverSetup, model: str = "Krauss") -> TrafficSetup:
-    routes = folder / "free.rou.xml"
-    routes.write_text(ROUTES.format(model=model), encoding="utf-8")
-    return TrafficSetup(
-        net=NET,
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=STEP,
-        keep_lane=("ego", "first", "late"),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=5000.0,
-        drivers=drivers,
-    )
+def free_road(folder: Path, drivers: DriverSetup, model: str = "Krauss") -> TrafficSetup:
+    return replace(setup_of(folder, ROUTES.format(model=model), ("ego", "first", "late")), drivers=drivers)
 
 
 UNAFFECTED = DriverSetup("unaffected", spread=0.0, compliance=Compliance(delay=0.0))
@@ -62,10 +43,10 @@ def drive(tmp_path: Path) -> Iterator[Callable[..., tuple[Traffic, dict[str, lis
     def drive(
         drivers: DriverSetup, seconds: float, advised: float = math.inf, model: str = "Krauss", link: Any = None
     ) -> tuple[Traffic, dict[str, list[float]]]:
-        setup = setup_of(tmp_path, drivers, model)
+        setup = free_road(tmp_path, drivers, model)
         traffic = libsumo_traffic(setup) if link is None else traci_traffic(setup, link)
         begun.append(traffic)
-        traffic.enter_fog(fog(60.0))
+        traffic.enter_fog(even(60.0))
         traffic.start(1)
         return traffic, speeds(traffic, seconds, advised)
 
@@ -76,17 +57,11 @@ def drive(tmp_path: Path) -> Iterator[Callable[..., tuple[Traffic, dict[str, lis
 
 def speeds(traffic: Traffic, seconds: float, advised: float = math.inf) -> dict[str, list[float]]:
     """Speeds after each step; everybody is advised a speed, if one is given."""
-    told: dict[str, list[float]] = {}
+    snapshots = []
     for _ in range(round(seconds / STEP)):
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        everybody = snapshot.state.ids if math.isfinite(advised) else ()
-        traffic.advance(Command(advised_speeds=dict.fromkeys(everybody, advised)))
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        for vehicle, speed in zip(snapshot.state.ids, snapshot.state.speed, strict=True):
-            told.setdefault(vehicle, []).append(float(speed))
-    return told
+        everybody = seen(traffic).state.ids if math.isfinite(advised) else ()
+        snapshots += driven(traffic, 1, Command(advised_speeds=dict.fromkeys(everybody, advised)))
+    return speeds_of(snapshots)
 
 
 # EIDM's drivers err a little by themselves.
@@ -116,7 +91,7 @@ def test_who_follows_advice_half_way_goes_no_farther(drive: Any) -> None:
 
 def test_fog_that_thickens_slows_down_as_gently(drive: Any) -> None:
     traffic, _ = drive(DriverSetup("within_sight", spread=0.0), 5.0)
-    traffic.enter_fog(fog(30.0))
+    traffic.enter_fog(even(30.0))
     first = np.array(speeds(traffic, 10.0)["first"])
     assert first[-1] == pytest.approx(within_sight(30.0), abs=0.3)
     assert 1.9 < (-np.diff(first) / STEP).max() <= 2.1
@@ -148,10 +123,8 @@ def test_who_enters_has_passed_the_sign_upstream_if_one_who_follows_it(
 
 def test_who_was_on_the_road_when_the_fog_came_does_not_jump(drive: Any) -> None:
     traffic, _ = drive(UNAFFECTED, 20.0)
-    snapshot = traffic.observe()
-    assert snapshot is not None
     traffic._setup = replace(traffic._setup, drivers=DriverSetup("within_sight", spread=0.0))
-    traffic.enter_fog(fog(60.0))
+    traffic.enter_fog(even(60.0))
     for slowed in speeds(traffic, 4.0).values():
         assert (-np.diff(slowed) / STEP).max() <= 2.1
 
@@ -159,7 +132,7 @@ def test_who_was_on_the_road_when_the_fog_came_does_not_jump(drive: Any) -> None
 def test_over_a_connection_they_drive_the_same(drive: Any, sumo_process: Callable, tmp_path: Path) -> None:
     drivers = DriverSetup("too_fast", spread=0.1, compliance=Compliance(delay=0.0))
     _, here = drive(drivers, 18.0, advised=ADVISED)
-    with sumo_process(command_line(setup_of(tmp_path, drivers), 1)) as (port, _):
+    with sumo_process(command_line(free_road(tmp_path, drivers), 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)
         _, there = drive(drivers, 18.0, advised=ADVISED, link=link)
         link.end()

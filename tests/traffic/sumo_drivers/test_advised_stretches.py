@@ -8,15 +8,13 @@ from typing import Any
 
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, Display, FogField, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import Command, Display, SpeedAdvice, Stretch, StretchAdvice
+from tests.traffic.common import driven, even, heard, seen, setup_of, speeds_of
 
-NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 STEP, FAST, ADVISED = 0.1, 30.0, 15.0
 # The approach is 900 m long, the bank 2504 m. One car drives on it, one comes onto it, one enters the network.
 ROUTES = """<routes>
@@ -42,10 +40,10 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Traffic]]:
     begun: list[Traffic] = []
 
     def start(routes: str = ROUTES, link: Any = None, visibility: float = 60.0, **changes: Any) -> Traffic:
-        setup = replace(setup_of(tmp_path, routes), **changes)
+        setup = replace(obedient(tmp_path, routes), **changes)
         traffic = libsumo_traffic(setup) if link is None else traci_traffic(setup, link)
         begun.append(traffic)
-        traffic.enter_fog(FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0, 3000.0, 3000.0))))
+        traffic.enter_fog(even(visibility))
         traffic.start(1)
         return traffic
 
@@ -54,33 +52,13 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Traffic]]:
         traffic.close()
 
 
-def setup_of(folder: Path, routes: str = ROUTES) -> TrafficSetup:
-    path = folder / "demand.rou.xml"
-    path.write_text(routes, encoding="utf-8")
-    return TrafficSetup(
-        net=NET,
-        routes=(path,),
-        additional=(),
-        ego="ego",
-        step_length=STEP,
-        keep_lane=("ego", "on", "coming", "late"),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=6000.0,
-        drivers=DriverSetup("unaffected", spread=0.0, compliance=Compliance(delay=0.0)),
-    )
+def obedient(folder: Path, routes: str = ROUTES) -> TrafficSetup:
+    drivers = DriverSetup("unaffected", spread=0.0, compliance=Compliance(delay=0.0))
+    return replace(setup_of(folder, routes, ("ego", "on", "coming", "late")), drivers=drivers)
 
 
 def drive(traffic: Traffic, seconds: float, command: Command) -> dict[str, list[float]]:
-    """Speeds of everybody after each step."""
-    told: dict[str, list[float]] = {}
-    for _ in range(round(seconds / STEP)):
-        traffic.advance(command)
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        for vehicle, speed in zip(snapshot.state.ids, snapshot.state.speed, strict=True):
-            told.setdefault(vehicle, []).append(float(speed))
-    return told
+    return speeds_of(driven(traffic, round(seconds / STEP), command))
 
 
 def to_all(display: Display, stretch: Stretch = STRETCH) -> Command:
@@ -100,25 +78,17 @@ def test_drivers_hear_advice_on_the_stretch_and_drive_by_themselves_behind_it(st
     assert [told[v][-1] for v in ("on", "coming", "late")] == pytest.approx([FAST] * 3, abs=0.5)
 
 
-def heard(traffic: Traffic) -> dict[str, float]:
-    """What those have heard who have heard anything."""
-    snapshot = traffic.observe()
-    assert snapshot is not None
-    state = snapshot.state
-    return {v: s for v, s in zip(state.ids, state.advised_speed.tolist(), strict=False) if s < math.inf}
-
-
 @pytest.mark.parametrize(
     ("compliance", "others"), [({"rate": 0.0}, {"on": ADVISED, "coming": ADVISED}), ({"reached_share": 0.0}, {})]
 )
 def test_who_has_heard_advice_is_told_whether_they_follow_it(start: Any, compliance: Any, others: Any) -> None:
     traffic = start(drivers=DriverSetup("unaffected", spread=0.0, compliance=Compliance(**compliance)))
-    assert heard(traffic) == {}
+    assert heard(seen(traffic).state) == {}
     advice = StretchAdvice(ADVISED, Stretch(), Display.LAW), StretchAdvice(20.0, Stretch(), Display.IN_CAR)
     drive(traffic, 2.0, Command(SpeedAdvice(25.0), stretches=advice))
-    assert heard(traffic) == {**others, "ego": 25.0}
+    assert heard(seen(traffic).state) == {**others, "ego": 25.0}
     drive(traffic, 2.0, Command())
-    assert heard(traffic) == {}
+    assert heard(seen(traffic).state) == {}
 
 
 def test_a_sign_tells_those_who_pass_it(start: Any) -> None:
@@ -126,22 +96,21 @@ def test_a_sign_tells_those_who_pass_it(start: Any) -> None:
     drive(traffic, 1.0, Command())
     told = drive(traffic, 12.0, to_all(Display.MESSAGE_SIGN))
     assert min(told["on"]) > 29.0
-    assert heard(traffic) == {"coming": ADVISED, "late": ADVISED}
+    assert heard(seen(traffic).state) == {"coming": ADVISED, "late": ADVISED}
     # It comes to the sign 10 s after it has entered, and brakes within a second.
     assert told["coming"][85] > 29.0
     assert told["coming"][-1] < 27.0
     # What was read is kept when the sign goes dark, to the end of the stretch.
     assert drive(traffic, 12.0, Command())["coming"][-1] == pytest.approx(ADVISED, abs=0.3)
     assert drive(traffic, 30.0, Command())["coming"][-1] == pytest.approx(FAST, abs=0.5)
-    assert heard(traffic) == {}
+    assert heard(seen(traffic).state) == {}
 
 
 def test_a_stretch_goes_on_across_junctions(start: Any) -> None:
     traffic = start()
     told = drive(traffic, 30.0, to_all(Display.IN_CAR, Stretch(100.0, 3000.0, ("approach", "bank"))))
     assert told["on"][-1] == pytest.approx(ADVISED, abs=0.3)
-    snapshot = traffic.observe()
-    assert snapshot is not None
+    snapshot = seen(traffic)
     assert snapshot.state.lane[snapshot.state.ids.index("on")].startswith("bank")
     # Nobody sped up in between.
     assert max(told["on"][120:]) <= ADVISED + 0.3
@@ -165,7 +134,7 @@ def test_a_stretch_that_the_network_does_not_have_is_refused(start: Any, stretch
 def test_over_a_connection_they_hear_the_same(start: Any, sumo_process: Callable, tmp_path: Path) -> None:
     command = replace(to_all(Display.MESSAGE_SIGN), advice=SpeedAdvice(25.0), advice_reach=600.0)
     here = drive(start(), 14.0, command)
-    with sumo_process(command_line(setup_of(tmp_path), 1)) as (port, _):
+    with sumo_process(command_line(obedient(tmp_path), 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)
         there = drive(start(link=link), 14.0, command)
         link.end()
@@ -177,8 +146,7 @@ def crashes(traffic: Traffic, seconds: float, command: Callable[[tuple[str, ...]
     """Collisions, with a command from the ids on the road that holds for half a second, as the loop's does."""
     count, decided = 0, Command()
     for step in range(round(seconds / STEP)):
-        snapshot = traffic.observe()
-        assert snapshot is not None
+        snapshot = seen(traffic)
         count += len(snapshot.collisions)
         decided = decided if step % 5 else command(snapshot.state.ids)
         traffic.advance(decided)

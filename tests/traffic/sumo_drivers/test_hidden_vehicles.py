@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ import fogsim
 from fogsim.atmosphere import FieldAccess
 from fogsim.obstruction import Obstructions, obstructions_of
 from fogsim.traffic import DriverSight
-from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.values import FogField, Structure, StructureKind
 
 PAIRS = [("me", "other"), ("other", "me")]
@@ -56,6 +56,7 @@ def two_vehicles(top: float) -> Any:
         getLength=lambda _: 5.0,
         getWidth=lambda _: 2.0,
         getHeight=lambda _: top,
+        getMinGap=lambda _: 2.5,
         getVehicleClass=lambda _: "passenger",
         getShapeClass=lambda _: "",
     )
@@ -76,13 +77,14 @@ def test_a_vehicle_is_hidden_when_every_corner_is(
     y: tuple[float, float], height: float, top: float, hidden: bool
 ) -> None:
     api, wall = two_vehicles(top), across(y, height)
-    assert HiddenVehicles(api, wall).are_hidden(PAIRS[:1]) == [hidden]
     clear = FieldAccess(FogField(0.0, (3000.0,) * 3))
-    sight = VehicleSight(api, clear, DriverSight(10_000.0), obstructions=wall)
+    view = DriversView(api, clear, DriverSight(10_000.0), cast("Roster", None), obstructions=wall)
+    assert view.hidden_vehicles is not None
+    assert view.hidden_vehicles.are_hidden(PAIRS[:1]) == [hidden]
+    assert view.hidden_vehicles.are_hidden([]) == []
+    sight = VehicleSight(view)
     assert sight.sees(PAIRS[:1], {}) == [not hidden]
     assert sight.certainly_seen == 0.0
-    sight.forget(["other"])
-    assert HiddenVehicles(api, wall).are_hidden([]) == []
 
 
 def drive(folder: Path, obstructions: str, *overrides: str) -> list[fogsim.Step]:

@@ -9,7 +9,7 @@ from typing import Any
 import sumo
 
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes, unregulated_junctions
+from fogsim.traffic.sumo_drivers.junction_sight import JunctionFoes, unregulated_junctions
 
 CROSSING_WAYS = (("A1B1", "B1C1"), ("B0B1", "B1B2"), ("C1B1", "B1A1"))
 

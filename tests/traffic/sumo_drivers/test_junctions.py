@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import (
     AttachedTraffic,
     BrakeEvent,
@@ -25,9 +24,11 @@ from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, FogField, SignalAhead, SignalColour
+from fogsim.values import Collision, Command, SignalAhead, SignalColour
+from tests.traffic.common import DATA, even, setup_of
 
-DATA = Path(__file__).resolve().parents[2] / "data" / "crossing"
+Cars = Callable[..., TrafficSetup]
+CROSSING = DATA / "crossing"
 DAY = DriverSight(illuminance=10_000.0)
 CLEAR = math.inf
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
@@ -35,10 +36,6 @@ TYPE = '<vType id="c" sigma="0" speedDev="0" collisionMinGapFactor="0"/>'
 IGNORED = "junctionModel.ignoreIDs"
 UNTOUCHED = (31, "")
 """Speed mode of SUMO's vehicles, and whom they ignore."""
-
-
-def fog(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0, 3000.0, 3000.0)))
 
 
 def vehicle(name: str, edges: str, place: float, speed: float = 13.0) -> str:
@@ -49,24 +46,12 @@ def vehicle(name: str, edges: str, place: float, speed: float = 13.0) -> str:
 
 
 @pytest.fixture
-def setup_of(tmp_path: Path) -> Callable[..., TrafficSetup]:
+def cars(tmp_path: Path) -> Cars:
     """A simulation of these vehicles on one of the nets; the first one is the ego."""
 
     def setup(net: str, *vehicles: str) -> TrafficSetup:
-        routes = tmp_path / "crossing.rou.xml"
-        routes.write_text(f"<routes>{TYPE}{''.join(vehicles)}</routes>", encoding="utf-8")
-        return TrafficSetup(
-            net=DATA / net,
-            routes=(routes,),
-            additional=(),
-            ego=vehicles[0].split('"')[1],
-            step_length=0.1,
-            keep_lane=(),
-            warm_up_limit=10.0,
-            advice_deceleration=2.0,
-            reading_radius=2000.0,
-            sight=DAY,
-        )
+        setup = setup_of(tmp_path, f"<routes>{TYPE}{''.join(vehicles)}</routes>")
+        return replace(setup, net=CROSSING / net, ego=vehicles[0].split('"')[1], sight=DAY)
 
     return setup
 
@@ -85,7 +70,7 @@ class Drive:
     def __init__(self, traffic: Traffic, visibility: float, steps: int = 250, *, each: Callable | None = None) -> None:
         self.entered: dict[str, tuple[float, float]] = {}
         self.hits: list[Collision] = []
-        traffic.enter_fog(fog(visibility))
+        traffic.enter_fog(even(visibility))
         try:
             traffic.start(1)
             for step in range(steps):
@@ -117,46 +102,44 @@ def drive(setup: TrafficSetup, visibility: float, **more: object) -> Drive:
     return Drive(libsumo_traffic(setup), visibility, **more)
 
 
-def crossing(setup_of: Callable[..., TrafficSetup], place: float) -> TrafficSetup:
-    return setup_of("priority.net.xml", vehicle("minor", "SC CN", 150.0), vehicle("major", "WC CE", place))
+def crossing(cars: Cars, place: float) -> TrafficSetup:
+    return cars("priority.net.xml", vehicle("minor", "SC CN", 150.0), vehicle("major", "WC CE", place))
 
 
-def test_in_fog_drivers_accept_gaps_that_they_refuse_in_clear_air(setup_of: Callable[..., TrafficSetup]) -> None:
-    setup = crossing(setup_of, 125.0)
+def test_in_fog_drivers_accept_gaps_that_they_refuse_in_clear_air(cars: Cars) -> None:
+    setup = crossing(cars, 125.0)
     clear, dense = drive(setup, CLEAR), drive(setup, 20.0)
     assert clear.entered["minor"][0] > clear.entered["major"][0]
     assert dense.entered["minor"][0] < dense.entered["major"][0]
     assert clear.hits == []
 
 
-def test_drivers_who_see_too_late_meet_on_the_crossing(setup_of: Callable[..., TrafficSetup]) -> None:
-    (hit,) = drive(crossing(setup_of, 140.0), 12.0).hits
+def test_drivers_who_see_too_late_meet_on_the_crossing(cars: Cars) -> None:
+    (hit,) = drive(crossing(cars, 140.0), 12.0).hits
     assert {hit.collider, hit.victim} == {"minor", "major"}
     # The one crosses the way of the other: what counts is the difference of their velocities.
     assert hit.impact_speed > 13.0
-    assert drive(crossing(setup_of, 140.0), CLEAR).hits == []
+    assert drive(crossing(cars, 140.0), CLEAR).hits == []
 
 
-def test_who_sees_through_fog_yields_in_it(setup_of: Callable[..., TrafficSetup]) -> None:
-    setup = replace(crossing(setup_of, 125.0), sight=None)
+def test_who_sees_through_fog_yields_in_it(cars: Cars) -> None:
+    setup = replace(crossing(cars, 125.0), sight=None)
     assert drive(setup, 12.0).entered == drive(setup, CLEAR).entered
 
 
 @pytest.mark.parametrize("visibility", [17.0, 20.0, 22.0])
-def test_a_driver_with_priority_hits_who_stands_on_the_crossing_as_physics_says(
-    setup_of: Callable[..., TrafficSetup], visibility: float
-) -> None:
+def test_a_driver_with_priority_hits_who_stands_on_the_crossing_as_physics_says(cars: Cars, visibility: float) -> None:
     """v² = v₀² − 2 a (d − v₀ t), with the distance d at which a black side is seen, and SUMO's emergency braking."""
     stand = BrakeEvent("stuck", Trigger(at_position=143.2), to_speed=0.0, deceleration=9.0)
-    setup = setup_of("priority.net.xml", vehicle("major", "WC CE", 20.0), vehicle("stuck", "SC CN", 150.0))
+    setup = cars("priority.net.xml", vehicle("major", "WC CE", 20.0), vehicle("stuck", "SC CN", 150.0))
     (hit,) = drive(replace(setup, events=(stand,)), visibility).hits
     expected = math.sqrt(13.89**2 - 2 * EMERGENCY_DECELERATION * (visibility - 13.89 * DAY.reaction_time))
     assert hit.impact_speed == pytest.approx(expected, abs=1.0)
 
 
-def at_red(setup_of: Callable[..., TrafficSetup]) -> TrafficSetup:
+def at_red(cars: Cars) -> TrafficSetup:
     # Its road has red for the first 45 s, at the end of which it would come to the line.
-    return setup_of("lights.net.xml", vehicle("ego", "WC CE", 20.0))
+    return cars("lights.net.xml", vehicle("ego", "WC CE", 20.0))
 
 
 def show_red(step: int) -> None:
@@ -167,10 +150,10 @@ def show_red(step: int) -> None:
 
 @pytest.mark.parametrize(("visibility", "overruns"), [(8.0, True), (12.0, True), (20.0, False), (60.0, False)])
 def test_a_red_light_is_overrun_in_dense_fog_as_physics_says_and_obeyed_in_thin(
-    setup_of: Callable[..., TrafficSetup], visibility: float, overruns: bool
+    cars: Cars, visibility: float, overruns: bool
 ) -> None:
     """A signal of 200 cd is seen by day at d with 200 e^(−k d) / d² = 10⁻³ lx; then v² = v₀² − 2 a (d − v₀ t)."""
-    setup = at_red(setup_of)
+    setup = at_red(cars)
     entered = drive(setup, visibility, each=show_red).entered
     assert bool(entered) == overruns
     if overruns:
@@ -180,8 +163,8 @@ def test_a_red_light_is_overrun_in_dense_fog_as_physics_says_and_obeyed_in_thin(
         assert entered["ego"][1] == pytest.approx(left, abs=1.2)
 
 
-def test_the_light_ahead_of_the_ego_is_told(setup_of: Callable[..., TrafficSetup]) -> None:
-    with contextlib.closing(libsumo_traffic(at_red(setup_of))) as traffic:
+def test_the_light_ahead_of_the_ego_is_told(cars: Cars) -> None:
+    with contextlib.closing(libsumo_traffic(at_red(cars))) as traffic:
         traffic.start(1)
         show_red(0)
         first = traffic.observe()
@@ -193,20 +176,20 @@ def test_the_light_ahead_of_the_ego_is_told(setup_of: Callable[..., TrafficSetup
         assert 0.0 < way == pytest.approx(first.signal_ahead.distance - second.signal_ahead.distance)
 
 
-def test_nobody_stops_at_a_line_in_one_step(setup_of: Callable[..., TrafficSetup]) -> None:
+def test_nobody_stops_at_a_line_in_one_step(cars: Cars) -> None:
     speeds: list[float] = []
 
     def watch(step: int) -> None:
         show_red(step)
         speeds.append(load_libsumo().vehicle.getSpeed("ego"))
 
-    drive(at_red(setup_of), 12.0, steps=230, each=watch)
+    drive(at_red(cars), 12.0, steps=230, each=watch)
     slowest = min(after - before for before, after in itertools.pairwise(speeds))
     assert slowest == pytest.approx(-0.1 * EMERGENCY_DECELERATION, abs=1e-6)
 
 
-def test_vehicles_on_rails_obey_signals_that_their_drivers_do_not_see(setup_of: Callable[..., TrafficSetup]) -> None:
-    setup = at_red(setup_of)
+def test_vehicles_on_rails_obey_signals_that_their_drivers_do_not_see(cars: Cars) -> None:
+    setup = at_red(cars)
     routes = setup.routes[0]
     routes.write_text(routes.read_text().replace('<vType id="c"', '<vType id="c" vClass="tram"'), encoding="utf-8")
     assert drive(setup, 8.0, each=show_red).entered == {}
@@ -222,18 +205,18 @@ def trajectories(api: Api, steps: int, before: Callable[[], None], step: Callabl
     return seen
 
 
-def busy(setup_of: Callable[..., TrafficSetup], net: str) -> TrafficSetup:
+def busy(cars: Cars, net: str) -> TrafficSetup:
     ways = ("WC CE", "SC CN", "EC CS", "NC CW", "SC CW", "WC CS", "EC CW", "NC CS")
-    cars = [vehicle(f"v{n}", ways[n % 8], 40.0 + 90.0 * (n // 8) + 11.0 * (n % 4), 10.0) for n in range(24)]
-    return setup_of(net, vehicle("ego", "WC CE", 5.0), *cars)
+    crowd = [vehicle(f"v{n}", ways[n % 8], 40.0 + 90.0 * (n // 8) + 11.0 * (n % 4), 10.0) for n in range(24)]
+    return cars(net, vehicle("ego", "WC CE", 5.0), *crowd)
 
 
 @pytest.mark.parametrize("net", ["priority.net.xml", "lights.net.xml"])
-def test_in_clear_air_every_step_is_that_of_sumo_alone(setup_of: Callable[..., TrafficSetup], net: str) -> None:
-    setup = busy(setup_of, net)
+def test_in_clear_air_every_step_is_that_of_sumo_alone(cars: Cars, net: str) -> None:
+    setup = busy(cars, net)
     api = load_libsumo()
     traffic = libsumo_traffic(setup)
-    traffic.enter_fog(fog(CLEAR))
+    traffic.enter_fog(even(CLEAR))
     traffic.start(1)
     ours = trajectories(api, 200, lambda: None, lambda: traffic.advance(Command()))
     traffic.close()
@@ -245,9 +228,9 @@ def test_in_clear_air_every_step_is_that_of_sumo_alone(setup_of: Callable[..., T
 
 
 @pytest.fixture
-def running(setup_of: Callable[..., TrafficSetup]) -> Iterator[tuple[Api, TrafficSetup]]:
+def running(cars: Cars) -> Iterator[tuple[Api, TrafficSetup]]:
     """A simulation that somebody else has started."""
-    setup = busy(setup_of, "lights.net.xml")
+    setup = busy(cars, "lights.net.xml")
     api = load_libsumo()
     api.start(["sumo", *command_line(setup, 1)])
     api.simulationStep()
@@ -257,7 +240,7 @@ def running(setup_of: Callable[..., TrafficSetup]) -> Iterator[tuple[Api, Traffi
 
 def attach(api: Api, setup: TrafficSetup, visibility: float) -> AttachedTraffic:
     traffic = AttachedTraffic(setup, api)
-    traffic.enter_fog(fog(visibility))
+    traffic.enter_fog(even(visibility))
     traffic.start(1)
     return traffic
 
@@ -290,10 +273,8 @@ def test_two_sessions_end_and_every_driver_yields_and_stops_as_before(running: t
     assert after == {v: before.get(v, UNTOUCHED) for v in after}
 
 
-def test_over_a_connection_drivers_see_what_they_see_in_process(
-    setup_of: Callable[..., TrafficSetup], sumo_process: Callable
-) -> None:
-    setup = busy(setup_of, "lights.net.xml")
+def test_over_a_connection_drivers_see_what_they_see_in_process(cars: Cars, sumo_process: Callable) -> None:
+    setup = busy(cars, "lights.net.xml")
     here = drive(setup, 15.0, steps=150)
     with sumo_process(command_line(setup, 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)
@@ -303,9 +284,9 @@ def test_over_a_connection_drivers_see_what_they_see_in_process(
     assert (there.entered, there.hits) == (here.entered, here.hits)
 
 
-def test_a_pedestrian_out_of_sight_is_not_yielded_to(setup_of: Callable[..., TrafficSetup]) -> None:
+def test_a_pedestrian_out_of_sight_is_not_yielded_to(cars: Cars) -> None:
     """A car turns right, across the way of somebody who has green, too."""
-    setup = setup_of("lights.net.xml", vehicle("ego", "SC CE", 150.0))
+    setup = cars("lights.net.xml", vehicle("ego", "SC CE", 150.0))
     routes = setup.routes[0]
     person = '<person id="p" depart="0" departPos="284"><walk edges="SC CN" arrivalPos="10"/></person>'
     routes.write_text(routes.read_text().replace("</routes>", person + "</routes>"), encoding="utf-8")
@@ -330,8 +311,8 @@ def test_a_pedestrian_out_of_sight_is_not_yielded_to(setup_of: Callable[..., Tra
     assert drive(hiding, CLEAR, each=watch).hits
 
 
-def test_a_wall_at_the_corner_hides_who_has_priority(setup_of: Callable[..., TrafficSetup]) -> None:
-    setup = crossing(setup_of, 125.0)
+def test_a_wall_at_the_corner_hides_who_has_priority(cars: Cars) -> None:
+    setup = crossing(cars, 125.0)
     walled = drive(beside(setup, "150,294.5,0 296,294.5,0", width=1.0, top=4.0), CLEAR)
     elsewhere = drive(beside(setup, "150,270,0 296,270,0", width=1.0, top=0.5), CLEAR)
     assert walled.entered["minor"][0] < walled.entered["major"][0]
@@ -342,9 +323,9 @@ def test_a_wall_at_the_corner_hides_who_has_priority(setup_of: Callable[..., Tra
     assert through.entered == drive(blind, CLEAR).entered
 
 
-def test_a_light_behind_a_low_bridge_is_seen_too_late(setup_of: Callable[..., TrafficSetup]) -> None:
+def test_a_light_behind_a_low_bridge_is_seen_too_late(cars: Cars) -> None:
     # From 20 m before the line on, it is before the driver; until then the beam hides what hangs lower than 6 m.
-    setup = beside(at_red(setup_of), "273,290,0 273,306,0", width=1.0, bottom=1.0, top=6.0)
+    setup = beside(at_red(cars), "273,290,0 273,306,0", width=1.0, bottom=1.0, top=6.0)
     late = drive(setup, CLEAR, each=show_red).entered
     assert late["ego"][1] > 3.0
-    assert drive(at_red(setup_of), CLEAR, each=show_red).entered == {}
+    assert drive(at_red(cars), CLEAR, each=show_red).entered == {}

@@ -1,7 +1,7 @@
 """Drivers change lanes by what they see: in a real SUMO, with eyes that see so far and no farther."""
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
@@ -13,19 +13,15 @@ from fogsim.traffic.drivers.playing import Lamps
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.drivers_perception import drivers_perception
+from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
 from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
-from tests.traffic.sumo_drivers.test_perception import NET, Fog, SeesFrom
+from tests.traffic.common import CROWD, NET, QUIET
+from tests.traffic.sumo_drivers.test_perception import Fog, SeesFrom
 
-CROWD = (
-    *("--net-file", str(NET), "--route-files", str(NET.parent / "motorway.rou.xml")),
-    *("--step-length", "0.1", "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
-)
 FREE, IN_LANE = 1621, 0
 CLEAR = 1000.0
 
@@ -40,8 +36,8 @@ class NeverSure(SeesFrom):
 class SeesNobody(VehicleSight):
     """What drivers see, but for some who see nobody."""
 
-    def __init__(self, api: Api, fog: Fog, sight: SeesFrom, blind: Sequence[str]) -> None:
-        super().__init__(api, fog, sight)
+    def __init__(self, view: DriversView, blind: Sequence[str]) -> None:
+        super().__init__(view)
         self._blind = blind
 
     def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
@@ -57,6 +53,7 @@ class Road:
     folder: Path
     options: Sequence[str] = ()
     api: Api = None
+    roster: Roster = field(init=False)
     parts: list[Perception | LaneChanging] = field(default_factory=list)
 
     def enter(self, vehicles: str, reach: float, free: Sequence[str] = ("ego",), blind: Sequence[str] = ()) -> Api:
@@ -68,19 +65,19 @@ class Road:
             encoding="utf-8",
         )
         files = ["--net-file", str(NET), "--route-files", str(routes), "--step-length", "0.1"]
-        quiet = ["--no-step-log", "true", "--no-warnings", "true", "--collision.action", "warn"]
-        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000", *self.options])
+        warn = ["--collision.action", "warn", "--collision.stoptime", "1000"]
+        self.api = api = self.link.begin([*files, *QUIET, *warn, *self.options])
         self.link.step()
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
-        roster, sight, fog = Roster(api), (NeverSure if blind else SeesFrom)(reach), Fog(0.05)
-        leaders = Perception(api, fog, sight, roster)
-
-        eyes = SeesNobody(api, fog, sight, blind)
-        self.parts = [leaders, LaneChanging(api, fog, sight, roster, leaders, eyes, False, "1")]
+        self.roster = Roster(api)
+        view = DriversView(api, Fog(0.05), (NeverSure if blind else SeesFrom)(reach), self.roster)
+        leaders = Perception(view)
+        self.parts = [leaders, LaneChanging(view, leaders, SeesNobody(view, blind))]
         return api
 
     def step(self) -> None:
+        self.roster.update()
         for part in self.parts:
             part.update({})
         self.link.step()
@@ -106,10 +103,8 @@ class Road:
 
 
 @pytest.fixture
-def road(tmp_path: Path) -> Iterator[Road]:
-    link = LibsumoLink()
-    yield Road(link, tmp_path)
-    link.end()
+def road(link: LibsumoLink, tmp_path: Path) -> Road:
+    return Road(link, tmp_path)
 
 
 def vehicle(name: str, place: float, speed: float, lane: int, top: float | None = None, inside: str = "") -> str:
@@ -245,7 +240,7 @@ def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road, illuminance: flo
         for _ in range(300):
             road.link.step()
         sight, roster = DriverSight(illuminance), Roster(api)
-        perception = drivers_perception(api, Fog(0.0), sight, roster, False, "1") if parts else None
+        perception = DriversPerception(DriversView(api, Fog(0.0), sight, roster)) if parts else None
         for _ in range(200):
             if perception is not None:
                 perception.update({"ego": Lamp.NONE}, Lamps())
@@ -293,6 +288,7 @@ def test_a_hidden_leader_may_have_left_since_the_last_look_ahead(road: Road) -> 
     api.vehicle.remove("wreck")
     for _ in range(6):
         road.link.step()
+        road.roster.update()
         lanes.update({})
     assert isinstance(leaders, Perception)
     assert leaders.hidden == {"ego": "wreck"}

@@ -2,31 +2,31 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
+from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.oncoming_glare import (
     LAMP_HEIGHT,
     MOST_GLARE,
     OncomingGlare,
     most_glare,
 )
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.sumo_drivers.perception import LeaderSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import OppositeEdges
 from fogsim.units import extinction_from_visibility
-from fogsim.values import FogField, Lamp
+from fogsim.values import Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on
+from tests.traffic.common import DATA, even
 
-NET = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
+NET = DATA / "grid" / "grid.net.xml"
 ROUTES = """<routes><vType id="c" length="5" width="1.8"/><route id="r" edges="B0C0"/><route id="s" edges="C0B0"/>
   <vehicle id="leader" type="c" route="r" depart="0" departPos="65" departLane="0" color="0,0,0"/>
   <vehicle id="me" type="c" route="r" depart="0" departPos="10" departLane="0"/>
@@ -46,12 +46,12 @@ def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     link.end()
 
 
-def even(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
+def view(api: Any, visibility: float, headlamp_reach: float = 55.0) -> DriversView:
+    return DriversView(api, even(visibility), DriverSight(0.01, headlamp_reach), Roster(api))
 
 
 def veil(api: Any, observer: str, target: str, visibility: float, own_lamps: OwnLamps) -> float:
-    return OncomingGlare(api, even(visibility), SeenVehicles(api)).veil(observer, target, own_lamps)
+    return OncomingGlare(view(api, visibility)).veil(observer, target, own_lamps)
 
 
 def test_the_other_side_of_a_road_leads_back(api: Any) -> None:
@@ -98,8 +98,8 @@ def test_own_high_beams_show_an_unlit_leader_from_farther(api: Any) -> None:
     dark: OwnLamps = {"leader": ALL_DARK, "coming": ALL_DARK}
 
     def sees(visibility: float, lamps: Lamp) -> bool:
-        sight = LeaderSight(api, even(visibility), DriverSight(0.01, 40.0), api.vehicle.getSpeed)
-        return sight.assess(pairs, {**dark, "me": int(lamps)}, 0.5)[0][0]
+        sight = LeaderSight(view(api, visibility, 40.0), api.vehicle.getSpeed, 0.5)
+        return sight.assess(pairs, {**dark, "me": int(lamps)})[0][0]
 
     assert [sees(3000.0, Lamp.LOW_BEAM), sees(3000.0, Lamp.HIGH_BEAM), sees(100.0, Lamp.HIGH_BEAM)] == [
         False,
@@ -111,10 +111,10 @@ def test_own_high_beams_show_an_unlit_leader_from_farther(api: Any) -> None:
 def test_a_dazzled_driver_sees_an_unlit_leader_later(api: Any) -> None:
     """The same leader, 50 m ahead in thin fog: by head lamps alone it is seen, against high beams it is not."""
     pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
-    sight = LeaderSight(api, even(1e5), DriverSight(0.01), api.vehicle.getSpeed)
+    sight = LeaderSight(view(api, 1e5), api.vehicle.getSpeed, 0.5)
     dark: OwnLamps = {"leader": ALL_DARK}
-    assert sight.assess(pairs, {**dark, "coming": ALL_DARK}, 0.5) == [(True, 0.0)]
-    assert sight.assess(pairs, {**dark, **HIGH_BEAM}, 0.5)[0][0] is False
+    assert sight.assess(pairs, {**dark, "coming": ALL_DARK}) == ([True], [0.0])
+    assert sight.assess(pairs, {**dark, **HIGH_BEAM})[0] == [False]
 
 
 def test_by_day_there_is_none(api: Any) -> None:

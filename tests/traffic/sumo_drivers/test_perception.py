@@ -24,11 +24,13 @@ from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.perception import LeaderSight
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import Collision, Command, FogBank, FogField, Lamp
 from fogsim.values.fog import AIRLIGHT_SHARE
+from tests.traffic.common import NET, driven, seen, setup_of
 
-NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
 ROUTES = """<routes>
   <vType id="c" vClass="passenger" sigma="0" speedDev="0" length="4.6" maxSpeed="33.8" collisionMinGapFactor="0"/>
@@ -91,6 +93,9 @@ class SeesFrom:
     def depth_limit(self, distance: float, *_: float) -> float:
         return math.inf if distance <= self.distance else -math.inf
 
+    def depth_limits(self, looks: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(looks[0] <= self.distance, math.inf, -math.inf)
+
     def judge_leaders(self, facing: NDArray[np.float64], *_: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """To be looked at again in the next step."""
         return np.where(facing[DISTANCE] <= self.distance, SEEN, HIDDEN), np.zeros(facing.shape[1])
@@ -98,37 +103,20 @@ class SeesFrom:
 
 @pytest.fixture
 def setup(tmp_path: Path) -> TrafficSetup:
-    routes = tmp_path / "wreck.rou.xml"
-    routes.write_text(ROUTES, encoding="utf-8")
-    return TrafficSetup(
-        net=NET,
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=0.05,
-        keep_lane=("ego", "wreck"),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=2000.0,
-    )
+    return setup_of(tmp_path, ROUTES, ("ego", "wreck"), step=0.05)
 
 
 def collisions(setup: TrafficSetup, k: float = 0.05, steps: int = 800) -> tuple[list[Collision], float]:
     """Collisions of a drive towards the wreck, and the ego's speed at the end [m/s]."""
     traffic = libsumo_traffic(setup)
     traffic.enter_fog(Fog(k))
-    hits: list[Collision] = []
     try:
         traffic.start(1)
-        for _ in range(steps):
-            traffic.advance(Command())
-            snapshot = traffic.observe()
-            assert snapshot is not None
-            hits += snapshot.collisions
-            speed = float(snapshot.state.speed[snapshot.ego])
+        snapshots = driven(traffic, steps)
     finally:
         traffic.close()
-    return hits, speed
+    last = snapshots[-1]
+    return [hit for one in snapshots for hit in one.collisions], float(last.state.speed[last.ego])
 
 
 @pytest.mark.parametrize(("sight", "reaction"), [(50.0, 0.0), (40.0, 0.0), (80.0, 1.0)])
@@ -168,9 +156,7 @@ def first_braking(setup: TrafficSetup, illuminance: float) -> float:
         traffic.start(1)
         speed = 0.0
         while True:
-            traffic.advance(Command())
-            snapshot = traffic.observe()
-            assert snapshot is not None
+            (snapshot,) = driven(traffic, 1)
             before, speed = speed, float(snapshot.state.speed[snapshot.ego])
             if snapshot.leader is not None and speed < before - 0.05:
                 return snapshot.leader.gap
@@ -191,7 +177,9 @@ def test_in_dusk_a_driver_first_brakes_where_the_laws_say_without_a_jump(setup: 
 
 
 @pytest.mark.parametrize("bank", [False, True])
-def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: bool, tmp_path: Path) -> None:
+def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(
+    link: LibsumoLink, bank: bool, tmp_path: Path
+) -> None:
     """τ = k d, as far uphill as on the level; in uneven fog along the line between both vehicles' places."""
     far_off = FogBank((0.0, 1e6), (1.0, 0.0), 0.0, 100.0, 10.0, 0.01)
     fog = FieldAccess(FogField(0.03, (1000.0,) * 3, (far_off,) if bank else ()))
@@ -203,21 +191,17 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: b
         encoding="utf-8",
     )
     net = NET.parents[1] / "graded_motorway" / "graded.net.xml"
-    link = LibsumoLink()
-    try:
-        api = link.begin(["--net-file", str(net), "--route-files", str(routes), "--no-step-log", "true"])
-        while len(api.vehicle.getIDList()) < 2:
-            link.step()
-        leader, gap = api.vehicle.getLeader("ego", 200.0)
-        front, ahead = (np.array(api.vehicle.getPosition3D(v)) for v in ("ego", leader))
-        way = float(np.linalg.norm(ahead - front)) - 5.0
-        assert gap + 2.5 == pytest.approx(way, abs=1e-3)
-        assert abs(front[2] - ahead[2]) > 2.5
-        sight = DriverSight(illuminance=10_000.0)
-        pairs = LeaderSight(api, fog, sight, api.vehicle.getSpeed)
-        assert pairs._facing([("ego", leader, gap)], 0.5)[DEPTH] == pytest.approx([0.03 * way], rel=1e-4)
-    finally:
-        link.end()
+    api = link.begin(["--net-file", str(net), "--route-files", str(routes), "--no-step-log", "true"])
+    while len(api.vehicle.getIDList()) < 2:
+        link.step()
+    leader, gap = api.vehicle.getLeader("ego", 200.0)
+    front, ahead = (np.array(api.vehicle.getPosition3D(v)) for v in ("ego", leader))
+    way = float(np.linalg.norm(ahead - front)) - 5.0
+    assert gap + 2.5 == pytest.approx(way, abs=1e-3)
+    assert abs(front[2] - ahead[2]) > 2.5
+    view = DriversView(api, fog, DriverSight(illuminance=10_000.0), Roster(api))
+    pairs = LeaderSight(view, api.vehicle.getSpeed, 0.5)
+    assert pairs._facing([("ego", leader, gap)])[DEPTH] == pytest.approx([0.03 * way], rel=1e-4)
 
 
 def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, model: str = "LC2013") -> bool:
@@ -228,9 +212,7 @@ def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, m
     try:
         traffic.start(1)
         while True:
-            traffic.advance(Command())
-            snapshot = traffic.observe()
-            assert snapshot is not None
+            (snapshot,) = driven(traffic, 1)
             if not snapshot.state.lane[snapshot.ego].endswith("_0"):
                 return True
             if snapshot.leader is not None and snapshot.leader.gap < 45.0:
@@ -275,16 +257,14 @@ def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
 
 def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(crowd: Traffic) -> None:
     crowd.start(1)
-    snapshot = crowd.observe()
-    assert snapshot is not None
+    snapshot = seen(crowd)
     others = [v for v in snapshot.state.ids if v != "ego"]
     chosen = within_sight(60.0)
     speeds = snapshot.state.speed[[snapshot.state.row(v) for v in others]]
     assert np.median(speeds) == pytest.approx(chosen, abs=1.0)
     for _ in range(600):
         crowd.advance(Command(advised_speeds=dict.fromkeys(others, 7.0)))
-    after = crowd.observe()
-    assert after is not None
+    after = seen(crowd)
     rows = [row for v in others if (row := after.state.row(v)) is not None]
     slow = float(np.mean(after.state.speed[rows] < 8.0))
     assert 0.25 < slow < 0.95  # half comply, and some of the others are held up behind them
@@ -301,10 +281,8 @@ def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
     traffic.enter_fog(Fog(0.1))
     try:
         traffic.start(1)
-        snapshot = traffic.observe()
-        assert snapshot is not None
         vehicles = load_libsumo().vehicle
-        return float(np.mean([vehicles.getTau(v) for v in snapshot.state.ids if v != "ego"]))
+        return float(np.mean([vehicles.getTau(v) for v in seen(traffic).state.ids if v != "ego"]))
     finally:
         traffic.close()
 

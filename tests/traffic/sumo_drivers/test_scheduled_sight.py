@@ -1,41 +1,29 @@
 """Looking only when sight could have changed decides in every step as looking in every step does."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
-from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
-from fogsim.traffic.drivers.eye_heights import eye_height
+from fogsim.traffic.appearance import OTHERS_LAMPS, eye_height, lamps_from_signals, paint
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import FogBank, FogField, Lamp
+from tests.traffic.common import CROWD
 
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
 STEP = 0.1
-ARGUMENTS = (
-    *("--net-file", str(FOLDER / "motorway.net.xml"), "--route-files", str(FOLDER / "motorway.rou.xml")),
-    *("--step-length", str(STEP), "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
-)
 EVEN = FogField(0.04, (3000.0, 3000.0, 3000.0))
 BANKS = FogField(
     0.01,
     (3000.0, 3000.0, 3000.0),
     banks=tuple(FogBank((0.0, 0.0), (1.0, 0.0), x, x + 150.0, 60.0, 0.05) for x in range(200, 3000, 300)),
 )
-
-
-@pytest.fixture
-def link() -> Iterator[LibsumoLink]:
-    link = LibsumoLink()
-    yield link
-    link.end()
 
 
 def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str, float], lamps: Lamp) -> bool:
@@ -58,18 +46,20 @@ def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str
 @pytest.mark.parametrize("illuminance", [10_000.0, 3.0, 0.1], ids=["day", "dusk", "night"])
 def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
     """For every leader that has been the leader for as long as a look may wait."""
-    api, fog = link.begin(ARGUMENTS), FieldAccess(field)
+    api, fog = link.begin(CROWD), FieldAccess(field)
     for _ in range(600):
         link.step()
     sight = DriverSight(illuminance, reaction_time=0.0)
-    perception = Perception(api, fog, sight)
+    roster = Roster(api)
+    perception = Perception(DriversView(api, fog, sight, roster))
     steady: dict[str, tuple[str, int]] = {}
-    compared, changes, before = 0, 0, perception.ignored
+    compared, changes, before = 0, 0, dict(perception.hidden)
     for step in range(400):
         link.step()
         lamps = Lamp.REAR_FOG if step % 100 > 50 else Lamp.NONE
+        roster.update()
         perception.update({"ego": int(lamps)})
-        ignored = perception.ignored
+        ignored = dict(perception.hidden)
         changes += len(ignored.items() ^ before.items())
         before = ignored
         for follower in api.vehicle.getIDList():
@@ -85,10 +75,11 @@ def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field:
 
 
 def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
-    api = link.begin(ARGUMENTS)
+    api = link.begin(CROWD)
     for _ in range(600):
         link.step()
-    perception = Perception(api, FieldAccess(EVEN), DriverSight(10_000.0))
+    roster = Roster(api)
+    perception = Perception(DriversView(api, FieldAccess(EVEN), DriverSight(10_000.0), roster))
     asked: list[str] = []
     original = perception.leader
 
@@ -100,6 +91,7 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
     present = 0
     for _ in range(100):
         link.step()
+        roster.update()
         perception.update({"ego": 0})
         present += api.vehicle.getIDCount()
     assert set(api.vehicle.getIDList()) <= set(asked)

@@ -2,17 +2,18 @@
 
 import math
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import NEAREST, VehicleSight
-from fogsim.units import extinction_from_visibility
+from fogsim.traffic.drivers.sight_kernels import BEARING, LINE, NEAREST
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import FogBank, FogField, Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on
+from tests.traffic.common import even
 
 DAY, NIGHT = DriverSight(10_000.0), DriverSight(0.01)
 DARK: OwnLamps = {"other": sum(dark_on(int(ALL_LAMPS), side) for side in Side)}
@@ -35,14 +36,16 @@ def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0, 
         getColor=lambda _: (0, 0, 0, 255),
         getLength=lambda _: LENGTH,
         getWidth=lambda _: WIDTH,
+        getHeight=lambda _: 1.5,
+        getMinGap=lambda _: 2.5,
         getVehicleClass=lambda vehicle: observer if vehicle == "me" else "passenger",
         getShapeClass=lambda _: "",
     )
     return SimpleNamespace(vehicle=vehicle)
 
 
-def even(visibility: float) -> FieldAccess:
-    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
+def sight_of(api: Any, fog: FieldAccess, sight: DriverSight) -> VehicleSight:
+    return VehicleSight(DriversView(api, fog, sight, cast("Roster", None)))
 
 
 def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows() -> None:
@@ -55,28 +58,28 @@ def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows() -> None:
         (-20.0, 0.0, 0.0, 20.0, 180.0),  # behind me
         (2.0, 0.0, 0.0, NEAREST, None),  # where I am
     ]:
-        line = VehicleSight(two_vehicles(ahead, left, turned), even(100.0), DAY).line_of_sight("me", "other")
-        assert line.distance == pytest.approx(distance)
+        (line,) = sight_of(two_vehicles(ahead, left, turned), even(100.0), DAY).lines_of_sight(PAIR)
+        assert line[LINE] == pytest.approx(distance)
         if bearing is not None:
-            assert abs(math.degrees(line.bearing)) == pytest.approx(abs(bearing), abs=1e-9)
+            assert abs(math.degrees(line[BEARING])) == pytest.approx(abs(bearing), abs=1e-9)
 
 
 def test_the_line_climbs_to_a_vehicle_that_is_higher() -> None:
-    line = VehicleSight(two_vehicles(35.0, 0.0, 0.0, height=4.0), even(100.0), DAY).line_of_sight("me", "other")
-    assert line.distance == pytest.approx(math.hypot(30.0, 4.0))
+    (line,) = sight_of(two_vehicles(35.0, 0.0, 0.0, height=4.0), even(100.0), DAY).lines_of_sight(PAIR)
+    assert line[LINE] == pytest.approx(math.hypot(30.0, 4.0))
 
 
 @pytest.mark.parametrize("turned", [0.0, 90.0, 180.0])
 def test_by_day_every_side_of_a_black_vehicle_is_seen_up_to_the_visibility(turned: float) -> None:
     for distance, expected in ((58.0, True), (62.0, False)):
         ahead = distance + {0.0: LENGTH, 90.0: WIDTH / 2.0, 180.0: 0.0}[turned]
-        sight = VehicleSight(two_vehicles(ahead, 0.0, turned), even(60.0), DAY)
+        sight = sight_of(two_vehicles(ahead, 0.0, turned), even(60.0), DAY)
         assert sight.sees(PAIR, DARK) == [expected]
 
 
 def test_at_night_low_beams_that_come_are_seen_farther_than_tail_lamps_and_these_than_a_side() -> None:
     def farthest(turned: float) -> int:
-        views = (VehicleSight(two_vehicles(float(d), 0.0, turned), even(60.0), NIGHT) for d in range(10, 400))
+        views = (sight_of(two_vehicles(float(d), 0.0, turned), even(60.0), NIGHT) for d in range(10, 400))
         return sum(view.sees(PAIR, {})[0] for view in views)
 
     side, rear, front = farthest(90.0), farthest(0.0), farthest(180.0)
@@ -87,9 +90,9 @@ def test_at_night_own_head_lamps_show_only_what_is_in_their_beam() -> None:
     lit: OwnLamps = {**DARK, "me": int(Lamp.LOW_BEAM)}
     unlit: OwnLamps = {**DARK, "me": int(Lamp.POSITION)}
     ahead, beside = two_vehicles(25.0, 0.0, 0.0), two_vehicles(9.0, 20.0, 0.0)
-    assert VehicleSight(ahead, even(400.0), NIGHT).sees(PAIR, lit) == [True]
-    assert VehicleSight(ahead, even(400.0), NIGHT).sees(PAIR, unlit) == [False]
-    assert VehicleSight(beside, even(400.0), NIGHT).sees(PAIR, lit) == [False]
+    assert sight_of(ahead, even(400.0), NIGHT).sees(PAIR, lit) == [True]
+    assert sight_of(ahead, even(400.0), NIGHT).sees(PAIR, unlit) == [False]
+    assert sight_of(beside, even(400.0), NIGHT).sees(PAIR, lit) == [False]
 
 
 def test_sight_goes_through_the_fog_that_lies_on_its_line() -> None:
@@ -97,9 +100,9 @@ def test_sight_goes_through_the_fog_that_lies_on_its_line() -> None:
     bank = FogBank((0.0, 0.0), (1.0, 0.0), 10.0, 40.0, 1.0, 0.1)
     fog = FieldAccess(FogField(0.001, (3000.0,) * 3, (bank,)))
     behind, aside = two_vehicles(65.0, 0.0, 0.0), two_vehicles(0.0, 60.0, 0.0)
-    assert VehicleSight(behind, fog, DAY).sees(PAIR, DARK) == [False]
-    assert VehicleSight(aside, fog, DAY).sees(PAIR, DARK) == [True]
-    assert VehicleSight(aside, fog, DAY).sees([], DARK) == []
+    assert sight_of(behind, fog, DAY).sees(PAIR, DARK) == [False]
+    assert sight_of(aside, fog, DAY).sees(PAIR, DARK) == [True]
+    assert sight_of(aside, fog, DAY).sees([], DARK) == []
 
 
 def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
@@ -110,9 +113,7 @@ def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
     fog = FieldAccess(FogField(0.1, (3000.0,) * 3, top=1.5, top_edge=0.001))
 
     def farthest(observer: str) -> float:
-        views = {
-            d: VehicleSight(two_vehicles(float(d), 0.0, 180.0, observer=observer), fog, DAY) for d in range(5, 200)
-        }
+        views = {d: sight_of(two_vehicles(float(d), 0.0, 180.0, observer=observer), fog, DAY) for d in range(5, 200)}
         return max(distance for distance, view in views.items() if view.sees(PAIR, DARK)[0])
 
     assert farthest("truck") / farthest("passenger") == pytest.approx((2.33 - 1.2) / (1.5 - 1.2), rel=0.04)
@@ -120,4 +121,4 @@ def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
 
 def test_a_vehicle_that_is_nowhere_is_not_seen() -> None:
     nowhere = two_vehicles(-1073741824.0, -1073741824.0, 0.0)
-    assert VehicleSight(nowhere, even(100.0), DAY).sees(PAIR, {}) == [False]
+    assert sight_of(nowhere, even(100.0), DAY).sees(PAIR, {}) == [False]

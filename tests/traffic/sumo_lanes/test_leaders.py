@@ -1,6 +1,5 @@
 """Leaders in the sublane model against geometry: positions, lengths and widths on a straight road along x."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.atmosphere import FieldAccess
 from fogsim.metrics.following import find_following
 from fogsim.metrics.surrogate import time_to_collision
 from fogsim.scenario import scenario_from_config
@@ -17,12 +15,12 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_lanes.courses import Courses
-from fogsim.traffic.sumo_lanes.leaders import Leaders
-from fogsim.units import extinction_from_visibility
-from fogsim.values import FogField, TrafficState
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
+from fogsim.traffic.sumo_lanes.leaders import Courses, Leaders
+from fogsim.values import TrafficState
+from tests.traffic.common import DATA, QUIET, even
 
-CASES = Path(__file__).resolve().parents[2] / "data" / "sumo_cases"
+CASES = DATA / "sumo_cases"
 REACH = 250.0
 
 NET = """<net version="1.20" {side}><location netOffset="0,0" convBoundary="0,0,800,0" origBoundary="0,0,800,0"
@@ -44,7 +42,7 @@ FLOW = '<flow id="{0}" type="{0}" route="r" begin="0" end="200" period="{1}" dep
 
 
 @pytest.fixture(params=["right-hand", "left-hand"])
-def crowd(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[LibsumoLink, Any]]:
+def crowd(link: LibsumoLink, request: pytest.FixtureRequest, tmp_path: Path) -> tuple[LibsumoLink, Any]:
     """Two wide lanes across a junction, full of vehicles side by side."""
     middles = (-6.75, -2.25) if request.param == "right-hand" else (-2.25, -6.75)
 
@@ -58,11 +56,8 @@ def crowd(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Libs
     (tmp_path / "a.net.xml").write_text(NET.format(side=side, links="".join(links), **parts))
     flows = "".join(FLOW.format(*flow, "random") for flow in (("motorcycle", 4), ("car", 3), ("lorry", 9)))
     (tmp_path / "a.rou.xml").write_text(DEMAND.format(flows=flows))
-    link = LibsumoLink()
     names = ("-n", str(tmp_path / "a.net.xml"), "-r", str(tmp_path / "a.rou.xml"))
-    api = link.begin([*names, "--lateral-resolution", "0.5", "--no-step-log", "true", "--no-warnings", "true"])
-    yield link, api
-    link.end()
+    return link, link.begin([*names, "--lateral-resolution", "0.5", *QUIET])
 
 
 def state_of(api: Any) -> TrafficState:
@@ -141,7 +136,7 @@ def test_a_motorcycle_in_the_same_wide_lane_is_no_leader() -> None:
     assert beside > 3
 
 
-def test_drivers_look_for_those_ahead_of_their_width(tmp_path: Path) -> None:
+def test_drivers_look_for_those_ahead_of_their_width(link: LibsumoLink, tmp_path: Path) -> None:
     """A motorcycle next to a car does not hide from its driver's reckoning that the car ahead is out of sight."""
     (tmp_path / "a.rou.xml").write_text(
         """<routes><vType id="m" vClass="motorcycle" latAlignment="right" sigma="0"/>
@@ -150,15 +145,10 @@ def test_drivers_look_for_those_ahead_of_their_width(tmp_path: Path) -> None:
         <vehicle id="m" type="m" route="r" depart="0" departPos="102" departSpeed="10" departPosLat="right"/>
         <vehicle id="c" type="c" route="r" depart="0" departPos="180" departSpeed="10" departPosLat="left"/></routes>"""
     )
-    link = LibsumoLink()
     names = ("-n", str(CASES / "side_by_side.net.xml"), "-r", str(tmp_path / "a.rou.xml"))
-    api = link.begin([*names, "--lateral-resolution", "0.8", "--no-step-log", "true", "--no-warnings", "true"])
-    try:
-        link.step()
-        assert api.vehicle.getLeader("me", REACH)[0] == "m"
-        fog = FieldAccess(FogField(extinction_from_visibility(25.0), (3000.0,) * 3))
-        perception = Perception(api, fog, DriverSight(1000.0), Roster(api))
-        perception.update({})
-        assert perception.ignored["me"] == "c"
-    finally:
-        link.end()
+    api = link.begin([*names, "--lateral-resolution", "0.8", *QUIET])
+    link.step()
+    assert api.vehicle.getLeader("me", REACH)[0] == "m"
+    perception = Perception(DriversView(api, even(25.0), DriverSight(1000.0), Roster(api)))
+    perception.update({})
+    assert perception.hidden["me"] == "c"

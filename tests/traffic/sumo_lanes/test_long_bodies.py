@@ -1,7 +1,6 @@
 """Bodies longer than 15 m: their pieces lie on the lanes, they are drawn and seen there, and crossings are closed."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,23 +9,24 @@ import pytest
 from numpy.typing import NDArray
 
 import fogsim
-from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import scenario_from_config
 from fogsim.scenario.build import traffic_setup
 from fogsim.traffic import DriverSight, libsumo_traffic
+from fogsim.traffic.drivers.sight_kernels import LINE
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
-from fogsim.traffic.sumo_lanes.lights import LightsAhead
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, sections
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, FogField, Lamp, SignalColour, TrafficState
+from fogsim.traffic.sumo_lanes.street import LightsAhead
+from fogsim.values import Collision, Command, Lamp, SignalColour, TrafficState
 from fogsim.values.command import EgoControl
 from fogsim.values.scene import Instance
 from fogsim.values.traffic import with_pieces
+from tests.traffic.common import DATA, QUIET, even, seen
 
-CASES = Path(__file__).resolve().parents[2] / "data" / "sumo_cases"
+CASES = DATA / "sumo_cases"
 RAILS = CASES / "rails.sumocfg"
 ROAD = ("e0_0", ":r1_2_0", "e1_0", ":b_0_0", "e2_0")
 TRACK = ("t0_0", ":r1_1_0", "t1_0")
@@ -52,15 +52,8 @@ KINDS = {
 }
 
 
-@pytest.fixture
-def link() -> Iterator[LibsumoLink]:
-    link = LibsumoLink()
-    yield link
-    link.end()
-
-
 def begun(link: LibsumoLink, *arguments: str) -> Any:
-    return link.begin([*arguments, "--step-length", "0.5", "--no-step-log", "true", "--no-warnings", "true"])
+    return link.begin([*arguments, "--step-length", "0.5", *QUIET])
 
 
 def line_of(api: Any, lanes: tuple[str, ...]) -> NDArray[np.float64]:
@@ -156,12 +149,13 @@ def test_a_train_on_the_crossing_is_near_wherever_its_front_is(link: LibsumoLink
     api = begun(link, "-c", str(RAILS))
     for _ in range(40):
         link.step()
-    sight = VehicleSight(api, FieldAccess(FogField(extinction_from_visibility(40.0), (3000.0,) * 3)), DriverSight(1e3))
+    sight = VehicleSight(DriversView(api, even(40.0), DriverSight(1e3), Roster(api)))
     eyes, front = (np.array(api.vehicle.getPosition(v)) for v in ("semi", "train"))
     gap = 351.6 - 0.5 * api.vehicle.getWidth("train") - eyes[0]
     assert math.dist(eyes, front) > 100.0
-    assert sight.line_of_sight("semi", "train").distance == pytest.approx(gap, abs=0.5)
-    assert sight.sees([("semi", "train")], {}) == [True]
+    pairs = [("semi", "train")]
+    assert sight.lines_of_sight(pairs)[0, LINE] == pytest.approx(gap, abs=0.5)
+    assert sight.sees(pairs, {}) == [True]
 
 
 def test_an_ego_on_rails_runs_and_is_shown_no_light_of_the_road() -> None:
@@ -201,9 +195,7 @@ def test_who_drives_into_a_train_has_a_collision(tmp_path: Path) -> None:
         traffic.start(1)
         for _ in range(230):
             traffic.advance(Command(control=EgoControl(acceleration=0.0)))
-            snapshot = traffic.observe()
-            assert snapshot is not None
-            hits += snapshot.collisions
+            hits += seen(traffic).collisions
     finally:
         traffic.close()
     assert [(hit.collider, hit.victim) for hit in hits] == [("ego", "train")]

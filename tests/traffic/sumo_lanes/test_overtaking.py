@@ -13,8 +13,8 @@ from fogsim.scenario import scenario_from_config
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.leaders import Leaders
-from fogsim.traffic.sumo_lanes.lights import LightsAhead
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
+from fogsim.traffic.sumo_lanes.street import LightsAhead
 from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
 from fogsim.values import Step, Stretch
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import libsumo
 import pytest
@@ -11,10 +10,9 @@ from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger, libsumo_traffic
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from fogsim.values import Command
-from tests.traffic.test_libsumo_traffic import SETUP
+from tests.traffic.common import DATA, SETUP, driven
 
-GRID = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.sumocfg"
+GRID = DATA / "grid" / "grid.sumocfg"
 
 
 def test_gaps_are_those_that_sumo_keeps_to_its_leaders_on_roads_and_junctions() -> None:
@@ -46,9 +44,7 @@ def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:
         traffic.start(1)
         gaps = [math.inf]
         for _ in range(150):
-            traffic.advance(Command())
-            snapshot = traffic.observe()
-            assert snapshot is not None
+            (snapshot,) = driven(traffic, 1)
             state, lead = snapshot.state, snapshot.state.row("lead")
             assert lead is not None
             if state.lamps[lead] == 0:

@@ -9,8 +9,8 @@ import sumo
 
 from fogsim.traffic.templates import ROAD_TEMPLATES, net_text
 from fogsim.traffic.templates.alignment import Points
-from fogsim.traffic.templates.junction import junctions
 from fogsim.traffic.templates.net_plan import NetPlan
+from fogsim.traffic.templates.net_writer import junctions
 
 Link = tuple[str, str, str, str]
 TURNS = {"r": 0, "R": 0, "s": 1, "L": 2, "l": 2}

@@ -12,15 +12,12 @@ import math
 
 import numpy as np
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
-from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
-from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
+from fogsim.traffic.sumo.link import vehicle_getter
+from fogsim.traffic.sumo.roster import Due, DueVehicles
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
+from fogsim.traffic.sumo_lanes.street import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
 _SIGNAL_HEIGHT = 2.0
@@ -29,20 +26,20 @@ _SIGNAL_HEIGHT = 2.0
 _EYE_HEIGHT, _HEAD_HEIGHT = 1.2, 3.0
 """Heights above the road from which and at which a light is looked for past what stands next to the road [m]."""
 
-REACH = 250.0
+_REACH = 250.0
 """No one brakes for a light farther ahead than this [m]."""
 
-MAX_PAUSE = 0.5
+_MAX_PAUSE = 0.5
 """A driver within reach of a light looks at least this often [s]."""
 
 _PAUSE_IN_DOUBT = 0.2
 """And one to whom uneven fog may show it at any time, at least this often [s]."""
 
-FAR_PAUSE = 2.0
+_FAR_PAUSE = 2.0
 """And one who is not, at least this often [s]."""
 
 _FASTEST_GAIN = 10.0
-"""No one is faster by more than this after `FAR_PAUSE` [m/s]."""
+"""No one is faster by more than this after `_FAR_PAUSE` [m/s]."""
 
 _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
@@ -52,30 +49,19 @@ _NOT_SEEN = math.inf
 class SignalSight:
     """Decides which drivers see the light ahead of them."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        session: str,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._obstructions = obstructions
-        self._api = api
-        self._fog = fog
-        self._sight = sight
-        self._roster = roster
+    def __init__(self, view: DriversView) -> None:
+        api = self._api = view.api
+        self._fog, self._sight, self._roster, self._obstructions = view.fog, view.sight, view.roster, view.obstructions
         self._lights = LightsAhead(api)
         self._speed = vehicle_getter(api, "getSpeed")
         self._deceleration = vehicle_getter(api, "getEmergencyDecel")
-        self._modes = Claims(api, SPEED_MODE, session)
+        self._modes = Claims(api, SPEED_MODE, view.session)
         self._step = float(api.simulation.getDeltaT())
-        self._due = DueVehicles(roster, self._step)
+        self._due = DueVehicles(view.roster, self._step)
         self._certainly_seen = self._certainly_hidden = math.inf
         if api.trafficlight.getIDCount():
-            self._certainly_seen = 0.0 if obstructions else self._seen_distance(fog.maximum_extinction)
-            self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
+            self._certainly_seen = 0.0 if view.obstructions else self._seen_distance(view.fog.maximum_extinction)
+            self._certainly_hidden = self._seen_distance(view.fog.minimum_extinction)
         self._unseen: dict[str, float] = {}
         self._braking_late: dict[str, str] = {}
         self._left_passing: set[str] = set()
@@ -91,7 +77,7 @@ class SignalSight:
 
     def update(self, own_lamps: OwnLamps) -> None:  # noqa: ARG002 - every part gets the lamps
         """Make SUMO's drivers ignore lights that they do not see."""
-        if self._certainly_seen >= REACH:
+        if self._certainly_seen >= _REACH:
             return
         due = self._due.take()
         railways = self._forget(due) if due.gone else ()
@@ -118,9 +104,9 @@ class SignalSight:
         light = self._lights.next_of(driver)
         if driver in self._braking_late:
             return self._brake_late(driver, light)
-        if light is None or light[2] > REACH:
+        if light is None or light[2] > _REACH:
             self._obey(driver)
-            return FAR_PAUSE if light is None else max(self._time_for(driver, light[2] - REACH), MAX_PAUSE)
+            return _FAR_PAUSE if light is None else max(self._time_for(driver, light[2] - _REACH), _MAX_PAUSE)
         return self._notice(driver, light) if self._sees(driver, light) else self._overlook(driver, light[2])
 
     def _overlook(self, driver: str, way: float) -> float:
@@ -131,21 +117,21 @@ class SignalSight:
         return self._time_for(driver, certain) if certain > 0.0 else _PAUSE_IN_DOUBT
 
     def _time_for(self, driver: str, way: float) -> float:
-        """What a driver needs for a way at least, if it is less than `FAR_PAUSE` [s]."""
-        return min(way / (float(self._speed(driver)) + _FASTEST_GAIN), FAR_PAUSE)
+        """What a driver needs for a way at least, if it is less than `_FAR_PAUSE` [s]."""
+        return min(way / (float(self._speed(driver)) + _FASTEST_GAIN), _FAR_PAUSE)
 
     def _notice(self, driver: str, light: Light) -> float:
         if driver not in self._unseen:
             # What is certainly seen is so until it is passed.
             certain = light[2] if light[2] <= self._certainly_seen else 0.0
-            return max(self._time_for(driver, certain), MAX_PAUSE)
+            return max(self._time_for(driver, certain), _MAX_PAUSE)
         now = self._roster.time
         since = self._unseen[driver] = min(self._unseen[driver], now)
         if now - since < self._sight.reaction_time:
             return 0.0
         self._obey(driver)
         if light[3].lower() not in _STOPPING or self._can_stop(driver, light[2]):
-            return MAX_PAUSE
+            return _MAX_PAUSE
         self._braking_late[driver] = light[0]
         return self._brake_late(driver, light)
 

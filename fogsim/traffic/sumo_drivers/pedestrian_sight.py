@@ -9,17 +9,13 @@ import functools
 import math
 from collections.abc import Iterable, Iterator
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS
-from fogsim.traffic.drivers.lamp_intensity import head_lamp_share
-from fogsim.traffic.drivers.own_beams import head_lamp_light
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.drivers.lamp_intensity import head_lamp_light, head_lamp_share
+from fogsim.traffic.sumo.link import getter, vehicle_getter
+from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 
-LOOK_PERIOD = 0.2
+_LOOK_PERIOD = 0.2
 """Time between two looks at pedestrians [s]."""
 
 _FARTHEST_PERSON = 100.0
@@ -35,7 +31,7 @@ where such a vehicle is at 55 m; FogSim's choice."""
 _BODY_MIDDLE = 1.0
 """Height of eyes and persons above the road [m]."""
 
-HEAD = 1.65
+_HEAD = 1.65
 """Height above the road of a person's head, which may be seen over a hedge or a wall [m]."""
 
 _OWN_PART = "persons"
@@ -46,37 +42,25 @@ _PLACES_ON_FOOT = (_CROSSING, _WALKING_AREA)
 class PedestrianSight:
     """Decides which pedestrians at junctions are seen."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        session: str,
-        obstructions: Obstructions = CLEAR_SIGHT,
-    ) -> None:
-        self._obstructions = obstructions
-        self._api = api
-        self._fog = fog
-        self._sight = sight
-        self._roster = roster
-        self._position = vehicle_getter(api, "getPosition3D")
-        self._person_position = getter(api, "person", "getPosition3D")
-        self._person_count = getter(api, "person", "getIDCount")
-        self._unseen = UnseenFoes(api, f"{session} {_OWN_PART}", sight.reaction_time)
-        self._seen_through_fog = sight.seen_distance(fog.maximum_extinction, _CONTRAST, head_lamps=0.0)
-        self._certainly_seen = 0.0 if obstructions else self._seen_through_fog
+    def __init__(self, view: DriversView) -> None:
+        self._api, self._fog, self._sight, self._roster = view.api, view.fog, view.sight, view.roster
+        self._obstructions = view.obstructions
+        self._position = vehicle_getter(view.api, "getPosition3D")
+        self._person_position = getter(view.api, "person", "getPosition3D")
+        self._person_count = getter(view.api, "person", "getIDCount")
+        self._unseen = UnseenFoes(view.api, f"{view.session} {_OWN_PART}", view.sight.reaction_time)
+        self._seen_through_fog = view.sight.seen_distance(view.fog.maximum_extinction, _CONTRAST, head_lamps=0.0)
+        self._certainly_seen = 0.0 if view.obstructions else self._seen_through_fog
         self._mark = 0
         self._roads: dict[str, tuple[str, ...]] = {}
         self._next = 0.0
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore pedestrians that they do not see."""
-        self._roster.update()
         now = self._roster.time
         if self._certainly_seen >= _FARTHEST_PERSON or now < self._next:
             return
-        self._next = now + LOOK_PERIOD
+        self._next = now + _LOOK_PERIOD
         new, self._mark = self._roster.entered_since(self._mark)
         present = self._roster.present
         self._unseen.forget([v for v in self._unseen.drivers if v not in present] + new, present.intersection(new))
@@ -132,7 +116,7 @@ class PedestrianSight:
         (x, y, z), (end_x, end_y, end_z) = self._position(driver), self._person_position(person)
         eyes, end = (x, y, z + _BODY_MIDDLE), (end_x, end_y, end_z + _BODY_MIDDLE)
         distance = math.dist(eyes, end)
-        if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + HEAD)]])[0]:
+        if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + _HEAD)]])[0]:
             return False
         if distance <= self._seen_through_fog:
             return True

@@ -1,27 +1,82 @@
-"""Drivers at junctions yield only to whom they can see.
+"""Foes at junctions, as SUMO reports them, and none where it cannot.
 
-SUMO's drivers get the foes to ignore (``junctionModel.ignoreIDs``), and only when those change; so who has the right of
-way, which gaps are accepted and how a driver brakes for somebody in the way stay SUMO's. To a driver who does not see a
-foe the junction is free of it: a minor road's driver pulls out, and one with priority does not brake for somebody who
-crosses until that one can be seen, and the reaction time is over.
+Where no one has the right of way (junctions of type ``unregulated``, also those that netconvert makes so since they
+have too many lanes), no one yields; SUMO 1.28 ends with a segmentation fault if it is asked for foes there.
 """
 
+import functools
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
+from fogsim.core.files.xml_reader import open_unpacked
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
-from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.due_vehicles import DueVehicles
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
-from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
-from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo.link import Api, edge_length, vehicle_getter
+from fogsim.traffic.sumo.roster import DueVehicles
+from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
+from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
+
+_Foe = tuple[str, float, float, float, float, str, str, bool, bool]
+"""SUMO's answer: foe, ways of driver and foe to where they cross, and so on; see libsumo's ``getJunctionFoes``."""
+
+_JUNCTION = re.compile(rb'<junction\s[^>]*\btype="(?:traffic_light_)?unregulated"[^>]*>')
+_ID = re.compile(rb'\bid="([^"]*)"')
+
+
+class JunctionFoes:
+    """Asks SUMO for foes at junctions."""
+
+    def __init__(self, api: Api, net: Path | None = None) -> None:
+        self._api = api
+        self._net = net
+        self._foes = vehicle_getter(api, "getJunctionFoes")
+        self._vehicles, self._places = api.vehicle, RoutePlaces(api)
+
+    @functools.cached_property
+    def _unregulated(self) -> frozenset[str]:
+        # Only in fog need the file be read.
+        return unregulated_junctions(self._net or Path(self._api.simulation.getOption("net-file")))
+
+    @functools.cached_property
+    def _leading_there(self) -> frozenset[str]:
+        get = self._api.junction.getIncomingEdges
+        return frozenset(edge for name in self._unregulated for edge in get(name))
+
+    def ahead_of(self, driver: str, reach: float) -> Sequence[_Foe]:
+        """Foes of a driver at the junctions within reach (`reach` [m])."""
+        if self._leading_there and self._meets_unregulated(driver, reach):
+            return ()
+        foes: Sequence[_Foe] = self._foes(driver, reach)
+        return foes
+
+    def _meets_unregulated(self, driver: str, reach: float) -> bool:
+        vehicles = self._vehicles
+        road = str(vehicles.getRoadID(driver))
+        if road.startswith(":") and road[1:].rpartition("_")[0] in self._unregulated:
+            return True
+        way = -self._places.find(driver).station
+        for edge in vehicles.getRoute(driver)[max(int(vehicles.getRouteIndex(driver)), 0) :]:
+            if edge in self._leading_there:
+                return True
+            way += edge_length(self._api, edge)
+            if way > reach:
+                return False
+        return False
+
+
+def unregulated_junctions(net: Path) -> frozenset[str]:
+    """Junctions of a network at which no one has the right of way; none if there is no such file here."""
+    if not net.is_file():
+        return frozenset()
+    with open_unpacked(net) as source:
+        tags = _JUNCTION.findall(source.read())
+    return frozenset(found[1].decode() for tag in tags if (found := _ID.search(tag)))
+
 
 _FARTHEST_FOE = 250.0
 """Foes whose ways to the junction and the driver's add up to more than this do not matter [m]."""
@@ -35,7 +90,7 @@ _ON_JUNCTION = 15.0
 _BRAKING = 4.5
 """SUMO's drivers begin to brake for a foe on the junction where this deceleration is enough [m/s²]."""
 
-MAX_PAUSE = 0.5
+_MAX_PAUSE = 0.5
 """A driver near a junction looks for foes at least this often [s]."""
 
 _PAUSE_IN_DOUBT = 0.2
@@ -44,14 +99,14 @@ _PAUSE_IN_DOUBT = 0.2
 For one who may be on the junction, in each step.
 """
 
-ALONG_A_LANE = 2.0
+_ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
 
 _LONG_LANE = 150.0
 """On shorter lanes a junction is always near [m]."""
 
 _FASTEST_GAIN = 10.0
-"""No one is faster by more than this after `ALONG_A_LANE` [m/s]."""
+"""No one is faster by more than this after `_ALONG_A_LANE` [m/s]."""
 
 # Of the lamps that others light, on any side of a vehicle.
 _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
@@ -60,30 +115,19 @@ _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
 class JunctionSight:
     """Decides which foes at junctions are seen."""
 
-    def __init__(
-        self,
-        api: Api,
-        fog: FogAccess,
-        sight: DriverSight,
-        roster: Roster,
-        foes: JunctionFoes,
-        vehicle_sight: VehicleSight,
-        remote: bool,
-        session: str,
-    ) -> None:
-        self._roster = roster
-        self._reaction_time = sight.reaction_time
+    def __init__(self, view: DriversView, foes: JunctionFoes, vehicle_sight: VehicleSight) -> None:
+        api, self._roster, self._reaction_time = view.api, view.roster, view.sight.reaction_time
         self._foes = foes
-        self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
-            api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
+        self._speed, self._position, self._lane, self._lane_position = view.getters(
+            "getSpeed", "getPosition3D", "getLaneID", "getLanePosition"
         )
         self._lane_length, self._directions = api.lane.getLength, LaneDirections(api)
-        self._lane_lengths: dict[str, float] = {}
+        self._lanes: dict[str, tuple[float, bool]] = {}
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
-        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST)
-        self._unseen = UnseenFoes(api, session, sight.reaction_time)
-        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._certainly_hidden = view.sight.hidden_distance(view.fog.minimum_extinction, _BRIGHTEST)
+        self._unseen = UnseenFoes(api, view.session, self._reaction_time)
+        self._due = DueVehicles(view.roster, float(api.simulation.getDeltaT()))
 
     @property
     def ignored(self) -> dict[str, frozenset[str]]:
@@ -96,10 +140,9 @@ class JunctionSight:
             return
         due = self._due.take()
         if due.gone:
-            self._vehicle_sight.forget(due.gone)
             self._unseen.forget(due.gone, due.new)
         doubts: dict[str, dict[str, float]] = {}
-        certain: dict[float, list[str]] = {MAX_PAUSE: [], ALONG_A_LANE: []}
+        certain: dict[float, list[str]] = {_MAX_PAUSE: [], _ALONG_A_LANE: []}
         for driver in due.vehicles:
             pause, foes = self._foes_in_doubt(driver)
             if foes:
@@ -116,11 +159,10 @@ class JunctionSight:
 
         With each, when to look for it again [s].
         """
-        speed = self._speed(driver)
-        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
-        unseen = self._unseen.of(driver)
+        speed, unseen = self._speed(driver), self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
-            return ALONG_A_LANE, {}
+            return _ALONG_A_LANE, {}
+        yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * _MAX_PAUSE)
         doubtful: dict[str, float] = {}
         near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * _BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
@@ -132,20 +174,19 @@ class JunctionSight:
                 doubtful[foe] = 0.0 if is_there else _PAUSE_IN_DOUBT
         if unseen and not doubtful:
             self._unseen.decide(driver, {}, self._roster.time)
-        return MAX_PAUSE, doubtful
+        return _MAX_PAUSE, doubtful
 
     def _is_far(self, driver: str, speed: float) -> bool:
-        """Whether no junction can come near a driver for `ALONG_A_LANE`."""
+        """Whether no junction can come near a driver for `_ALONG_A_LANE`."""
         lane = self._lane(driver)
-        if self._directions.is_against(driver, lane):
-            return False
-        length = self._lane_lengths.get(lane)
-        if length is None:
-            length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
-        if length < _LONG_LANE:
+        if lane not in self._lanes:
+            length = float(self._lane_length(lane)) if lane else 0.0
+            self._lanes[lane] = length, self._directions.is_two_way(lane)
+        length, is_two_way = self._lanes[lane]
+        if length < _LONG_LANE or (is_two_way and self._directions.is_against(driver, lane)):
             return False
         fastest = speed + _FASTEST_GAIN
-        reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
+        reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)
         return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * _BRAKING))
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:

@@ -1,17 +1,19 @@
 """Traffic lights and persons of a real SUMO at a crossing, and where the heads stand."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fogsim.traffic import TrafficSetup, libsumo_traffic
+from fogsim.traffic import libsumo_traffic
 from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, read_net, signal_heads
 from fogsim.values import Command, SignalColour, TrafficSnapshot
+from tests.traffic.common import DATA, setup_of
 
-NET = Path(__file__).resolve().parents[2] / "data" / "crossing" / "lights.net.xml"
+NET = DATA / "crossing" / "lights.net.xml"
 DEMAND = """<routes>
 <vType id="c" sigma="0" speedDev="0"/>
 <vType id="w" vClass="pedestrian" speed="1.2" sigma="0"/>
@@ -23,19 +25,7 @@ DEMAND = """<routes>
 
 
 def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
-    routes = folder / "crossing.rou.xml"
-    routes.write_text(DEMAND, encoding="utf-8")
-    setup = TrafficSetup(
-        net=NET,
-        routes=(routes,),
-        additional=(),
-        ego="ego",
-        step_length=0.5,
-        keep_lane=(),
-        warm_up_limit=10.0,
-        advice_deceleration=2.0,
-        reading_radius=2000.0,
-    )
+    setup = replace(setup_of(folder, DEMAND, step=0.5), net=NET)
     traffic = libsumo_traffic(setup)
     seen = []
     try:

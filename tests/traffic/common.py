@@ -1,0 +1,85 @@
+"""What tests of the traffic share: the motorway, even fog, and what is seen of a simulation."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from early_motorway import ROUTES
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import Traffic, TrafficSetup
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField, TrafficSnapshot, TrafficState
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+MOTORWAY = DATA.parents[1] / "scenarios" / "motorway_fog_bank"
+NET = MOTORWAY / "motorway.net.xml"
+QUIET = ("--no-step-log", "true", "--no-warnings", "true")
+CROWD = (
+    *("--net-file", str(NET), "--route-files", str(MOTORWAY / "motorway.rou.xml")),
+    *("--step-length", "0.1", "--seed", "5", *QUIET),
+)
+"""SUMO's command line for the motorway's own traffic."""
+
+SETUP = TrafficSetup(
+    net=NET,
+    routes=(ROUTES,),
+    additional=(MOTORWAY / "signs.add.xml",),
+    ego="ego",
+    step_length=0.1,
+    keep_lane=("ego", "lead"),
+    warm_up_limit=600.0,
+    advice_deceleration=2.0,
+    reading_radius=800.0,
+)
+"""The motorway with an ego that enters early."""
+
+
+def setup_of(folder: Path, routes: str, keep_lane: Sequence[str] = (), step: float = 0.1) -> TrafficSetup:
+    """The motorway with other vehicles, all of which are read."""
+    file = folder / "demand.rou.xml"
+    file.write_text(routes, encoding="utf-8")
+    return TrafficSetup(
+        net=NET,
+        routes=(file,),
+        additional=(),
+        ego="ego",
+        step_length=step,
+        keep_lane=tuple(keep_lane),
+        warm_up_limit=60.0,
+        advice_deceleration=2.0,
+        reading_radius=6000.0,
+    )
+
+
+def even(visibility: float) -> FieldAccess:
+    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
+
+
+def seen(traffic: Traffic) -> TrafficSnapshot:
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    return snapshot
+
+
+def driven(traffic: Traffic, steps: int, command: Command | None = None) -> list[TrafficSnapshot]:
+    """What is seen after each step."""
+    snapshots = []
+    for _ in range(steps):
+        traffic.advance(command or Command())
+        snapshots.append(seen(traffic))
+    return snapshots
+
+
+def speeds_of(snapshots: Sequence[TrafficSnapshot]) -> dict[str, list[float]]:
+    """Speeds of all vehicles, from the snapshot on in which they are first seen."""
+    speeds: dict[str, list[float]] = {}
+    for snapshot in snapshots:
+        for vehicle, speed in zip(snapshot.state.ids, snapshot.state.speed.tolist(), strict=True):
+            speeds.setdefault(vehicle, []).append(speed)
+    return speeds
+
+
+def heard(state: TrafficState) -> Mapping[str, float]:
+    """What those have heard advised who have heard anything."""
+    return {v: s for v, s in zip(state.ids, state.advised_speed.tolist(), strict=False) if s < math.inf}

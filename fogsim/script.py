@@ -22,7 +22,6 @@ from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
 from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
-from fogsim.scenario.loading import as_written
 from fogsim.scenario.roads.schema import ActorSection as Actor
 from fogsim.scenario.roads.schema import DemandSection as Demand
 from fogsim.scenario.roads.schema import Road
@@ -66,6 +65,7 @@ from fogsim.scenario.timeline.schema import (
 from fogsim.scenario.traffic_schema import DriversSection as Drivers
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation.cases import Verdict
+from fogsim.scenario.written_form import as_written
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 _TRAFFIC_FILES = ("config", "net")

@@ -18,7 +18,7 @@ ROUTE = np.array([[0.0, 0.0, 412.0], [3000.0, 0.0, 430.0]])
 
 
 def fog(*settings: str) -> FogField:
-    return build.fog_field(load_scenario("motorway_fog_bank", [f"fog.{s}" for s in settings]), ROUTE)
+    return build.world_config(load_scenario("motorway_fog_bank", [f"fog.{s}" for s in settings])).fog.along(ROUTE)
 
 
 def test_heights_count_from_the_lowest_point_of_the_route() -> None:

@@ -8,26 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import field_at, with_change
-from fogsim.camera import Delivered, FaultyLens, FrameDelivery, Pixels, knocked, mounted_pose, unexposed
+from fogsim.camera import CAR, BodyPitch, Delivered, FaultyLens, FrameDelivery, Pixels, knocked, mounted_pose, unexposed
 from fogsim.core.randomness import Streams
 from fogsim.errors import SimulationError
-from fogsim.fusion import DatedFusion
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.schema import NO_RENDERER
-from fogsim.scenario.sensors.faults import fault_of
+from fogsim.fusion import FUSIONS, DatedFusion
 from fogsim.sensors import check_sign_ids, faulty_signs
+from fogsim.simulation.chosen_methods import estimators
 from fogsim.simulation.ego.daylight import Ramp, in_daylight
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.fog_truth import KnownWay, carriageways, fog_truth
 from fogsim.simulation.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.simulation.ego.measurements import EgoSensors
+from fogsim.simulation.ego.motion_blur import exposed
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras
 from fogsim.simulation.ego.second_camera import SecondCamera
 from fogsim.simulation.ego.sensor_faults import FaultSchedule
-from fogsim.simulation.ego.shutter import Shutter, exposed
 from fogsim.simulation.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
+from fogsim.simulation.run_config import NO_RENDERER, RunConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Belief,
@@ -67,32 +66,30 @@ class _RunParts(NamedTuple):
 
 
 class EgoEquipment:
-    """The ego's camera, sensors, estimators and belief, in the fog of a scenario.
+    """The ego's camera, sensors, estimators and belief, in the fog of a run.
 
     Parameters
     ----------
-    scenario : Scenario
-        The scenario; of its traffic, nothing is used.
+    config : RunConfig
+        The run; of its traffic, only the reading radius is used.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._camera_sensor = build.camera_sensor(scenario)
-        self._second = SecondCamera(scenario) if scenario.camera.stereo is not None else None
-        self._body_pitch = build.body_pitch(scenario)
-        blur = scenario.camera.motion_blur
-        self._shutter = Shutter(blur.open_time_s, blur.instants, blur.follows_exposure)
-        self._sensors = EgoSensors(scenario)
-        self._light_sensing = LightSensing(scenario)
-        self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
+    def __init__(self, config: RunConfig) -> None:
+        camera, period = config.camera, config.periods.camera_period
+        self._config = config
+        self._camera_sensor = camera.make_sensor(period)
+        self._second = None if camera.stereo is None else SecondCamera(camera, camera.stereo, period)
+        self._body_pitch = BodyPitch(camera.suspension, period)
+        self._sensors = EgoSensors(config.sensors)
+        self._light_sensing = LightSensing(config.sensors.light)
         self._schedule: FaultSchedule | None = None
-        self._light = Ramp(scenario.light.illuminance_lx)
+        self._light = Ramp(config.world.illuminance)
         self._daylight = self._light.first
         self._fog: FogField | None = None
         self._fog_now: FogField | None = None
         self._glass, self._delivery = FaultyLens(), FrameDelivery()
         self._watch, self._leads = FrameWatch(), LeadHistory()
-        self._fusion = DatedFusion(build.fusion(scenario), scenario.fusion.method)
+        self._fusion = DatedFusion(config.fusion.make(FUSIONS), config.fusion.name)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
@@ -101,20 +98,19 @@ class EgoEquipment:
         self._way = KnownWay()
         self._network: tuple[RoadNetwork, SignMap] | None = None
         self._sign_faults: tuple[FaultKind, ...] = ()
-        self._mount_camera(build.CAR)
+        self._mount_camera(CAR)
 
     def _mount_camera(self, body: str) -> None:
         """Put the camera where it belongs on a kind of body, and pass its calibration to the estimators."""
-        scenario = self._scenario
+        camera = self._config.camera
         self._body = body
-        self._camera = build.camera(scenario, body)
-        self._setback = build.camera_mount(scenario, body).setback
-        self._assumed_camera = build.assumed_camera(scenario, body)
+        self._camera, self._assumed_camera = camera.on(body), camera.assumed_on(body)
+        self._setback = camera.mount(body).setback
         self._unexposed = unexposed(self._camera)
-        self._estimators = build.estimators(scenario, self._assumed_camera)
+        self._estimators = estimators(self._config.estimators, self._assumed_camera)
 
     def start_run(
-        self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = build.CAR
+        self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = CAR
     ) -> FogField:
         """Forget earlier runs, and lay the scenario's fog along the route.
 
@@ -143,12 +139,12 @@ class EgoEquipment:
             self._mount_camera(body)
         if self._view_renderer is None:
             self._network = road, _ = network()
-            self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
-            self._reporters = FogReports(self._scenario, road.route)
+            self._meters = RoadMeters(self._config.advice.sections, road.route, road.route_limits)
+            self._reporters = FogReports(self._config.reports, road.route)
             self._way = KnownWay(road.route, carriageways(road.lanes))
             self._sensors.enter_road(road.structures)
         self._schedule = FaultSchedule(streams.faults)
-        self.begin_faults(self._faults, 0.0)
+        self.begin_faults(self._config.sensors.faults, 0.0)
         view = self._view_of_world(())
         for estimator in self._estimators:
             estimator.reset()
@@ -167,11 +163,11 @@ class EgoEquipment:
             self._reporters.reset(streams.reports)
         if self._meters is not None:
             self._meters.reset()
-        self._light = Ramp(self._scenario.light.illuminance_lx)
+        self._light = Ramp(self._config.world.illuminance)
         self._daylight = self._light.first
         if self._fog is None:
             self._fog = view.fog
-        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
+        self._fog = self._config.world.fog.of_run(self._fog, streams.patch_seed)
         self._enter_fog(self._fog)
         return self._fog
 
@@ -184,9 +180,10 @@ class EgoEquipment:
         if self._view_renderer is None or of_signs != self._sign_faults:
             if self._view_renderer is not None:
                 self._view_renderer.close()
-            kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
+            world = self._config.world
+            kind = NoView if world.renderer == NO_RENDERER else ViewRenderer
             standing = faulty_signs(signs, of_signs, Where.WORLD) if of_signs else signs
-            self._view_renderer = kind(self._scenario, road, standing, self._body)
+            self._view_renderer = kind(world, self._config.camera, road, standing, self._body)
             self._sign_faults = of_signs
             if self._fog_now is not None:
                 self._view_renderer.enter_fog(self._fog_now)
@@ -309,7 +306,7 @@ class EgoEquipment:
         second = self._second_image(renderer, snapshot, pose, time, light)
         view, radiance = exposed(
             lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
-            self._shutter.at(self._camera_sensor.share_of_longest_exposure),
+            self._config.camera.shutter.at(self._camera_sensor.share_of_longest_exposure),
             state,
             ego,
             pose,
@@ -348,7 +345,7 @@ class EgoEquipment:
             belief=self._believe(estimates, observation, time, snapshot.route_position),
             command=command,
             ending=ending,
-            reading_radius=self._scenario.traffic.reading_radius_m,
+            reading_radius=self._config.traffic.reading_radius,
         )
 
     def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
@@ -361,13 +358,13 @@ class EgoEquipment:
         state : TrafficState
             Traffic at that time.
         """
-        sensors = self._scenario.sensors.reports.roadside
+        sensors = self._config.reports.roadside
         if sensors is None or sensors.camera is None:
             return ()
         parts = self._run_parts()
         if self._roadside_cameras is None:
-            rng = parts.streams.reports.spawn(1)[0]
-            self._roadside_cameras = RoadsideCameras(self._scenario, sensors, sensors.camera, parts.road.route, rng)
+            period, rng = self._config.periods.camera_period, parts.streams.reports.spawn(1)[0]
+            self._roadside_cameras = RoadsideCameras(sensors, sensors.camera, period, parts.road.route, rng)
         renderer, light = self._lit_world(parts.schedule.at(time), time)
         reports = self._roadside_cameras.look(
             time, light, lambda pose, camera: renderer.render(state, None, pose, time, camera, light)[1]
@@ -403,7 +400,7 @@ class EgoEquipment:
         state, ego = snapshot.state, snapshot.ego
         taken = self._second.take(
             lambda traffic, place, camera: renderer.render(traffic, ego, place, time, camera, light),
-            self._shutter,
+            self._config.camera.shutter,
             state,
             ego,
             pose,
@@ -468,8 +465,8 @@ class EgoEquipment:
         # A late frame belongs with what the radar measured when it was taken.
         observation = replace(observation, lead=self._leads.at(frame.time))
         return tuple(
-            checked_estimate(section.method, estimator.update(observation))
-            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
+            checked_estimate(chosen.name, estimator.update(observation))
+            for chosen, estimator in zip(self._config.estimators, self._estimators, strict=True)
         )
 
     def close(self) -> None:

@@ -48,18 +48,15 @@ from fogsim.scenario.sensors.faults import SignsMissingSection as SignsMissing
 from fogsim.scenario.sensors.faults import SignsMovedSection as SignsMoved
 from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline.lamps import LampActions, LampSides, StopLampSides
-from fogsim.scenario.timeline.schema import (
+from fogsim.scenario.timeline.schema import FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import (
     BrakeAction,
     BreakDownAction,
     DepartAction,
-    FogActions,
     FollowAction,
     LaneAction,
-    LightActions,
-    SignalActions,
     SpeedAction,
     StopAction,
-    TimelineEntry,
     VehicleActions,
 )
 from fogsim.scenario.traffic_schema import DriversSection as Drivers

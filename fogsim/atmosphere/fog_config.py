@@ -53,7 +53,15 @@ class FogConfig:
     eye_height: float = 0.0
 
     def along(self, route: NDArray[np.float64], structures: Sequence[Structure] = ()) -> FogField:
-        """Lay the fog along a route (`route` (n, 3) [m]); `of_run` draws its patches."""
+        """Lay the fog along a route; `of_run` draws its patches.
+
+        Parameters
+        ----------
+        route : (n, 3) float64
+            Points of the route [m].
+        structures : sequence of Structure
+            Bridges and tunnels, into which fog does not get.
+        """
         field, ground = self.field, float(route[:, 2].min())
         tunnels = tunnels_of(structures) if math.isfinite(self.in_tunnels) else ()
         fog = replace(
@@ -70,7 +78,15 @@ class FogConfig:
         return fog
 
     def of_run(self, fog: FogField, patch_seed: int) -> FogField:
-        """Fog with the patches of one run, unless their seed is fixed."""
+        """Fog with the patches of one run, unless their seed is fixed.
+
+        Parameters
+        ----------
+        fog : FogField
+            Fog along a route.
+        patch_seed : int
+            Seed of the patches.
+        """
         if fog.patches is None or not self.has_patches_of_run:
             return fog
         return replace(fog, patches=replace(fog.patches, seed=patch_seed))

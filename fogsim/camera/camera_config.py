@@ -89,17 +89,35 @@ class CameraConfig:
     stereo: StereoConfig | None = None
 
     def mount(self, body: str = CAR) -> CameraMount:
-        """Where the camera is on a body kind."""
+        """Where the camera is on a vehicle.
+
+        Parameters
+        ----------
+        body : str
+            Body kind of the vehicle.
+        """
         if body in self.mounts:
             return self.mounts[body]
         return CameraMount(self.camera.mount_height, USUAL_MOUNTS[body].setback)
 
     def on(self, body: str = CAR) -> Camera:
-        """True calibration on a body kind."""
+        """True calibration on a vehicle.
+
+        Parameters
+        ----------
+        body : str
+            Body kind of the vehicle.
+        """
         return replace(self.camera, mount_height=self.mount(body).height)
 
     def assumed_on(self, body: str = CAR) -> Camera:
-        """Calibration on a body kind that estimators assume."""
+        """Calibration on a vehicle that estimators assume.
+
+        Parameters
+        ----------
+        body : str
+            Body kind of the vehicle.
+        """
         true, errors = self.on(body), self.errors
         return replace(
             true,
@@ -110,5 +128,11 @@ class CameraConfig:
         )
 
     def make_sensor(self, period: float) -> CameraSensor:
-        """What takes the images of one run, `period` apart [s]."""
+        """Make what takes the images of one run.
+
+        Parameters
+        ----------
+        period : float
+            Time between two images [s].
+        """
         return CameraSensor(self.camera, self.sensor, self.exposure, self.lens_shading, period, self.lens_glare)

@@ -90,13 +90,4 @@ def _load_lamps(path: Path) -> Any:
     return import_module("fogsim.scenario.parts.lamp_file").load_lamps(path)
 
 
-__all__ = [
-    "ESTIMATORS",
-    "Estimator",
-    "FoggyRoad",
-    "OnnxGuest",
-    "conformal_factor",
-    "extinction_bound",
-    "make",
-    "supply",
-]
+__all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "OnnxGuest", "conformal_factor", "extinction_bound", "make"]

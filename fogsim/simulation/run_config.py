@@ -28,15 +28,33 @@ _ADVISER, _LIGHTING = MethodConfig("stopping_sight_distance"), MethodConfig("fog
 
 @dataclass(frozen=True, slots=True)
 class Periods:
-    """The clocks of a run as whole numbers."""
+    """The clocks of a run as whole numbers.
 
-    camera_period: float = 0.1  # Time between frames [s]
-    traffic_steps: int = 1  # Traffic steps in one camera period
-    decision_frames: int = 5  # Camera periods in one decision period
-    frames: int = 1200  # Most camera periods that a run may last
+    Parameters
+    ----------
+    camera_period : float
+        Time between frames [s].
+    traffic_steps : int
+        Traffic steps in one camera period.
+    decision_frames : int
+        Camera periods in one decision period.
+    frames : int
+        Most camera periods that a run may last.
+    """
+
+    camera_period: float = 0.1
+    traffic_steps: int = 1
+    decision_frames: int = 5
+    frames: int = 1200
 
     def time(self, index: int) -> float:
-        """Time of a camera period since the run began [s]."""
+        """Time of a camera period since the run began [s].
+
+        Parameters
+        ----------
+        index : int
+            Number of the camera period.
+        """
         return clock_time(index * self.camera_period)
 
 

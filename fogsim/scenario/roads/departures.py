@@ -4,7 +4,7 @@ from fogsim.errors import suggest
 from fogsim.scenario.roads.files import road_layout, traffic_files
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.timeline import Entries, operations
-from fogsim.scenario.timeline.schema import DepartAction, VehicleActions
+from fogsim.scenario.timeline.vehicle_actions import DepartAction, VehicleActions
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.net_edges import read_net_edges
 from fogsim.traffic.templates import Actor, Placed, PlacementError, check_placement, read_ways

@@ -7,19 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from fogsim.atmosphere import FogConfig
 from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
-from fogsim.scenario.timeline.schema import (
+from fogsim.scenario.timeline.schema import Doing, FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import (
     LONGEST_CHANGE,
     ArriveAction,
     DepartAction,
-    Doing,
-    FogActions,
     LaneAction,
-    LightActions,
     PathAction,
-    SignalActions,
     SpeedAction,
     StopAction,
-    TimelineEntry,
     VehicleActions,
 )
 from fogsim.simulation.run_config import Situation

@@ -12,14 +12,8 @@ from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.timeline.actions import departing_vehicles, entry_name, operations, vehicles_of
 from fogsim.scenario.timeline.lamps import lamp_mistake
-from fogsim.scenario.timeline.schema import (
-    Doing,
-    FogActions,
-    LightActions,
-    SignalActions,
-    TimelineEntry,
-    VehicleActions,
-)
+from fogsim.scenario.timeline.schema import Doing, FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.units import DAY_ILLUMINANCE
 
 if TYPE_CHECKING:

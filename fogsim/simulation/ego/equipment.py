@@ -2,35 +2,30 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from fogsim.atmosphere import field_at, with_change
-from fogsim.camera import CAR, BodyPitch, Delivered, FaultyLens, FrameDelivery, Pixels, knocked, mounted_pose, unexposed
+from fogsim.camera import CAR, BodyPitch, knocked, mounted_pose
 from fogsim.core.randomness import Streams
 from fogsim.errors import SimulationError
 from fogsim.fusion import FUSIONS, DatedFusion
 from fogsim.sensors import check_sign_ids, faulty_signs
 from fogsim.simulation.chosen_methods import estimators
+from fogsim.simulation.ego.camera_rig import CameraRig
 from fogsim.simulation.ego.daylight import Ramp, in_daylight
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.fog_truth import KnownWay, carriageways, fog_truth
 from fogsim.simulation.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.simulation.ego.measurements import EgoSensors
-from fogsim.simulation.ego.motion_blur import exposed
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras
-from fogsim.simulation.ego.second_camera import SecondCamera
 from fogsim.simulation.ego.sensor_faults import FaultSchedule
 from fogsim.simulation.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.simulation.run_config import NO_RENDERER, RunConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Belief,
-    Camera,
     CameraPose,
     Command,
     Ending,
@@ -42,7 +37,6 @@ from fogsim.values import (
     Observation,
     RoadNetwork,
     RunningFault,
-    SecondView,
     SignMap,
     Step,
     TrafficSnapshot,
@@ -77,8 +71,7 @@ class EgoEquipment:
     def __init__(self, config: RunConfig) -> None:
         camera, period = config.camera, config.periods.camera_period
         self._config = config
-        self._camera_sensor = camera.make_sensor(period)
-        self._second = None if camera.stereo is None else SecondCamera(camera, camera.stereo, period)
+        self._rig = CameraRig(camera, period)
         self._body_pitch = BodyPitch(camera.suspension, period)
         self._sensors = EgoSensors(config.sensors)
         self._light_sensing = LightSensing(config.sensors.light)
@@ -87,7 +80,6 @@ class EgoEquipment:
         self._daylight = self._light.first
         self._fog: FogField | None = None
         self._fog_now: FogField | None = None
-        self._glass, self._delivery = FaultyLens(), FrameDelivery()
         self._watch, self._leads = FrameWatch(), LeadHistory()
         self._fusion = DatedFusion(config.fusion.make(FUSIONS), config.fusion.name)
         self._view_renderer: EgoView | None = None
@@ -102,12 +94,9 @@ class EgoEquipment:
 
     def _mount_camera(self, body: str) -> None:
         """Put the camera where it belongs on a kind of body, and pass its calibration to the estimators."""
-        camera = self._config.camera
         self._body = body
-        self._camera, self._assumed_camera = camera.on(body), camera.assumed_on(body)
-        self._setback = camera.mount(body).setback
-        self._unexposed = unexposed(self._camera)
-        self._estimators = estimators(self._config.estimators, self._assumed_camera)
+        self._rig.mount_on(body)
+        self._estimators = estimators(self._config.estimators, self._rig.assumed)
 
     def start_run(
         self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = CAR
@@ -149,13 +138,9 @@ class EgoEquipment:
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
-        self._camera_sensor.reset()
-        if self._second is not None:
-            self._second.reset(streams.camera.spawn(1)[0])
+        self._rig.reset(streams.camera)
         self._body_pitch.reset()
         self._sensors.reset(streams)
-        self._glass.reset()
-        self._delivery.reset()
         self._watch.reset()
         self._leads.reset()
         self._streams, self._roadside_cameras = streams, None
@@ -286,7 +271,7 @@ class EgoEquipment:
         parts = self._run_parts()
         faults = parts.schedule.at(time)
         renderer, light = self._lit_world(faults, time)
-        state, ego, camera = snapshot.state, snapshot.ego, knocked(self._camera, [one.kind for one in faults])
+        state, ego, camera = snapshot.state, snapshot.ego, knocked(self._rig.camera, [one.kind for one in faults])
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         reports = parts.reporters.heard(time, state, ego, fog, sent)
         parts.meters.hear(reports)
@@ -303,15 +288,16 @@ class EgoEquipment:
         )
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
-        second = self._second_image(renderer, snapshot, pose, time, light)
-        view, radiance = exposed(
-            lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
-            self._config.camera.shutter.at(self._camera_sensor.share_of_longest_exposure),
+        view, frame, right = self._rig.take(
+            lambda state, pose, camera: renderer.render(state, ego, pose, time, camera, light),
             state,
             ego,
             pose,
+            camera,
+            faults,
+            parts.streams.camera,
+            time,
         )
-        frame, right = self._frame(radiance, second, camera, faults, parts.streams, time)
         speed = float(state.speed[ego])
         old = self._watch.stale_reason(frame, speed) if self._estimators else ""
         observation = Observation(
@@ -319,7 +305,7 @@ class EgoEquipment:
             speed=speed,
             lead=self._sensors.lead(snapshot, faults, parts.streams),
             signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
-            camera_setback=self._setback,
+            camera_setback=self._rig.setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,
@@ -391,44 +377,6 @@ class EgoEquipment:
         """What is believed after this step."""
         return self._fusion.update_at(estimates, time, place, observation.reports)
 
-    def _second_image(
-        self, renderer: EgoView, snapshot: TrafficSnapshot, pose: CameraPose, time: float, light: float
-    ) -> Pixels | None:
-        """What the second camera takes, drawn first: arrays of the picture that is drawn last are kept."""
-        if self._second is None:
-            return None
-        state, ego = snapshot.state, snapshot.ego
-        taken = self._second.take(
-            lambda traffic, place, camera: renderer.render(traffic, ego, place, time, camera, light),
-            self._config.camera.shutter,
-            state,
-            ego,
-            pose,
-            self._camera,
-        )
-        return self._unexposed if taken is None else taken
-
-    def _frame(
-        self,
-        radiance: NDArray[np.float32] | None,
-        second: Pixels | None,
-        camera: Camera,
-        faults: Sequence[RunningFault],
-        streams: Streams,
-        time: float,
-    ) -> tuple[Frame, SecondView | None]:
-        """What the cameras deliver of the light that falls on the first one's glass; None where nothing is drawn."""
-        image = self._unexposed
-        if radiance is not None:
-            image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
-        if self._second is None or second is None:
-            return Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera), None
-        # Both pictures go one way, and are late, lost or frozen together.
-        pair = cast("Pixels", np.concatenate((image, second), axis=1))
-        when, both = self._delivery.deliver(Delivered(time, pair), faults)
-        left, right = (np.ascontiguousarray(half) for half in np.split(both, 2, axis=1))
-        return Frame(when, left, self._assumed_camera), SecondView(right, self._second.stated_baseline)
-
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Describe the surroundings of the camera.
 
@@ -453,7 +401,7 @@ class EgoEquipment:
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
         body_pitch = self._body_pitch.update(float(state.acceleration[ego]))
         heading, grade = float(state.heading[ego]), float(state.grade[ego])
-        return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
+        return mounted_pose(self._rig.camera, state.position[ego], heading, self._rig.setback, grade, body_pitch)
 
     def _estimate(self, frame: Frame, observation: Observation, time: float, old: str) -> tuple[Estimate, ...]:
         """Results of all estimators; a frame that shows nothing new is rejected with a reason."""

@@ -20,6 +20,7 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError, suggest
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
+from fogsim.scenario.drivers_schema import DriversSection as Drivers
 from fogsim.scenario.expect.schema import Expectation
 from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
 from fogsim.scenario.roads.schema import ActorSection as Actor
@@ -59,7 +60,6 @@ from fogsim.scenario.timeline.vehicle_actions import (
     StopAction,
     VehicleActions,
 )
-from fogsim.scenario.traffic_schema import DriversSection as Drivers
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation.cases import Verdict
 from fogsim.scenario.written_form import as_written

@@ -18,6 +18,7 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
+from fogsim.scenario.drivers_schema import DriversSection
 from fogsim.scenario.expect.checks import check_expectations
 from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.expect.schema import Expectations
@@ -28,7 +29,7 @@ from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline, light_range
 from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
 from fogsim.scenario.traffic_alone import without_ego
-from fogsim.scenario.traffic_schema import DriversSection, Traffic
+from fogsim.scenario.traffic_schema import Traffic
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.scene import USUAL_PAVEMENT, RoadSurface

@@ -9,9 +9,9 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import SafetyStandard
+from fogsim.scenario.drivers_schema import Harmonisation as WrittenHarmonisation
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import Method
-from fogsim.scenario.traffic_schema import Harmonisation as WrittenHarmonisation
 from fogsim.simulation import chosen_methods
 from fogsim.simulation.run_config import NO_RENDERER, AdviceConfig, Harmonisation, SectionsConfig, check_ego
 from fogsim.units import KMH_PER_MPS

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from fogsim.scenario.drivers import driver_setup, driver_sight
+from fogsim.scenario.parts.drivers import driver_setup, driver_sight
 from fogsim.scenario.roads.files import actors_of, traffic_files
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.timeline.lamps import LampActions, lamp_switches

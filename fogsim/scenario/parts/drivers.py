@@ -2,8 +2,8 @@
 
 import dataclasses
 
+from fogsim.scenario.drivers_schema import ComplianceSection
 from fogsim.scenario.schema import ScenarioFile
-from fogsim.scenario.traffic_schema import ComplianceSection
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
 from fogsim.values import Display
 

@@ -74,7 +74,7 @@ def one_run(visibility: float, protocol: str, oracle: bool, speed_choice: str, s
         scenario, setup = motorway(visibility, protocol, speed_choice, Path(folder))
         traffic = libsumo_traffic(setup)
         # Homogeneous fog lies everywhere: the route that banks are laid along does not matter.
-        traffic.enter_fog(FieldAccess(build.fog_field(scenario, np.zeros((2, 3)))))
+        traffic.enter_fog(FieldAccess(build.world_config(scenario).fog.along(np.zeros((2, 3)))))
         advice = SpeedAdvice(within_sight(visibility))
         command = Command(advice, advice_reach=math.inf) if oracle else Command()
         collisions: list[Collision] = []

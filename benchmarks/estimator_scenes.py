@@ -79,7 +79,9 @@ def camera(number: int) -> Camera:
     """One of the cameras, with the scenario's response."""
     width, height, view, mount, pitch = CAMERAS[number]
     keys = {"width": width, "height": height, "field_of_view_deg": view, "mount_height_m": mount, "pitch_deg": pitch}
-    return build.camera(fogsim.load_scenario(SCENARIO, [f"camera.{key}={value}" for key, value in keys.items()]))
+    return build.camera_config(
+        fogsim.load_scenario(SCENARIO, [f"camera.{key}={value}" for key, value in keys.items()])
+    ).on()
 
 
 class Road:

@@ -31,7 +31,7 @@ from staging import Board, Shot, Vehicle, network, signs, traffic
 from staging import scenario as staged
 
 from fogsim.camera import mounted_pose
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import Lamp, TrafficState
@@ -91,9 +91,13 @@ class Case:
 
     def __init__(self, key: Key) -> None:
         described, roads = scenario(*key), network("motorway")
-        camera, setback = build.camera(described), build.camera_mount(described).setback
-        self._view_renderer = ViewRenderer(described, roads, signs(roads.route, SHOT))
-        self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
+        config = described.run_config()
+        camera, setback = config.camera.on(), config.camera.mount().setback
+        self._view_renderer = ViewRenderer(config.world, config.camera, roads, signs(roads.route, SHOT))
+        self._camera_sensor, self._rng = (
+            config.camera.make_sensor(config.periods.camera_period),
+            np.random.default_rng(1),
+        )
         shots = [replace(SHOT, station=START + STEP * number) for number in range(ROUND)]
         self.traffic = [traffic(roads.route, shot) for shot in shots]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]

@@ -26,7 +26,7 @@ def soak(renderer: str, renderers: int, frames: int) -> Row:
     """One record."""
     roads = network("motorway")
     scene = build_scene(roads, signs(roads.route, SHOT), np.random.default_rng(1))
-    cameras = [build.camera(scenario(renderer, "day", size, 1)) for size in SIZES]
+    cameras = [build.camera_config(scenario(renderer, "day", size, 1)).on() for size in SIZES]
     cases = [Case((renderer, "day", size, 1)) for size in SIZES]
     vehicles, pose = vehicle_batches(cases[0].traffic[0], 0), cases[0].poses[0]
 

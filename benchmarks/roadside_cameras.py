@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 import fogsim
 from fogsim.atmosphere import extinction, field_at
-from fogsim.scenario.road_sections import stations
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.loop import ClosedLoop
+from fogsim.simulation.road_sections import stations
 from fogsim.values import FogField, FogReport, Step, TrafficState
 from fogsim.values.estimate import NORMAL_90_PERCENT
 

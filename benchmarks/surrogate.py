@@ -65,8 +65,9 @@ def episodes(number: int, split: str) -> Iterator[list[Record]]:
     source, rng = EpisodeSource(None, None, None, SIZE, split), np.random.default_rng(0)
     for index in range(number):
         seed, drawn = source.draw(rng, EpisodeChoice())
-        policy, light = AdvisedDriving(drawn.scenario), drawn.scenario.light.illuminance_lx
-        with ClosedLoop(drawn.scenario) as loop:
+        config = drawn.scenario.run_config()
+        policy, light = AdvisedDriving(config.advice, config.periods.decision_frames), config.world.illuminance
+        with ClosedLoop(config) as loop:
             step = loop.start(seed)
             run = [Record(step.truth.extinction_ahead, light, step.estimates[0])]
             while step.ending is None:

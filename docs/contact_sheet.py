@@ -81,8 +81,8 @@ def tile(shot: Shot, renderer: str) -> NDArray[np.uint8]:
     if not shot.title.startswith("signs"):
         return taken.image
     stop = shot.boards[1]
-    camera = build.camera(taken.scenario)
-    depth = stop.ahead + build.camera_mount(taken.scenario).setback
+    camera = build.camera_config(taken.scenario).on()
+    depth = stop.ahead + build.camera_config(taken.scenario).mount().setback
     u = round(camera.principal_point[0] - camera.focal_length * shot.boards[0].left / depth)
     v = round(camera.principal_point[1] - camera.focal_length * (math.tan(camera.pitch) + (2.4 - 1.38) / depth))
     across = max(12, 2 * round(0.5 * camera.focal_length * 5.0 / depth))

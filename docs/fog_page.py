@@ -90,7 +90,8 @@ def koschmieder() -> Figure:
     """Black targets by day: picture, contrast and radiance as they are in the frame."""
     figure, (left, middle, right) = panels((1.1, 1, 1))
     described = scenario((fog("100"),), "cpu", (640, 480))
-    camera = dataclasses.replace(build.camera(described), pitch=0.0)
+    config = described.run_config()
+    camera = dataclasses.replace(config.camera.on(), pitch=0.0)
     camera = dataclasses.replace(camera, principal_point=(camera.principal_point[0], 0.5 * camera.height))
     pose = CameraPose((0.0, 0.0, 1.38), 0.0)
     renderer = make_renderer("cpu", black_targets(), ILLUMINANCE)
@@ -110,7 +111,7 @@ def koschmieder() -> Figure:
         right.plot(line, airlight[1] * (1 - np.exp(-k * line)), color=colour)
         right.plot(distances, measured, "o", color=colour, ms=4)
         if visibility == 100.0:
-            image = build.camera_sensor(described).take(radiance, np.random.default_rng(1))
+            image = config.camera.make_sensor(config.periods.camera_period).take(radiance, np.random.default_rng(1))
             show(left, image[150:330], "black targets at 10 … 200 m, V_met 100 m")
     middle.axhline(0.05, color="black", lw=0.8, ls=":")
     middle.set(yscale="log", xlabel="distance [m]", ylabel="contrast of black targets", ylim=(1e-3, 1.1))
@@ -133,7 +134,7 @@ LIFTING = (
 
 def field_of(setting: str) -> FogField:
     """Fog along the motorway."""
-    return build.fog_field(scenario((setting,), "cpu", SIZE), network("motorway").route)
+    return build.world_config(scenario((setting,), "cpu", SIZE)).fog.along(network("motorway").route)
 
 
 def fields() -> Figure:

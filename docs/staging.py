@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import (
@@ -144,14 +144,19 @@ def photograph(shot: Shot, renderer: str = "cpu", size: tuple[int, int] = (480, 
     """Take a picture."""
     described, roads = scenario(shot.settings, renderer, size), network(shot.place)
     state = replace(traffic(roads.route, shot), signals=traffic_lights(roads))
-    camera, setback = build.camera(described), build.camera_mount(described).setback
+    config = described.run_config()
+    camera, setback = config.camera.on(), config.camera.mount().setback
     pose = mounted_pose(camera, state.position[0], float(state.heading[0]), setback)
-    view_renderer = ViewRenderer(described, roads, signs(roads.route, shot))
+    view_renderer = ViewRenderer(config.world, config.camera, roads, signs(roads.route, shot))
     try:
         _, radiance = view_renderer.render(state, 0, pose, shot.time)
     finally:
         view_renderer.close()
-    image = build.camera_sensor(described).take(radiance, np.random.default_rng(1)).astype(np.uint8)
+    image = (
+        config.camera.make_sensor(config.periods.camera_period)
+        .take(radiance, np.random.default_rng(1))
+        .astype(np.uint8)
+    )
     return Taken(image, radiance, described, pose)
 
 

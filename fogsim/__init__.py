@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario as Scenario
     from fogsim.scenario import catalogue as catalogue
     from fogsim.scenario import load_scenario as load_scenario
+    from fogsim.scenario.attaching import attach as attach
+    from fogsim.scenario.attaching import connect as connect
     from fogsim.simulation.loop import ClosedLoop as ClosedLoop
     from fogsim.simulation.loop import run as run
-    from fogsim.simulation.plugin import attach as attach
-    from fogsim.simulation.plugin import connect as connect
     from fogsim.simulation.traffic_run import run_traffic as run_traffic
     from fogsim.values import Belief as Belief
     from fogsim.values import Camera as Camera
@@ -69,8 +69,8 @@ _LAZY = {
     **dict.fromkeys(_ERRORS, "fogsim.errors"),
     **dict.fromkeys(_VALUES, "fogsim.values"),
     "ClosedLoop": "fogsim.simulation.loop",
-    "attach": "fogsim.simulation.plugin",
-    "connect": "fogsim.simulation.plugin",
+    "attach": "fogsim.scenario.attaching",
+    "connect": "fogsim.scenario.attaching",
     "Scenario": "fogsim.scenario",
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",

@@ -20,9 +20,9 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError, suggest
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
+from fogsim.scenario.drivers_schema import DriversSection as Drivers
 from fogsim.scenario.expect.schema import Expectation
 from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
-from fogsim.scenario.loading import as_written
 from fogsim.scenario.roads.schema import ActorSection as Actor
 from fogsim.scenario.roads.schema import DemandSection as Demand
 from fogsim.scenario.roads.schema import Road
@@ -49,23 +49,20 @@ from fogsim.scenario.sensors.faults import SignsMissingSection as SignsMissing
 from fogsim.scenario.sensors.faults import SignsMovedSection as SignsMoved
 from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline.lamps import LampActions, LampSides, StopLampSides
-from fogsim.scenario.timeline.schema import (
+from fogsim.scenario.timeline.schema import FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import (
     BrakeAction,
     BreakDownAction,
     DepartAction,
-    FogActions,
     FollowAction,
     LaneAction,
-    LightActions,
-    SignalActions,
     SpeedAction,
     StopAction,
-    TimelineEntry,
     VehicleActions,
 )
-from fogsim.scenario.traffic_schema import DriversSection as Drivers
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation.cases import Verdict
+from fogsim.scenario.written_form import as_written
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 _TRAFFIC_FILES = ("config", "net")

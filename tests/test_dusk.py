@@ -21,8 +21,13 @@ Picture = Callable[[float], np.ndarray]
 def pictures(*settings: str) -> Iterator[Picture]:
     """What the camera of one scenario gets by an illuminance [lx]."""
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
-    view_renderer, state = ViewRenderer(scenario, road(0.0), SignMap()), traffic(0.0, 400.0, LIT)
-    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback, 0.0)
+    view_renderer, state = (
+        ViewRenderer(build.world_config(scenario), build.camera_config(scenario), road(0.0), SignMap()),
+        traffic(0.0, 400.0, LIT),
+    )
+    pose = mounted_pose(
+        build.camera_config(scenario).on(), state.position[0], 0.0, build.camera_config(scenario).mount().setback, 0.0
+    )
     clear = view_renderer.fog
 
     def picture(illuminance: float) -> np.ndarray:

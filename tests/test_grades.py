@@ -80,9 +80,16 @@ def traffic(grade: float, station: float, lamps: Lamp = Lamp.POSITION) -> Traffi
 def look(grade: float, *settings: str, lamps: Lamp = Lamp.POSITION) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instance ids, distances and radiance."""
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
-    view_renderer, state = ViewRenderer(scenario, road(grade), SignMap()), traffic(grade, 400.0, lamps)
+    view_renderer, state = (
+        ViewRenderer(build.world_config(scenario), build.camera_config(scenario), road(grade), SignMap()),
+        traffic(grade, 400.0, lamps),
+    )
     pose = mounted_pose(
-        build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback, float(state.grade[0])
+        build.camera_config(scenario).on(),
+        state.position[0],
+        0.0,
+        build.camera_config(scenario).mount().setback,
+        float(state.grade[0]),
     )
     view, radiance = view_renderer.render(state, 0, pose, 0.0)
     view_renderer.close()
@@ -165,7 +172,7 @@ def drive(grade: float, visibility: float) -> list[Step]:
     scenario = fogsim.load_scenario(
         "motorway_fog_bank", ["renderer=cpu", f"fog={{visibility_m: {visibility}}}", f"estimators=[{methods}]"]
     )
-    equipment = EgoEquipment(scenario)
+    equipment = EgoEquipment(scenario.run_config())
     equipment.start_run(spawn_streams(1), lambda: (road(grade), SignMap()))
     steps = []
     for index in range(3):

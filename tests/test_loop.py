@@ -15,7 +15,7 @@ from early_motorway import EARLY, ROUTES
 
 import fogsim
 from fogsim.errors import SimulationError
-from fogsim.scenario import Scenario
+from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
 from fogsim.traffic.sumo_traffic import SumoTraffic
@@ -205,12 +205,15 @@ def test_public_names_are_there() -> None:
 
 def test_advice_goes_to_everybody_near_the_ego_only_if_the_scenario_says_so() -> None:
     told = Command(advice=SpeedAdvice(20.0))
-    everybody = fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=all"])
-    assert spread_advice(told, fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=ego"])) is told
+    alone, everybody = (
+        build.advice_config(fogsim.load_scenario("motorway_fog_bank", [f"drivers.advised={whom}"]))
+        for whom in ("ego", "all")
+    )
+    assert spread_advice(told, alone) is told
     assert spread_advice(told, everybody) == replace(told, advice_reach=1000.0)
     assert not spread_advice(Command(), everybody).is_for_others
     stretch = "drivers.advised_stretch={start_m: 500, end_m: inf, display: message_sign}"
-    signs = fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=stretch", stretch])
+    signs = build.advice_config(fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=stretch", stretch]))
     shown = StretchAdvice(20.0, Stretch(500.0), Display.MESSAGE_SIGN)
     assert spread_advice(told, signs) == replace(told, stretches=(shown,))
 

@@ -12,10 +12,10 @@ import fogsim
 from fogsim.atmosphere import extinction
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build
-from fogsim.scenario.parts import methods
-from fogsim.scenario.road_sections import road_sections, section_limits
+from fogsim.simulation import chosen_methods
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.road_advice import RoadAdvice
+from fogsim.simulation.road_sections import road_sections, section_limits
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Display, FogField, RoadSection, SpeedAdvice, Step, Stretch
 from fogsim.values.belief import certain_belief
@@ -28,6 +28,10 @@ A16 = "advice={method: netherlands_a16, informed_by: truth}"
 
 def scenario(*settings: str) -> Scenario:
     return fogsim.load_scenario("motorway_fog_bank", settings)
+
+
+def road_advice(described: Scenario) -> RoadAdvice:
+    return RoadAdvice(build.advice_config(described))
 
 
 def step(
@@ -56,7 +60,7 @@ def kmh(advice: RoadAdvice, at: Step) -> tuple[float, dict[float, int]]:
 
 
 def test_each_sign_goes_by_the_visibility_at_its_own_place_and_the_ego_reads_it_in_passing() -> None:
-    signs = RoadAdvice(scenario("drivers.advised=signs", A16))
+    signs = road_advice(scenario("drivers.advised=signs", A16))
     road = [1000.0, 100.0, 60.0, 1000.0]
     assert kmh(signs, step(road)) == (math.inf, {500.0: 80, 1000.0: 60})
     assert kmh(signs, step(road, 510.0, 1))[0] == pytest.approx(80.0)
@@ -69,22 +73,22 @@ def test_each_sign_goes_by_the_visibility_at_its_own_place_and_the_ego_reads_it_
 
 
 def test_signs_step_down_towards_fog_where_they_are_harmonised() -> None:
-    signs = RoadAdvice(scenario("drivers.advised=signs", "drivers.harmonisation={}", A16))
+    signs = road_advice(scenario("drivers.advised=signs", "drivers.harmonisation={}", A16))
     assert kmh(signs, step([1000.0] * 4 + [60.0])) == (math.inf, {500.0: 120, 1000.0: 100, 1500.0: 80, 2000.0: 60})
     gentle = "drivers.harmonisation={largest_step_kmh: 30, deceleration_mps2: 0.1}"
-    told = kmh(RoadAdvice(scenario("drivers.advised=signs", gentle, A16)), step([1000.0, 60.0]))[1]
+    told = kmh(road_advice(scenario("drivers.advised=signs", gentle, A16)), step([1000.0, 60.0]))[1]
     assert told == {0.0: round(3.6 * math.hypot(60.0 / 3.6, math.sqrt(2 * 0.1 * 500.0))), 500.0: 60}
 
 
 def test_each_section_goes_by_the_limit_of_its_own_road() -> None:
     signs, town = scenario("drivers.advised=signs", A16), 50.0 / 3.6
     road = step([100.0, 100.0, 60.0, 60.0], limits=[LIMIT, town, town, LIMIT])
-    assert kmh(RoadAdvice(signs), road)[1] == {0.0: 80, 1500.0: 60}
-    assert {a.stretch.start for a in RoadAdvice(signs).advise_traffic(road)} == {0.0, 1500.0}
+    assert kmh(road_advice(signs), road)[1] == {0.0: 80, 1500.0: 60}
+    assert {a.stretch.start for a in road_advice(signs).advise_traffic(road)} == {0.0, 1500.0}
     # A step down towards fog is not needed where the limit is lower already.
     harmonised = scenario("drivers.advised=signs", "drivers.harmonisation={}", A16)
     road = step([1000.0, 1000.0, 1000.0, 60.0], limits=[LIMIT, LIMIT, town, LIMIT])
-    assert kmh(RoadAdvice(harmonised), road)[1] == {0.0: 120, 500.0: 100, 1500.0: 60}
+    assert kmh(road_advice(harmonised), road)[1] == {0.0: 120, 500.0: 100, 1500.0: 60}
 
 
 def test_the_limit_of_a_section_is_that_where_it_begins() -> None:
@@ -97,7 +101,7 @@ def test_the_limit_of_a_section_is_that_where_it_begins() -> None:
 
 def test_in_cars_and_by_law_advice_holds_as_long_as_it_is_in_force() -> None:
     for advised, display in (("equipped", Display.IN_CAR), ("law", Display.LAW)):
-        advice = RoadAdvice(scenario(f"drivers.advised={advised}", A16))
+        advice = road_advice(scenario(f"drivers.advised={advised}", A16))
         assert kmh(advice, step([60.0, 100.0], 100.0))[0] == pytest.approx(60.0)
         assert {told.display for told in advice.advise(step([60.0], 100.0, 1))[1]} == {display}
         assert kmh(advice, step([60.0, 100.0], 600.0, 1))[0] == pytest.approx(80.0)
@@ -105,7 +109,7 @@ def test_in_cars_and_by_law_advice_holds_as_long_as_it_is_in_force() -> None:
 
 
 def test_an_ego_that_goes_by_its_belief_tells_the_section_on_which_it_is() -> None:
-    signs = RoadAdvice(scenario("drivers.advised=signs", "advice=netherlands_a16"))
+    signs = road_advice(scenario("drivers.advised=signs", "advice=netherlands_a16"))
     clear = [1000.0] * 3
     assert kmh(signs, step(clear, 100.0, believed=300.0)) == (math.inf, {})
     assert kmh(signs, step(clear, 600.0, 1, believed=60.0)) == (pytest.approx(60.0), {500.0: 60})
@@ -115,20 +119,20 @@ def test_an_ego_that_goes_by_its_belief_tells_the_section_on_which_it_is() -> No
 
 
 def test_sections_lie_where_the_scenario_puts_signs() -> None:
-    assert road_sections(scenario("drivers.advised=all"), 3000.0) == ()
+    assert road_sections(build.sections_config(scenario("drivers.advised=all")), 3000.0) == ()
     signs = scenario("drivers.advised=signs", "drivers.signs={from_m: 400, spacing_m: 1000, to_m: 2000}")
-    assert road_sections(signs, 3000.0) == (Stretch(400.0, 1400.0), Stretch(1400.0, 2000.0))
+    assert road_sections(build.sections_config(signs), 3000.0) == (Stretch(400.0, 1400.0), Stretch(1400.0, 2000.0))
     placed = scenario("drivers.advised=signs", "drivers.signs.at_m=[100, 900, 5000]")
-    assert road_sections(placed, 3000.0) == (Stretch(100.0, 900.0), Stretch(900.0, math.inf))
-    cars = road_sections(scenario("drivers.advised=equipped"), 250.0)
+    assert road_sections(build.sections_config(placed), 3000.0) == (Stretch(100.0, 900.0), Stretch(900.0, math.inf))
+    cars = road_sections(build.sections_config(scenario("drivers.advised=equipped")), 250.0)
     assert cars == (Stretch(0.0, 100.0), Stretch(100.0, 200.0), Stretch(200.0, math.inf))
 
 
 def test_meters_measure_at_the_signs_and_in_the_middle_of_other_sections() -> None:
     for advised, expected in (("signs", [2000.0, 2000.0, 2000.0, 60.0, 60.0, EDGE]), ("law", [2000.0])):
         bank = scenario(f"drivers.advised={advised}")
-        fog = build.fog_field(bank, ROUTE)
-        measured = RoadMeters(bank, ROUTE, np.full(2, LIMIT)).measure(fog)
+        fog = build.world_config(bank).fog.along(ROUTE)
+        measured = RoadMeters(build.sections_config(bank), ROUTE, np.full(2, LIMIT)).measure(fog)
         visibilities = [math.log(20.0) / section.extinction for section in measured]
         assert visibilities[: len(expected)] == pytest.approx(expected, rel=0.001)
     # The last one was that of drivers who apply a law.
@@ -172,6 +176,6 @@ def test_compliance_by_display_begins_with_that_of_all() -> None:
 @pytest.mark.parametrize("speed", [math.nan, -1.0])
 def test_an_adviser_that_returns_no_speed_is_named(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = SimpleNamespace(advise=lambda *_: SpeedAdvice(speed))
-    monkeypatch.setattr(methods, "adviser", lambda _: broken)
+    monkeypatch.setattr(chosen_methods, "adviser", lambda _: broken)
     with pytest.raises(InputError, match=rf"adviser 'netherlands_a16': advise\(\).*speed.*{speed:g}"):
-        RoadAdvice(scenario("drivers.advised=signs", A16)).advise(step([60.0]))
+        road_advice(scenario("drivers.advised=signs", A16)).advise(step([60.0]))

@@ -73,7 +73,7 @@ def test_files_say_it_of_actors_and_in_the_timeline(tmp_path: Path) -> None:
         SetLamps("slow", failed=Lamp.POSITION, side=Side.LEFT),
         SetLamps("slow", failed=Lamp.LOW_BEAM, side=Side.RIGHT),
     )
-    begun = actions_of(scenario.timeline[0], Anywhere(), 0.03)
+    begun = actions_of(scenario.timeline[0], 0.03, {}, Anywhere())
     assert begun is not None
     assert begun.traffic == (
         SetLamps("slow", lit=Lamp.REAR_FOG),

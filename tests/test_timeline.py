@@ -23,6 +23,10 @@ def scenario(*timeline: str, settings: tuple[str, ...] = ()) -> Scenario:
     return load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{', '.join(timeline)}]", *settings])
 
 
+def timeline_of(described: Scenario) -> Timeline:
+    return Timeline(described.run_config().script)
+
+
 def step(time: float, *, speed: float = 20.0, lane: str = "e_1", **vehicles: float) -> TrafficStep:
     """An instant in which vehicles are at places along a straight road to the east."""
     ids = tuple(vehicles)
@@ -45,7 +49,7 @@ def names(timeline: Timeline, *steps: TrafficStep) -> list[list[str]]:
 
 
 def test_an_entry_begins_once_or_each_time_and_after_its_delay() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario(
             "{name: first, when: 'lead.speed > 10 m/s', do: {lead: {hazard_lights: true}}}",
             "{when: 'lead.speed > 10 m/s', repeat: each, do: {lead: {hazard_lights: true}}}",
@@ -65,13 +69,13 @@ def test_an_entry_begins_once_or_each_time_and_after_its_delay() -> None:
 
 
 def test_an_entry_waits_for_its_vehicles() -> None:
-    timeline = Timeline(scenario("{when: time >= 0.1 s, do: {lead: {brake: {}}, ego: {hazard_lights: on}}}"))
+    timeline = timeline_of(scenario("{when: time >= 0.1 s, do: {lead: {brake: {}}, ego: {hazard_lights: on}}}"))
     steps = step(0.0, ego=0.0, lead=50.0), step(0.1, ego=1.0), step(0.2, ego=2.0), step(0.3, ego=2.0, lead=50.0)
     assert names(timeline, *steps) == [[], [], [], ["timeline.0"]]
 
 
 def test_actions_are_in_si_units_and_where_everybody_is() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario(
             "{when: time >= 0 s, do: {"
             "lead: {brake: {to: 18 km/h, deceleration: 5 m/s², hold: 9 s}, change_lane: {to: 0, duration: 2 s}},"
@@ -88,7 +92,7 @@ def test_actions_are_in_si_units_and_where_everybody_is() -> None:
 
 
 def test_a_vehicle_that_the_timeline_brings_is_known_to_the_rest_of_it() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario(
             "{when: time >= 0 s, do: {new: {depart: {like: ego, gap: 15 m, speed: 72 km/h}}}}",
             "{when: new.speed > 10 m/s, do: {new: {hazard_lights: on}}}",
@@ -99,7 +103,7 @@ def test_a_vehicle_that_the_timeline_brings_is_known_to_the_rest_of_it() -> None
 
 
 def test_an_entry_is_told_when_it_begins_and_when_it_is_over() -> None:
-    timeline = Timeline(scenario("{when: lead.speed > 10 m/s, do: {lead: {brake: {hold: 0.2 s}}}}"))
+    timeline = timeline_of(scenario("{when: lead.speed > 10 m/s, do: {lead: {brake: {hold: 0.2 s}}}}"))
     told = []
     for i in range(4):
         due = timeline.due(step(0.1 * i, lead=100.0))
@@ -111,7 +115,7 @@ def test_an_entry_is_told_when_it_begins_and_when_it_is_over() -> None:
 
 
 def test_what_has_not_begun_is_told_with_the_reason() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario(
             "{name: never, when: time > 99 s, do: {lead: {hazard_lights: on}}}",
             "{name: without, when: time >= 0 s, do: {ego: {hazard_lights: on}}}",
@@ -197,7 +201,7 @@ def test_drivers_meet_the_fog_that_a_timeline_brings() -> None:
 
 
 def test_speeds_and_lanes_as_others_have_them() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario(
             "{when: time >= 0 s, do: {lead: {speed: {like: ego, factor: 1.5, plus: 3.6 km/h, rate: 2 m/s²}}}}",
             "{when: time >= 0 s, do: {lead: {change_lane: {to_lane_of: ego, lanes: 1}}}}",
@@ -213,7 +217,7 @@ def test_speeds_and_lanes_as_others_have_them() -> None:
 
 
 def test_an_entry_that_does_nothing_remembers_and_a_condition_ends_the_run() -> None:
-    timeline = Timeline(
+    timeline = timeline_of(
         scenario("{name: past, when: time > 0.1 s, delay: 0.1 s, do: {}}", settings=("end_when=happened(past)",))
     )
     steps, endings = [step(0.1 * i, lead=100.0) for i in range(6)], []

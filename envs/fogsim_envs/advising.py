@@ -57,7 +57,9 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._step: Step | None = None
         self.render_mode = render_mode
         self._act_in(self._scenario)
-        self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
+        self.observation_space = cast(
+            "spaces.Space[Observation]", observation_space(build.camera_config(self._scenario).on())
+        )
         self.action_space = action_space(continuous)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -70,7 +72,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         build.check_frames(scenario, "the agent")
         self._active = scenario
         self._frames = build.periods(scenario).decision_frames
-        self._standard = build.safety_standard(scenario)
+        self._standard, self._advice = build.safety_standard(scenario), build.advice_config(scenario)
         rate = 1 / scenario.clocks.decision_period_s
         self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": rate}
 
@@ -81,7 +83,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it."""
         more = tuple(checked_options(ResetOptions, options).overrides)
         scenario = self._load([*self._overrides, *more]) if more else self._scenario
-        if build.camera(scenario) != build.camera(self._scenario):
+        if build.camera_config(scenario).on() != build.camera_config(self._scenario).on():
             raise InputError("overrides of reset() must not change the camera: the observation space is fixed")
         if scenario != self._active:
             self._act_in(scenario)
@@ -106,7 +108,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         name = type(self).__name__ if self.spec is None else self.spec.id
         chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
         before = self._step
-        command = warned(spread_advice(chosen, self._active, before.truth.sections), before, before.command)
+        command = warned(spread_advice(chosen, self._advice, before.truth.sections), before, before.command)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)
             if self._step.ending is not None:

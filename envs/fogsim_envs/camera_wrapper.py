@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import InputError
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.scenario.loading import clock_settings
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.loop import DriversFog
@@ -91,9 +91,9 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         if not is_highway_environment(env.unwrapped):
             raise InputError(f"FogCameraWrapper: expected an environment of highway-env, got {env!r}")
         size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
-        self._scenario = _scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
+        self._config = _scenario(highway_config(env.unwrapped), visibility, [*size, *overrides]).run_config()
         self._drivers = drivers
-        self._equipment = EgoEquipment(self._scenario)
+        self._equipment = EgoEquipment(self._config)
         self._network: RoadNetwork | None = None
         self._progress: RouteProgress | None = None
         self._drivers_fog = DriversFog()
@@ -101,7 +101,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._step: Step | None = None
         # The noise of the sensors draws on numbers of its own: the environment runs as it would without the camera.
         self._noise = np.random.default_rng()
-        own = observation_space(build.camera(self._scenario))
+        own = observation_space(self._config.camera.on())
         self.observation_space = spaces.Dict(
             {"camera": own["camera"], "state": own["state"], "highway": env.observation_space}
         )
@@ -128,7 +128,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         network = road_network(environment.road, environment.vehicle)
         if self._network is not None and not same_roads(self._network, network):
             self._equipment.close()
-            self._equipment = EgoEquipment(self._scenario)
+            self._equipment = EgoEquipment(self._config)
         self._network, self._progress = network, RouteProgress(network.route)
         streams = spawn_streams(int(self._noise.integers(2**31)))
         fog = self._equipment.start_run(streams, lambda: (network, SignMap()))
@@ -138,7 +138,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
 
     def _take_over_drivers(self, fog: FogField, fleet: Fleet, seed: int) -> DriversFog:
         """Play the script, and put the fog about the environment's drivers if it concerns them."""
-        setup, drivers_fog = build.traffic_setup(self._scenario), DriversFog()
+        setup, drivers_fog = self._config.traffic, DriversFog()
         manners = setup.drivers if self._drivers else UNTOUCHED
         control = control_drivers(fleet, manners, setup.events, seed, setup.advice_deceleration, setup.sight)
         if self._drivers:
@@ -162,8 +162,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         """Observation with the frame of now; with the last one if the vehicle is no longer there."""
         if self._fleet is None or self._progress is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        reach = self._scenario.traffic.reading_radius_m
-        snapshot = read_snapshot(self._fleet, self._progress, (), reach)
+        snapshot = read_snapshot(self._fleet, self._progress, (), self._config.traffic.reading_radius)
         if snapshot is not None:
             index = 0 if self._step is None else self._step.index + 1
             sent = self._equipment.look_from_roadside(self._fleet.time, snapshot.state)

@@ -14,6 +14,7 @@ from fogsim.atmosphere.fog.optical_depth import (
     optical_depth,
     optical_depth_along,
 )
+from fogsim.atmosphere.fog_config import FogConfig, RouteBank
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.surfaces.tunnel_light import TunnelLight
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
@@ -24,11 +25,13 @@ __all__ = [
     "Air",
     "Droplets",
     "FieldAccess",
+    "FogConfig",
     "FogKind",
     "FogNow",
     "FrustumGrid",
     "Observer",
     "Pavement",
+    "RouteBank",
     "TunnelLight",
     "airlight_from_illuminance",
     "distance_at_depth",

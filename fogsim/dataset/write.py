@@ -320,7 +320,7 @@ def _missing(
 
 def _pictures(loop: ClosedLoop, scenario: Scenario, seed: int, every: int) -> Iterator[Step]:
     """Every n-th step of a run, if it has its own image."""
-    policy = AdvisedDriving(scenario)
+    policy = AdvisedDriving(build.advice_config(scenario), build.periods(scenario).decision_frames)
     step = loop.start(seed)
     while True:
         # After the ego has left the network, its last frame is only repeated.

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 from fogsim.core import registry
 from fogsim.core.parameters import checked_parameters
@@ -72,10 +74,20 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
         If the estimator has no such parameter.
     """
     made: Estimator = registry.make(ESTIMATORS, name, camera, **options)
-    if isinstance(made, TakesCalibrations):
-        # By name, for scenes are drawn by stages that no estimator may import.
-        import_module("fogsim.scenario.parts.methods").supply(made)
+    supply(made)
     return made
+
+
+def supply(estimator: Estimator) -> None:
+    """Give an estimator cached calibrations to take where it was given no files of them."""
+    if isinstance(estimator, TakesCalibrations):
+        # By name, for scenes are drawn by stages that no estimator may import.
+        estimator.take_calibrations(import_module("fogsim.calibration.cached").CachedCalibrations(_load_lamps))
+
+
+def _load_lamps(path: Path) -> Any:
+    """Read a file of lamps, where a parameter names one."""
+    return import_module("fogsim.scenario.parts.lamp_file").load_lamps(path)
 
 
 __all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "OnnxGuest", "conformal_factor", "extinction_bound", "make"]

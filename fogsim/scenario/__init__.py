@@ -5,10 +5,10 @@ from fogsim.scenario.loading import (
     catalogue,
     load_scenario,
     override,
-    resolved,
     scenario_from_config,
 )
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.runnable import Scenario
+from fogsim.scenario.written_form import resolved
 
 __all__ = [
     "Scenario",

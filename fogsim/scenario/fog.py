@@ -1,16 +1,12 @@
-"""The fog of a scenario file: how thick, where, how it changes; and the field that it makes along the ego's route."""
+"""The fog of a scenario file: how thick, where, and how it changes."""
 
 import itertools
 import math
-from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fogsim.atmosphere import Droplets
-from fogsim.obstruction import Tunnel
+from fogsim.atmosphere import Droplets, FogConfig, RouteBank
 from fogsim.scenario.section import (
     Distance,
     Length,
@@ -25,7 +21,7 @@ from fogsim.scenario.section import (
     Visibility,
 )
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
-from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
+from fogsim.values import FogChange, FogField, FogPatches
 from fogsim.values.fog import GROUND_ALBEDO, airlight_share
 
 
@@ -221,46 +217,47 @@ class Fog(Section):
         )
 
 
-def fog_along(
-    fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.float64], tunnels: Sequence[Tunnel] = ()
-) -> FogField:
-    """Fog laid along a route (`airlight` [cd/m²], `route` (n, 3) [m])."""
+def fog_config(fog: Fog, airlight: tuple[float, float, float], eye_height: float) -> FogConfig:
+    """Fog along a route (`airlight` [cd/m²], `eye_height` [m])."""
     visibility = fog.visibility_m if fog.visibility_m is not None else fog.outside_visibility_m
     outside = extinction_from_visibility(math.inf if visibility is None else visibility)
-    ground = float(route[:, 2].min())
-    return FogField(
+    field = FogField(
         extinction=outside,
         airlight=airlight,
-        banks=tuple(_bank(bank, outside, route) for bank in fog.banks),
-        top=ground + fog.top_m,
+        top=fog.top_m,
         top_edge=fog.top_edge_m,
-        base=-math.inf if fog.base_m is None else ground + fog.base_m,
+        base=-math.inf if fog.base_m is None else fog.base_m,
         base_edge=fog.base_edge_m,
         scale_height=fog.scale_height_m or math.inf,
-        ground=ground,
         patches=None if fog.patches is None else _patches(fog.patches),
         wind=(0.0, 0.0) if fog.wind is None else _velocity(fog.wind),
-        changes=_changes(fog, ground),
+        changes=_changes(fog),
         airlight_shading=fog.airlight_shading,
         airlight_share=fog.airlight_share,
         ground_albedo=fog.ground_albedo if fog.airlight == "photons" else None,
         forward_scatter=fog.forward_scatter,
         forward_scatter_width=math.radians(fog.forward_scatter_deg),
-        shelters=tuple(_shelter(tunnel, fog.in_tunnels_m) for tunnel in tunnels if math.isfinite(fog.in_tunnels_m)),
+    )
+    return FogConfig(
+        field=field,
+        banks=tuple(_bank(bank, outside) for bank in fog.banks),
+        in_tunnels=fog.in_tunnels_m,
+        droplets=fog.droplets,
+        has_patches_of_run=fog.patches is None or fog.patches.seed is None,
+        eye_height=eye_height,
     )
 
 
-def _shelter(tunnel: Tunnel, reach: float) -> FogShelter:
-    points = tuple((x, y, z) for x, y, z in tunnel.line.tolist())
-    return FogShelter(points, tunnel.half_width, tunnel.height, reach)
+def _bank(bank: Bank, outside: float) -> RouteBank:
+    extra = extinction_from_visibility(bank.visibility_m) - outside
+    return RouteBank(bank.start_m, bank.end_m, bank.edge_m, extra)
 
 
-def _changes(fog: Fog, ground: float) -> tuple[FogChange, ...]:
+def _changes(fog: Fog) -> tuple[FogChange, ...]:
     changes = []
     for change in fog.changes:
         base, top = fog.heights(change)
-        lifted = -math.inf if base is None else ground + base
-        changes.append(FogChange(change.at_s, change.density, lifted, ground + top))
+        changes.append(FogChange(change.at_s, change.density, -math.inf if base is None else base, top))
     return tuple(changes)
 
 
@@ -272,27 +269,3 @@ def _velocity(wind: Wind) -> tuple[float, float]:
     """East and north components [m/s]; wind is named by where it comes from."""
     speed, bearing = wind.speed_kmh / KMH_PER_MPS, math.radians(wind.from_deg)
     return -speed * math.sin(bearing), -speed * math.cos(bearing)
-
-
-def _bank(bank: Bank, outside: float, route: NDArray[np.float64]) -> FogBank:
-    """A bank between two places of the route: a slab across the straight line that joins them."""
-    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1))))
-
-    def place(at: float) -> NDArray[np.float64]:
-        inside = np.array([np.interp(at, station, route[:, axis]) for axis in (0, 1)])
-        # Before the start and beyond the end of the route, go straight on.
-        first, last = route[1, :2] - route[0, :2], route[-1, :2] - route[-2, :2]
-        before, beyond = min(at, 0.0), max(at - station[-1], 0.0)
-        return np.asarray(inside + before * first / math.hypot(*first) + beyond * last / math.hypot(*last))
-
-    start, end = place(bank.start_m), place(bank.end_m)
-    chord = math.dist(start, end)
-    axis = (end - start) / chord
-    return FogBank(
-        origin=(float(start[0]), float(start[1])),
-        axis=(float(axis[0]), float(axis[1])),
-        start=0.0,
-        end=chord,
-        edge=min(bank.edge_m, chord),
-        extra_extinction=extinction_from_visibility(bank.visibility_m) - outside,
-    )

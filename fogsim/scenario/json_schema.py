@@ -11,7 +11,7 @@ from fogsim.core.registry import Registry
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.system_under_test import BLOCK, KEYS
 from fogsim.scenario.variation import VariationKeys
 from fogsim.units.quantities import UNIT_OF_SUFFIX

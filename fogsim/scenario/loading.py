@@ -19,11 +19,12 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.departures import entering_vehicles
 from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
+from fogsim.scenario.written_form import resolved
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import check_configured_files, check_sumo_file
 from fogsim.traffic.templates import PlacementError
@@ -252,31 +253,6 @@ def clock_settings(step: float, camera: float, decision: float) -> list[str]:
     """
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
     return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
-
-
-def resolved(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as JSON-compatible data with every default filled in; infinite visibility becomes "inf"."""
-    data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True))
-    return data
-
-
-def deciding(scenario: Scenario) -> dict[str, Any]:
-    """As `resolved`, without the time limit of methods, which decides whether a run fails but not what it gives."""
-    return {key: value for key, value in resolved(scenario).items() if key != "method_timeout_s"}
-
-
-def as_written(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data without its defaults."""
-    data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True, exclude_unset=True))
-    return data
-
-
-def _without_infinities(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_infinities(v) for key, v in value.items()}
-    if isinstance(value, list):
-        return [_without_infinities(v) for v in value]
-    return "inf" if value == math.inf else value
 
 
 def _checked(

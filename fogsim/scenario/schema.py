@@ -18,6 +18,7 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
+from fogsim.scenario.drivers_schema import DriversSection
 from fogsim.scenario.expect.checks import check_expectations
 from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.expect.schema import Expectations
@@ -28,12 +29,10 @@ from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline, light_range
 from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
 from fogsim.scenario.traffic_alone import without_ego
-from fogsim.scenario.traffic_schema import DriversSection, Traffic
+from fogsim.scenario.traffic_schema import Traffic
+from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.scene import USUAL_PAVEMENT, RoadSurface
-
-NO_RENDERER = "none"
-"""Name that stands for drawing nothing, in runs that need no camera."""
 
 
 class InformedMethod(Method):
@@ -104,8 +103,8 @@ class PavementSection(Section):
     """Standard deviation of the reflectance of stretches of older and newer asphalt, 5 to 150 m long, as a share."""
 
 
-class Scenario(Section):
-    """A whole scenario."""
+class ScenarioFile(Section):
+    """Keys of a scenario file."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=100)
     """Name; letters, digits, `_`, `.` and `-`."""

@@ -11,7 +11,7 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.expect.checks import last_time, named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
-from fogsim.scenario.schema import Clocks, Scenario
+from fogsim.scenario.schema import Clocks, ScenarioFile
 from fogsim.scenario.timeline import departing_vehicles, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.traffic_schema import ChangeLane
@@ -56,7 +56,7 @@ def _is_whole(ticks: float) -> bool:
     return abs(ticks - round(ticks)) < _ROUNDING
 
 
-def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool) -> list[str]:
+def option_lines(document: Document, scenario: ScenarioFile, *, own_simulation: bool) -> list[str]:
     """One line for each SUMO option of a scenario that it does not accept."""
     options = scenario.traffic.sumo_options
     if own_simulation:
@@ -67,7 +67,7 @@ def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool
     return [f"{document.where((*at, name))}: {dotted((*at, name))}: {text}" for name, text in mistakes.items()]
 
 
-def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
+def trigger_mistakes(document: Document, scenario: ScenarioFile) -> list[str]:
     """One line for each trigger that can never fire, whatever the network is."""
     found = pointless_triggers(document, scenario, {"time": (0.0, last_time(scenario))})
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in found]
@@ -77,7 +77,7 @@ _MOST_SHOWN = 10
 """Maximum number of names in a message."""
 
 
-def demand_mistakes(document: Document, scenario: Scenario, end: float) -> list[str]:
+def demand_mistakes(document: Document, scenario: ScenarioFile, end: float) -> list[str]:
     """One line for each vehicle, edge or lane that a scenario names and its route files or network lack.
 
     `end` is the time by which conditions must have been decided [s].
@@ -104,7 +104,7 @@ def demand_mistakes(document: Document, scenario: Scenario, end: float) -> list[
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in mistakes.items()]
 
 
-def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+def _named_vehicles(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
     traffic = scenario.traffic
     if traffic.has_ego and traffic.ego != ANY_EGO:
         yield ("traffic", "ego"), traffic.ego
@@ -113,7 +113,7 @@ def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
 
 
-def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
+def _demand(scenario: ScenarioFile, wanted: frozenset[str]) -> Demand:
     traffic, folder = scenario.traffic, scenario.directory
     if traffic.config is not None:
         return read_configured_demand(folder / traffic.config, wanted)
@@ -121,7 +121,7 @@ def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
     return read_demand((*files.additional, *files.routes), wanted)
 
 
-def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
+def _edges(scenario: ScenarioFile, demand: Demand) -> NetEdges | None:
     """Edges of the network, if a check needs them."""
     traffic, folder = scenario.traffic, scenario.directory
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
@@ -131,13 +131,13 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     return read_net_edges(net, _way(scenario, demand), must_follow=bool(traffic.along))
 
 
-def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
+def _way(scenario: ScenarioFile, demand: Demand) -> tuple[str, ...]:
     """Edges along which positions count; empty if unknown."""
     way = demand.routes.get(scenario.traffic.ego)
     return scenario.traffic.along if way is None else tuple(way.edges)
 
 
-def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
+def _unknown_edges(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, str]:
     """Edges of ``traffic.along`` that the network does not have, or that do not follow the one before."""
     along = scenario.traffic.along
     unknown: dict[KeyPath, str] = {
@@ -152,7 +152,7 @@ def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
     }
 
 
-def _unknown_signals(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
+def _unknown_signals(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, str]:
     """Traffic lights that the timeline or conditions name, and the net does not have."""
     known = edges.signals
     return {
@@ -162,7 +162,7 @@ def _unknown_signals(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
     }
 
 
-def _named_signals(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+def _named_signals(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
     prefix = "signal."
     for number, entry in enumerate(scenario.timeline):
         for subject in entry.do:
@@ -193,7 +193,7 @@ def _unfit_way(vehicle: str, way: VehicleRoute, edges: NetEdges) -> str | None:
     return None
 
 
-def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[KeyPath, str]:
+def _wide_changes(scenario: ScenarioFile, demand: Demand, edges: NetEdges) -> dict[KeyPath, str]:
     """Changes over more lanes than any road on the vehicle's route has."""
     mistakes: dict[KeyPath, str] = {}
     for i, event in enumerate(scenario.traffic.events):
@@ -217,7 +217,7 @@ def _limits(end: float, way: tuple[str, ...], edges: NetEdges) -> Limits:
     return limits
 
 
-def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[KeyPath, str]:
+def _pointless(document: Document, scenario: ScenarioFile, limits: Limits) -> dict[KeyPath, str]:
     """Conditions that can never be true, or never matter, on this network."""
     mistakes: dict[KeyPath, str] = {}
     for name, expectation in scenario.expect.items():
@@ -225,7 +225,7 @@ def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[K
     return mistakes | dict(pointless_triggers(document, scenario, limits))
 
 
-def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:
+def _places_aside(scenario: ScenarioFile, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:
     """Positions before the start or beyond the end of the ego's route."""
     if not way or not all(edges.axes.get(edge) for edge in way):
         return {}
@@ -244,7 +244,7 @@ def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> 
     return mistakes
 
 
-def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
+def _banks_aside(scenario: ScenarioFile, length: float) -> dict[KeyPath, str]:
     """Banks entirely before the start or beyond the end of the ego's route; no wind brings them in."""
     mistakes: dict[KeyPath, str] = {}
     for i, bank in enumerate(scenario.fog.banks):

@@ -1,4 +1,4 @@
-"""A scenario's own policy: from what is believed of the fog to advice, lamps and warning."""
+"""A run's own policy: from what is believed of the fog to advice, lamps and warning."""
 
 import dataclasses
 import math
@@ -6,41 +6,38 @@ from collections.abc import Callable, Sequence
 
 from fogsim.advice import Adviser, VehicleAdviser
 from fogsim.advice.warning import choose_warning
-from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.drivers import stretch_advice
-from fogsim.scenario.road_sections import DISPLAYS
-from fogsim.scenario.schema import InformedMethod
+from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
+from fogsim.simulation.chosen_methods import adviser
 from fogsim.simulation.road_advice import RoadAdvice, stretch_advices
+from fogsim.simulation.run_config import AdviceConfig
 from fogsim.values import Belief, Command, LampChoice, RoadSection, SpeedAdvice, Step
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_lamp_choice, checked_lamps
 
 
 class AdvisedDriving:
-    """The scenario's own policy: adviser, lighting rules and the driver's warning, asked once a decision period."""
+    """The run's own policy: adviser, lighting rules and the driver's warning, asked once in so many frames."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._ask_adviser = _questions_to(build.adviser(scenario))
-        self._ask_lighting = _lighting_questions(build.lighting_policy(scenario), scenario.lighting.method)
-        self._frames = build.periods(scenario).decision_frames
-        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
+    def __init__(self, advice: AdviceConfig, decision_frames: int) -> None:
+        self._advice, self._frames, lighting = advice, decision_frames, advice.lighting
+        self._ask_adviser = _questions_to(adviser(advice.adviser))
+        self._ask_lighting = _lighting_questions(lighting.make(LIGHTING_POLICIES), lighting.name)
+        self._road = RoadAdvice(advice) if advice.sections else None
 
     def decide(self, step: Step, previous: Command | None = None) -> Command:
         """Command for the next camera period; the one before between decisions."""
         previous = step.command if previous is None else previous
         if step.index % self._frames:
             return previous
-        lit = _known_fog(step, self._scenario.lighting)
+        lit = _known_fog(step, self._advice.lighting_informed_by)
         chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
         command = warned(Command(lamps=chosen.lamps, lamp_wish=chosen.wish), step, previous)
         if self._road is not None:
             advice, stretches = self._road.advise(step)
             return dataclasses.replace(command, advice=advice, stretches=stretches)
-        known = _known_fog(step, self._scenario.advice)
-        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
-        return spread_advice(dataclasses.replace(command, advice=advice), self._scenario)
+        known = _known_fog(step, self._advice.informed_by)
+        advice = checked_advice(self._advice.adviser.name, self._ask_adviser(step, known, previous.advice))
+        return spread_advice(dataclasses.replace(command, advice=advice), self._advice)
 
 
 def warned(command: Command, step: Step, previous: Command) -> Command:
@@ -71,19 +68,20 @@ def _lighting_questions(
     return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
 
 
-def _known_fog(step: Step, method: InformedMethod) -> Belief:
+def _known_fog(step: Step, informed_by: str) -> Belief:
     """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it."""
-    return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
+    return step.belief if informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
 
 
-def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadSection] = ()) -> Command:
-    """Let others hear the ego's advice too, if the scenario says so."""
-    if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
+def spread_advice(command: Command, config: AdviceConfig, sections: Sequence[RoadSection] = ()) -> Command:
+    """Let others hear the ego's advice too, if they are to."""
+    speed = command.advice.speed
+    if not math.isfinite(speed):
         return command
-    if scenario.drivers.advised == "all":
-        return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
-    if scenario.drivers.advised in DISPLAYS:
-        stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
-        advices = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
+    if config.sections is not None:
+        stretches = [section.stretch for section in sections]
+        advices = stretch_advices(stretches, [speed] * len(sections), config.sections.display)
         return dataclasses.replace(command, stretches=advices)
-    return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))
+    if config.stretch is not None:
+        return dataclasses.replace(command, stretches=(dataclasses.replace(config.stretch, speed=speed),))
+    return dataclasses.replace(command, advice_reach=config.reach) if config.reach else command

@@ -11,11 +11,11 @@ from fogsim.atmosphere import FogNow
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import SimulationError, UnplayedWarning
-from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.ego.view_rendering import Surrounding
 from fogsim.simulation.fleet import EquippedFleet, camera_messages
+from fogsim.simulation.run_config import Periods, ScenarioLike, check_ego
 from fogsim.simulation.timeline import Timeline
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
 from fogsim.values import (
@@ -35,7 +35,7 @@ Processes = Annotated[int, Range(0, 1000)]
 
 @checked_parameters
 def run(
-    scenario: Scenario,
+    scenario: ScenarioLike,
     seed: Seed = 0,
     traffic: Traffic | None = None,
     *,
@@ -46,8 +46,8 @@ def run(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `load_scenario`.
+    scenario : Scenario or RunConfig
+        From `load_scenario`, or made of plain values.
     seed : int
         The same seed gives the same run, bit for bit.
     traffic : Traffic or None
@@ -77,21 +77,22 @@ def run(
         After the last step, if something of the script was not played and a longer run would not have played it
         either; `Step.unplayed` of the last step has all that was not played.
     """
-    policy = AdvisedDriving(scenario)
-    with ClosedLoop(scenario, traffic, sumo_outputs, camera_processes) as loop:
+    config = scenario.run_config()
+    policy = AdvisedDriving(config.advice, config.periods.decision_frames)
+    with ClosedLoop(config, traffic, sumo_outputs, camera_processes) as loop:
         step = loop.start(seed)
         yield step
         while step.ending is None:
             step = loop.advance(policy.decide(step))
             yield step
-    warn_of_unplayed(scenario, step)
+    warn_of_unplayed(config.name, step)
 
 
-def warn_of_unplayed(scenario: Scenario, last: TrafficStep) -> None:
+def warn_of_unplayed(name: str, last: TrafficStep) -> None:
     """Warn of what was not played in a run that is over, if a longer one would not have played it either."""
     came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NONE_LEFT)
     if last.unplayed and (came_to_end or last.unplayed.is_final):
-        warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
+        warnings.warn(f"{name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
 
 class EntersFog(Protocol):
@@ -165,7 +166,7 @@ class DriversFog:
             self._fog.set_time(time)
 
 
-def advance_traffic(traffic: AnyTraffic, fog: DriversFog, periods: build.Periods, index: int, command: Command) -> None:
+def advance_traffic(traffic: AnyTraffic, fog: DriversFog, periods: Periods, index: int, command: Command) -> None:
     """Move a traffic simulation by one camera period, the fog with it."""
     for number in range(periods.traffic_steps):
         fog.set_time((index + number / periods.traffic_steps) * periods.camera_period)
@@ -178,7 +179,7 @@ class ClosedLoop:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or RunConfig
         The scenario.
     traffic : Traffic or None
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
@@ -195,20 +196,20 @@ class ClosedLoop:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: ScenarioLike,
         traffic: Traffic | None = None,
         sumo_outputs: Path | None = None,
         camera_processes: Processes = 0,
     ) -> None:
-        build.check_ego(scenario, "the closed loop")
-        self._scenario = scenario
-        self._periods = build.periods(scenario)
-        self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario), sumo_outputs)
+        config = scenario.run_config()
+        check_ego(config.traffic.ego, "the closed loop")
+        self._config, self._periods = config, config.periods
+        self._traffic = traffic or libsumo_traffic(config.traffic, sumo_outputs)
         self._replays = traffic is None
-        self._equipment = EgoEquipment(scenario)
-        self._fleet = EquippedFleet(scenario, camera_processes)
+        self._equipment = EgoEquipment(config)
+        self._fleet = EquippedFleet(config, camera_processes)
         self._drivers_fog = DriversFog()
-        self._timeline = Timeline(scenario)
+        self._timeline = Timeline(config.script)
         self._fog: FogField | None = None
         self._step: Step | None = None
 
@@ -231,7 +232,7 @@ class ClosedLoop:
         streams = spawn_streams(seed)
         self._step = None
         self._drivers_fog.restart()
-        self._timeline = Timeline(self._scenario)
+        self._timeline = Timeline(self._config.script)
         if self._replays:
             self._enter_known_fog(streams.patch_seed)
         self._traffic.start(streams.traffic_seed)
@@ -252,9 +253,9 @@ class ClosedLoop:
         """Surround drivers with the fog from the beginning if the ego's route, along which it lies, is known."""
         fog = self._fog
         if fog is None and (planned := self._traffic.planned_network()) is not None:
-            fog = build.fog_field(self._scenario, planned[0].route, planned[0].structures)
+            fog = self._config.world.fog.along(planned[0].route, planned[0].structures)
         if fog is not None:
-            fog = build.fog_of_run(self._scenario, fog, patch_seed)
+            fog = self._config.world.fog.of_run(fog, patch_seed)
             if not self._drivers_fog.matches(fog):
                 self._drivers_fog.enter(fog, self._traffic)
 
@@ -349,9 +350,9 @@ class ClosedLoop:
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:
         ego = snapshot.state.ids[snapshot.ego]
-        if self._scenario.end_on_collision and any(ego in (c.collider, c.victim) for c in snapshot.collisions):
+        if self._config.ends_on_collision and any(ego in (c.collider, c.victim) for c in snapshot.collisions):
             return Ending.COLLISION
-        if snapshot.route_position >= snapshot.route_length - self._scenario.traffic.stop_before_end_m:
+        if snapshot.route_position >= snapshot.route_length - self._config.stop_before_end:
             return Ending.ARRIVED
         return Ending.TIME if index >= self._periods.frames or snapshot.is_ended else None
 

@@ -30,9 +30,9 @@ from fogsim.recorders import (
     StepRecorder,
     write_sign_map,
 )
-from fogsim.scenario import Scenario, build, resolved
-from fogsim.scenario.wording.sentences import SENTENCES
+from fogsim.simulation.chosen_methods import safety_standard
 from fogsim.simulation.loop import Processes, run, warn_of_unplayed
+from fogsim.simulation.run_config import RunConfig, RunRecord, ScenarioLike
 from fogsim.simulation.traffic_run import run_traffic
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net
@@ -149,7 +149,7 @@ class RecordedRun:
 
 @checked_parameters
 def record_run(
-    scenario: Scenario,
+    scenario: ScenarioLike,
     seed: Seed,
     out: str | Path,
     *,
@@ -170,21 +170,22 @@ def record_run(
     recorded and a manifest of status "failed" with the message. An error of a user's method leaves that manifest in
     either case, if there are no earlier results.
     """
+    config = scenario.run_config()
 
     def of_ego() -> _Recorded[Step]:
         return _Recorded(
-            lambda folder: run(scenario, seed, sumo_outputs=folder, camera_processes=camera_processes),
-            RunMetrics(build.safety_standard(scenario)),
+            lambda folder: run(config, seed, sumo_outputs=folder, camera_processes=camera_processes),
+            RunMetrics(safety_standard(config.advice.adviser)),
             RECORDERS,
             watch,
         )
 
-    return _record(of_ego, scenario, seed, Path(out), overwrite, recorders, command_line)
+    return _record(of_ego, config, scenario.run_record, seed, Path(out), overwrite, recorders, command_line)
 
 
 @checked_parameters
 def record_traffic(
-    scenario: Scenario,
+    scenario: ScenarioLike,
     seed: Seed,
     out: str | Path,
     *,
@@ -197,18 +198,19 @@ def record_traffic(
 
     There is no video; table and report cover all vehicles.
     """
+    config = scenario.run_config()
 
     def alone() -> _Recorded[TrafficStep]:
         road = RoadSpeeds()
         return _Recorded(
-            lambda folder: run_traffic(scenario, seed, folder),
-            TrafficRunMetrics(build.safety_standard(scenario), watchers=[road]),
+            lambda folder: run_traffic(config, seed, folder),
+            TrafficRunMetrics(safety_standard(config.advice.adviser), watchers=[road]),
             TRAFFIC_RECORDERS,
             watch,
             road,
         )
 
-    return _record(alone, scenario, seed, Path(out), overwrite, recorders, command_line)
+    return _record(alone, config, scenario.run_record, seed, Path(out), overwrite, recorders, command_line)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -230,7 +232,8 @@ class _Recorded(Generic[AnyStep]):
 
 def _record(
     make: Callable[[], _Recorded[AnyStep]],
-    scenario: Scenario,
+    config: RunConfig,
+    about: Callable[[], RunRecord],
     seed: int,
     out: Path,
     overwrite: bool,
@@ -238,20 +241,21 @@ def _record(
     command_line: Sequence[str],
 ) -> RecordedRun:
     with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
+        record = about()
         manifest = Manifest(
             Status.RUNNING,
             seed,
-            resolved(scenario),
+            record.resolved,
             datetime.now(UTC),
             command_line=command_line,
-            own_methods=build.own_methods(scenario),
+            own_methods=record.own_methods,
         )
         try:
             what = make()
         except MethodError as error:
             _note_failure(directory, manifest, error)
             raise
-        information = _information(what, scenario, seed, directory)
+        information = _information(what, config, record, seed, directory)
         opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
         recording = Recording(directory, manifest, opened, what.metrics)
         status, last, message = Status.FAILED, None, ""
@@ -283,7 +287,7 @@ def _record(
     if recording.failures and not message:
         raise RecorderError(recording.failures, directory.path)
     if last is not None and status is Status.COMPLETE:
-        warn_of_unplayed(scenario, last)
+        warn_of_unplayed(config.name, last)
     return RecordedRun(status, ending, what.metrics.summary(), directory.path, tuple(recording.files), unplayed)
 
 
@@ -297,35 +301,38 @@ def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodErro
         directory.finish(ended.to_json())
 
 
-def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, directory: RunDirectory) -> RunInformation:
+def _information(
+    what: _Recorded[AnyStep], config: RunConfig, record: RunRecord, seed: int, directory: RunDirectory
+) -> RunInformation:
     return RunInformation(
         directory=directory,
-        title=scenario.name,
-        description=scenario.description,
+        title=config.name,
+        description=config.description,
         seed=seed,
-        methods=tuple(e.method for e in scenario.estimators),
-        frame_period=scenario.clocks.camera_period_s,
+        methods=tuple(one.name for one in config.estimators),
+        frame_period=config.periods.camera_period,
         summary=lambda: what.metrics.summary().values,
         meanings=what.metrics.summary().meanings,
         along_road=what.along_road,
         topics=metric_topics(),
-        settings=lambda: {heading: words(scenario) for heading, words in SENTENCES.items()},
+        settings=record.settings,
     )
 
 
 @checked_parameters
-def record_signs(scenario: Scenario, out: str | Path, *, overwrite: bool = False) -> SignMap:
+def record_signs(scenario: ScenarioLike, out: str | Path, *, overwrite: bool = False) -> SignMap:
     """Write the sign map of a scenario as GeoJSON, without starting a simulation."""
     out = Path(out)
     refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
-    setup = build.traffic_setup(scenario)
+    config = scenario.run_config()
+    setup = config.traffic
     net_file, additional = setup.net, setup.additional
     if net_file is None and setup.config is not None:
         net_file, additional = configured_files(setup.config)
     if net_file is None:
-        raise InputError(f"{scenario.name}: the scenario names neither a SUMO network nor a SUMO configuration")
+        raise InputError(f"{config.name}: the scenario names neither a SUMO network nor a SUMO configuration")
     net = read_net(net_file)
     signs = sign_map(net, additional)
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_sign_map(out, signs, scenario.name, geographic_position(net))
+    write_sign_map(out, signs, config.name, geographic_position(net))
     return signs

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fogsim.advice.presentation import harmonised_speeds
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.road_sections import DISPLAYS
-from fogsim.units import KMH_PER_MPS
+from fogsim.errors import InputError
+from fogsim.simulation.chosen_methods import road_adviser
+from fogsim.simulation.run_config import AdviceConfig
 from fogsim.values import Belief, Display, SpeedAdvice, Step, Stretch, StretchAdvice, TrafficStep
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice
@@ -24,12 +24,13 @@ class RoadAdvice:
     reached knows nothing.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._adviser = build.road_adviser(scenario)
-        self._advice = scenario.advice
-        self._display = DISPLAYS[scenario.drivers.advised]
-        self._harmonisation = scenario.drivers.harmonisation
-        self._read_before = scenario.drivers.signs.reading_distance_m if self._display == Display.MESSAGE_SIGN else 0.0
+    def __init__(self, config: AdviceConfig) -> None:
+        sections = config.sections
+        if sections is None:
+            raise InputError("advice to sections of road needs sections, got None")
+        self._adviser, self._config = road_adviser(config.adviser), config
+        self._display, self._harmonisation = sections.display, sections.harmonisation
+        self._read_before = sections.reading_distance
         self._advised: dict[Stretch, SpeedAdvice] = {}
         self._egos = SpeedAdvice()
         self._read: tuple[Stretch, float] | None = None
@@ -40,14 +41,14 @@ class RoadAdvice:
             self._advised, self._egos, self._read = {}, SpeedAdvice(), None
         sections = tuple(section.stretch for section in step.truth.sections)
         here = next((s for s in sections if s.start <= step.route_position < s.end), None)
-        if self._advice.informed_by == "belief":
+        if self._config.informed_by == "belief":
             self._egos = self._ask(step, step.speed_limit, step.belief, self._egos)
             if here is not None:
                 self._advised[here] = self._egos
         else:
             self._ask_meters(step)
         shown = self._shown(step)
-        if self._advice.informed_by != "belief":
+        if self._config.informed_by != "belief":
             read = next((s for s in sections if s.start <= step.route_position + self._read_before < s.end), None)
             self._egos = SpeedAdvice(self._heard(read, dict(zip(sections, shown, strict=True))))
         return self._egos, self._advices(sections, shown)
@@ -71,13 +72,13 @@ class RoadAdvice:
     def _ask_meters(self, step: TrafficStep) -> None:
         for section in step.truth.sections:
             previous = self._advised.get(section.stretch, SpeedAdvice())
-            measured = section.reported if self._advice.informed_by == "sensors" else section.extinction
+            measured = section.reported if self._config.informed_by == "sensors" else section.extinction
             if measured is not None:
                 known = certain_belief(measured)
                 self._advised[section.stretch] = self._ask(step, section.speed_limit, known, previous)
 
     def _ask(self, step: TrafficStep, limit: float, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
-        return checked_advice(self._advice.method, self._adviser.advise(known, limit, step.time, previous))
+        return checked_advice(self._config.adviser.name, self._adviser.advise(known, limit, step.time, previous))
 
     def _shown(self, step: TrafficStep) -> tuple[float, ...]:
         sections, steps = step.truth.sections, self._harmonisation
@@ -86,8 +87,7 @@ class RoadAdvice:
             return speeds
         starts, limits = [s.stretch.start for s in sections], [s.speed_limit for s in sections]
         lengths = [*(following - start for start, following in itertools.pairwise(starts)), math.inf]
-        largest = steps.largest_step_kmh / KMH_PER_MPS
-        return harmonised_speeds(speeds, lengths, limits, largest, steps.deceleration_mps2)
+        return harmonised_speeds(speeds, lengths, limits, steps.largest_step, steps.deceleration)
 
     def _heard(self, here: Stretch | None, shown: dict[Stretch, float]) -> float:
         """What the ego has heard where it is [m/s]; a sign says in passing what holds to the end of its section."""

@@ -14,13 +14,14 @@ from fogsim.atmosphere import extinction, field_at, with_change
 from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import InputError, SimulationError, shown, suggest
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.road_sections import DISPLAYS, EYES, stations
 from fogsim.simulation.advised_driving import spread_advice
+from fogsim.simulation.chosen_methods import road_adviser
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.loop import DriversFog, advance_traffic, warn_of_unplayed
 from fogsim.simulation.road_advice import RoadAdvice
+from fogsim.simulation.road_sections import EYES, stations
+from fogsim.simulation.run_config import RunConfig, ScenarioLike
 from fogsim.simulation.timeline import Timeline
 from fogsim.traffic import NetworkTraffic, libsumo_network_traffic
 from fogsim.traffic.road.configuration import configured_files
@@ -36,14 +37,14 @@ _METER_SPACING = 100.0
 
 @checked_parameters
 def run_traffic(
-    scenario: Scenario, seed: Seed = 0, sumo_outputs: Path | None = None
+    scenario: ScenarioLike, seed: Seed = 0, sumo_outputs: Path | None = None
 ) -> Generator[TrafficStep, None, None]:
     """Run a scenario without an ego (``traffic.ego: none``) with its own advice.
 
     Parameters
     ----------
-    scenario : Scenario
-        From `load_scenario`.
+    scenario : Scenario or RunConfig
+        From `load_scenario`, or made of plain values.
     seed : int
         The same seed gives the same run, bit for bit.
     sumo_outputs : Path or None
@@ -65,24 +66,24 @@ def run_traffic(
     UnplayedWarning
         See `fogsim.run`.
     """
-    policy = MeteredAdvice(scenario)
-    with TrafficRun(scenario, sumo_outputs=sumo_outputs) as traffic:
+    config = scenario.run_config()
+    policy = MeteredAdvice(config)
+    with TrafficRun(config, sumo_outputs=sumo_outputs) as traffic:
         step, limit = traffic.start(seed)
         yield step
         while step.ending is None:
             step, limit = traffic.advance(policy.decide(step, limit))
             yield step
-    warn_of_unplayed(scenario, step)
+    warn_of_unplayed(config.name, step)
 
 
 class MeteredAdvice:
-    """The scenario's adviser, who goes by the visibility meters; asked once a decision period."""
+    """The run's adviser, who goes by the visibility meters; asked once a decision period."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._adviser = build.road_adviser(scenario)
-        self._frames = build.periods(scenario).decision_frames
-        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
+    def __init__(self, config: RunConfig) -> None:
+        self._advice, self._frames = config.advice, config.periods.decision_frames
+        self._adviser = road_adviser(config.advice.adviser)
+        self._road = RoadAdvice(config.advice) if config.advice.sections else None
 
     def decide(self, step: TrafficStep, speed_limit: float) -> Command:
         """Command for the next camera period; the one in force between decisions (`speed_limit` [m/s])."""
@@ -92,8 +93,8 @@ class MeteredAdvice:
             return Command(stretches=self._road.advise_traffic(step))
         measured = certain_belief(step.truth.extinction)
         advised = self._adviser.advise(measured, speed_limit, step.time, step.command.advice)
-        advice = checked_advice(self._scenario.advice.method, advised)
-        command = spread_advice(Command(advice=advice), self._scenario)
+        advice = checked_advice(self._advice.adviser.name, advised)
+        command = spread_advice(Command(advice=advice), self._advice)
         # Without an ego there is no place to be near to.
         return dataclasses.replace(command, advice_reach=math.inf) if command.advice_reach else command
 
@@ -103,28 +104,29 @@ class TrafficRun:
     """The traffic of one simulation in fog, from command to finished step."""
 
     def __init__(
-        self, scenario: Scenario, traffic: NetworkTraffic | None = None, sumo_outputs: Path | None = None
+        self, scenario: ScenarioLike, traffic: NetworkTraffic | None = None, sumo_outputs: Path | None = None
     ) -> None:
-        if scenario.traffic.has_ego:
+        config = scenario.run_config()
+        setup, along = config.traffic, config.along
+        if setup.ego is not None:
             raise InputError(
-                f"traffic alone has no ego, and traffic.ego is {scenario.traffic.ego!r}; write none, or call fogsim.run"
+                f"traffic alone has no ego, and traffic.ego is {setup.ego!r}; write none, or call fogsim.run"
             )
-        setup = build.traffic_setup(scenario)
-        self._periods = build.periods(scenario)
+        self._periods = config.periods
         self._traffic = traffic or libsumo_network_traffic(setup, sumo_outputs)
-        along = scenario.traffic.along
         net, files = (setup.net, setup.additional) if setup.config is None else configured_files(setup.config)
         # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
         axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
         self._route = axis if along else None
-        self._fog = build.fog_field(scenario, axis, structures(path for path in files if path.is_file()))
-        self._fog_now, self._scenario, self._timeline = self._fog, scenario, Timeline(scenario)
+        self._fog = config.world.fog.along(axis, structures(path for path in files if path.is_file()))
+        self._fog_now, self._config, self._timeline = self._fog, config, Timeline(config.script)
         # A meter that stands for a whole network does not see single patches.
         self._sees_patches = bool(along)
         self._meters = _places_along(axis) + EYES
-        self._section_meters, self._reporters = RoadMeters(scenario, axis, limits), FogReports(scenario, axis)
+        self._section_meters = RoadMeters(config.advice.sections, axis, limits)
+        self._reporters = FogReports(config.reports, axis)
         self._drivers_fog = DriversFog()
-        self._cohort = _CohortWatch(scenario.traffic.cohort_s)
+        self._cohort = _CohortWatch(config.cohort)
         self._step: TrafficStep | None = None
 
     @checked_parameters
@@ -135,9 +137,9 @@ class TrafficRun:
         """
         self._step = None
         streams = spawn_streams(seed)
-        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
-        self._timeline, self._fog_now = Timeline(self._scenario), self._fog
-        self._cohort = _CohortWatch(self._scenario.traffic.cohort_s)
+        self._fog = self._config.world.fog.of_run(self._fog, streams.patch_seed)
+        self._timeline, self._fog_now = Timeline(self._config.script), self._fog
+        self._cohort = _CohortWatch(self._config.cohort)
         self._drivers_fog.restart()
         if not self._drivers_fog.matches(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)

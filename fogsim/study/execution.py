@@ -83,9 +83,9 @@ def build_without_running(scenario: Scenario) -> None:
     planned = libsumo_traffic(build.traffic_setup(scenario)).planned_network()
     if planned is not None:
         road, _ = planned
-        build.fog_field(scenario, road.route, road.structures)
-        RoadMeters(scenario, road.route, road.route_limits)
-        FogReports(scenario, road.route)
+        build.world_config(scenario).fog.along(road.route, road.structures)
+        RoadMeters(build.sections_config(scenario), road.route, road.route_limits)
+        FogReports(build.reports_config(scenario), road.route)
 
 
 def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:

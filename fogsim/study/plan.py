@@ -19,13 +19,14 @@ from fogsim.errors import InputError, UnknownNameError, shown, suggest
 from fogsim.scenario import Scenario, build, catalogue, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.expect.conditions import refuse
-from fogsim.scenario.loading import CountWatch, deciding, scenario_reader
+from fogsim.scenario.loading import CountWatch, scenario_reader
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.scenario.variation import grid_mistake
+from fogsim.scenario.written_form import deciding
+from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import unknown_metrics
 from fogsim.study.table import column_mistake
 from fogsim.traffic.road.configuration import configured_demand, configured_files

@@ -17,8 +17,8 @@ from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
-from fogsim.scenario.schema import NO_RENDERER
 from fogsim.simulation.loop import run
+from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.simulation.traffic_run import run_traffic
 from fogsim.study.execution import outcome_of
 from fogsim.study.plan import StudyRun

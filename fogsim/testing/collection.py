@@ -10,8 +10,9 @@ from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError
 from fogsim.scenario import build
 from fogsim.scenario.document import read_scenario_document
-from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, deciding, load_cases, scenario_file
+from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
 from fogsim.scenario.variation import NONE_FAILS, Verdict
+from fogsim.scenario.written_form import deciding
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
 

@@ -29,27 +29,58 @@ class AfterCollision(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TrafficSetup:
-    """A SUMO simulation, and who the ego is if there is one."""
+    """A SUMO simulation, and who the ego is if there is one.
 
-    net: Path | None  # SUMO network; None for the one that the simulation says it has loaded
-    # routes, additional: SUMO route and additional files
-    routes: tuple[Path, ...]
-    additional: tuple[Path, ...]
-    ego: str | None  # Id of the ego vehicle, or `ANY_EGO`; None for traffic alone
-    step_length: float  # SUMO's step [s]
-    keep_lane: tuple[str, ...]  # Vehicles that never change lane
-    warm_up_limit: float  # Simulated time within which the ego must appear [s]
-    advice_deceleration: float  # Deceleration with which an advised vehicle slows down to the advice [m/s²]
-    reading_radius: float  # Vehicles farther from the ego than this are not read [m]
-    events: tuple[Event, ...] = ()  # What is scripted
-    # Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves
+    Parameters
+    ----------
+    net : Path or None
+        SUMO network; None for the one that the simulation has loaded.
+    routes, additional : tuple of Path
+        SUMO route and additional files.
+    ego : str or None
+        Id of the ego vehicle, or `ANY_EGO`; None for traffic alone.
+    step_length : float
+        SUMO's step [s].
+    keep_lane : tuple of str
+        Vehicles that never change lane.
+    warm_up_limit : float
+        Simulated time within which the ego must appear [s].
+    advice_deceleration : float
+        Deceleration with which an advised vehicle slows down to the advice [m/s²].
+    reading_radius : float
+        Vehicles farther from the ego than this are not read [m].
+    events : tuple of Event
+        What is scripted.
+    sight : DriverSight or None
+        Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves.
+    drivers : DriverSetup
+        How drivers choose their speed in fog and follow advice.
+    after_collision : AfterCollision
+        What becomes of vehicles that have collided.
+    config : Path or None
+        SUMO configuration, in place of net, routes and additional files.
+    sumo_options : tuple of (str, str)
+        Further options of SUMO, named without dashes, and their values as on its command line.
+    warm_up : float
+        Without an ego, simulated time before the run begins [s].
+    """
+
+    net: Path | None
+    routes: tuple[Path, ...] = ()
+    additional: tuple[Path, ...] = ()
+    ego: str | None = "ego"
+    step_length: float = 0.1
+    keep_lane: tuple[str, ...] = ()
+    warm_up_limit: float = 600.0
+    advice_deceleration: float = 2.0
+    reading_radius: float = 1000.0
+    events: tuple[Event, ...] = ()
     sight: DriverSight | None = None
-    drivers: DriverSetup = UNTOUCHED  # How drivers choose their speed in fog and follow advice
-    after_collision: AfterCollision = AfterCollision.STOP  # What becomes of vehicles that have collided
-    config: Path | None = None  # SUMO configuration, in place of net, routes and additional files
-    # (str, str): Further options of SUMO, named without dashes, and their values as on its command line
+    drivers: DriverSetup = UNTOUCHED
+    after_collision: AfterCollision = AfterCollision.STOP
+    config: Path | None = None
     sumo_options: tuple[tuple[str, str], ...] = ()
-    warm_up: float = 0.0  # Without an ego, simulated time before the run begins [s]
+    warm_up: float = 0.0
 
 
 class AnyTraffic(Protocol):

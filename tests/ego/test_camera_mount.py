@@ -79,4 +79,4 @@ def test_mounts_go_with_the_eyes_and_a_car_keeps_what_it_always_had() -> None:
     assert USUAL_MOUNTS.keys() == EYE_HEIGHTS.keys()
     behind_windscreen = USUAL_MOUNTS.keys() - {"motorcycle"}
     assert all(USUAL_MOUNTS[body].height == pytest.approx(EYE_HEIGHTS[body] + 0.3) for body in behind_windscreen)
-    assert build.camera_mount(fogsim.load_scenario("motorway_fog_bank")) == (1.38, 1.7)
+    assert build.camera_config(fogsim.load_scenario("motorway_fog_bank")).mount() == (1.38, 1.7)

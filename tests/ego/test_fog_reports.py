@@ -8,6 +8,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.scenario import build
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import FogBank, FogField, FogReport, TrafficState
@@ -20,7 +21,7 @@ EVEN = FogField(0.03, (1.0,) * 3)
 
 def senders(**reports: object) -> FogReports:
     written = [f"sensors.reports.{kind}={value}" for kind, value in reports.items()]
-    made = FogReports(fogsim.load_scenario("motorway_fog_bank", written), ROUTE)
+    made = FogReports(build.reports_config(fogsim.load_scenario("motorway_fog_bank", written)), ROUTE)
     made.reset(np.random.default_rng(1))
     return made
 

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.scenario import load_scenario
 from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
+from fogsim.simulation.run_config import LightSensor
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp, LightMeasurement, TrafficState
 from fogsim.values.eye import disability_glare
 
 LOW, HIGH = int(Lamp.POSITION | Lamp.LOW_BEAM), int(Lamp.POSITION | Lamp.HIGH_BEAM)
 NIGHT = 0.05
-SENSING = LightSensing(load_scenario("motorway_fog_bank"))
+SENSING = LightSensing(LightSensor())
 
 
 def fog(visibility: float) -> FogField:

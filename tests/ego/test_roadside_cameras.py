@@ -8,6 +8,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.scenario import build
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras, as_log_normal, over_road
 from fogsim.units import extinction_from_visibility
@@ -121,7 +122,7 @@ def test_a_log_normal_distribution_stands_for_the_positive_part_of_a_normal_one(
 
 def test_a_section_goes_by_the_last_report_of_a_sensor_wherever_that_was_seen() -> None:
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "drivers.advised=signs"])
-    meters = RoadMeters(scenario, np.array([[0.0, 0.0, 0.0], [2000.0, 0.0, 0.0]]), np.zeros(0))
+    meters = RoadMeters(build.sections_config(scenario), np.array([[0.0, 0.0, 0.0], [2000.0, 0.0, 0.0]]), np.zeros(0))
     fog = drive("renderer=none", "estimators=[]", "duration_s=0.1")[0].truth.fog
     assert fog is not None
     report = FogReport("sensor 0", 0, 150.0, 0.0, 0.03, 0.1)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor
-from fogsim.simulation.ego.shutter import Shutter, exposed, moved
+from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor, Shutter
+from fogsim.simulation.ego.motion_blur import exposed, moved
 from fogsim.values import Camera, CameraPose, TrafficState, View
 
 POSE = CameraPose((100.0, 50.0, 1.4), 0.0)

@@ -37,15 +37,19 @@ def two_cars(x: float, y: float) -> TrafficState:
 
 
 def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
-    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback)
+    pose = mounted_pose(
+        build.camera_config(scenario).on(), state.position[0], 0.0, build.camera_config(scenario).mount().setback
+    )
     view, radiance = view_renderer.render(state, 0, pose, 0.0)
     return view.instance.copy(), radiance.copy()
 
 
 def test_a_camera_beside_the_road_sees_every_vehicle(scenario: fogsim.Scenario) -> None:
     lane, state = road((0.0, 0.0), 900.0, "a"), two_cars(100.0, 0.0)
-    view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
-    pose = mounted_pose(build.camera(scenario), np.array([60.0, 0.0, 0.0]), 0.0, 0.0)
+    view_renderer = ViewRenderer(
+        build.world_config(scenario), build.camera_config(scenario), RoadNetwork((lane,), lane.centreline), SignMap()
+    )
+    pose = mounted_pose(build.camera_config(scenario).on(), np.array([60.0, 0.0, 0.0]), 0.0, 0.0)
     seen_by = {ego: set(view_renderer.render(state, ego, pose, 0.0)[0].instance.ravel()) for ego in (None, 0)}
     # One hides the other.
     assert 16 in seen_by[None]
@@ -62,7 +66,12 @@ def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogs
     pictures = []
     for x, y in ((0.0, 0.0), (1.0e6, 5.5e6)):
         lane = road((x, y), 900.0, "a")
-        view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+        view_renderer = ViewRenderer(
+            build.world_config(scenario),
+            build.camera_config(scenario),
+            RoadNetwork((lane,), lane.centreline),
+            SignMap(),
+        )
         pictures.append(seen(view_renderer, scenario, two_cars(x + 100.13, y + 0.17)))
         view_renderer.close()
     assert (pictures[0][0] >= 16).sum() > 10
@@ -73,7 +82,9 @@ def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogs
 
 def test_where_the_ego_leaves_its_route_there_is_a_road_too(scenario: fogsim.Scenario) -> None:
     lanes = road((0.0, 0.0), 900.0, "a"), road((0.0, 9000.0), 900.0, "b")
-    view_renderer = ViewRenderer(scenario, RoadNetwork(lanes, lanes[0].centreline), SignMap())
+    view_renderer = ViewRenderer(
+        build.world_config(scenario), build.camera_config(scenario), RoadNetwork(lanes, lanes[0].centreline), SignMap()
+    )
     shares = [np.mean(seen(view_renderer, scenario, two_cars(100.0, y))[0] == 2) for y in (0.0, 9000.0, 0.0)]
     assert shares[0] > 0.2
     assert shares[1:] == pytest.approx([shares[0]] * 2, abs=0.02)
@@ -88,7 +99,7 @@ def test_a_large_network_looks_as_if_it_were_built_whole(
     pictures = []
     for few in (0, 2000):
         monkeypatch.setattr(view_rendering, "FEW_LANES", few)
-        view_renderer = ViewRenderer(scenario, network, SignMap())
+        view_renderer = ViewRenderer(build.world_config(scenario), build.camera_config(scenario), network, SignMap())
         pictures.append([seen(view_renderer, scenario, two_cars(x, 0.1)) for x in (100.0, 2100.0)])
         view_renderer.close()
     for there, here in zip(*pictures, strict=True):
@@ -98,7 +109,9 @@ def test_a_large_network_looks_as_if_it_were_built_whole(
 
 def test_a_closed_view_renderer_says_so(scenario: fogsim.Scenario) -> None:
     lane = road((0.0, 0.0), 100.0, "a")
-    view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+    view_renderer = ViewRenderer(
+        build.world_config(scenario), build.camera_config(scenario), RoadNetwork((lane,), lane.centreline), SignMap()
+    )
     view_renderer.close()
     with pytest.raises(fogsim.FogSimError, match="closed"):
         seen(view_renderer, scenario, two_cars(10.0, 0.0))

@@ -18,7 +18,8 @@ from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.mistakes import mistakes_in
 from fogsim.scenario.parts.lamp_file import LampFile
 from fogsim.scenario.timeline import FogActions, LightActions, TimelineEntry
-from fogsim.scenario.timeline.schema import SignalActions, VehicleActions
+from fogsim.scenario.timeline.schema import SignalActions
+from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.scenario.variation import VariationKeys
 from fogsim.study.plan import StudyFile
 

@@ -13,7 +13,7 @@ from early_motorway import ROUTES
 from fogsim import Camera, Frame, Observation, SecondView, load_scenario
 from fogsim.advice import ADVISERS
 from fogsim.errors import InputError, MethodError
-from fogsim.scenario import build
+from fogsim.simulation import chosen_methods
 from fogsim.study.execution import run_to_file
 from fogsim.testing.execution import ThisProcess
 from fogsim.values.image import for_kernels
@@ -198,10 +198,12 @@ def test_pixels_that_cannot_be_written_are_read_by_the_usual_kernels() -> None:
 
 def test_methods_may_catch_their_own_errors_and_be_named_tuples(folder: Path) -> None:
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "'mine:Fine'"))
-    scenario = load_scenario(folder / "short.fog.yaml", ["advice={method: 'mine:Tuple', parameters: {speed: 11.0}}"])
-    (estimator,) = build.estimators(scenario, build.assumed_camera(scenario))
+    config = load_scenario(
+        folder / "short.fog.yaml", ["advice={method: 'mine:Tuple', parameters: {speed: 11.0}}"]
+    ).run_config()
+    (estimator,) = chosen_methods.estimators(config.estimators, config.camera.assumed_on())
     assert estimator.update(Observation(np.zeros((48, 64, 3), np.uint8))).extinction == 0.05
-    assert build.adviser(scenario).speed == 11.0
+    assert chosen_methods.adviser(config.advice.adviser).speed == 11.0
     with pytest.raises(
         MethodError, match=r"adviser 'mine:ExitsInAdvise': advise\(\) failed: SystemExit: 0, at .*mine.py"
     ):

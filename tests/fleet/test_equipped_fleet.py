@@ -126,7 +126,7 @@ def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
         with pytest.raises(SimulationError, match="has died"):
             loop.advance(Command())
     with pytest.raises(SimulationError, match="not been started"):
-        EquippedFleet(scenario, 1)._pools[0].answer()
+        EquippedFleet(scenario.run_config(), 1)._pools[0].answer()
 
 
 def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed():

@@ -12,7 +12,7 @@ from fogsim.openscenario import read_parameter_cases
 from fogsim.openscenario.distributions import ParameterCases
 from fogsim.scenario import Scenario
 from fogsim.scenario.loading import load_cases, load_scenario
-from fogsim.scenario.timeline.schema import VehicleActions
+from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.testing.collection import collect
 
 DATA = Path(__file__).parents[1] / "data" / "openscenario"

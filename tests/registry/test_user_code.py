@@ -12,6 +12,7 @@ from fogsim.core.registry.user_code import import_class
 from fogsim.errors import UnknownNameError
 from fogsim.recorders import Manifest, Status
 from fogsim.scenario import build
+from fogsim.simulation import chosen_methods
 from fogsim.values.belief import certain_belief
 
 PLUGIN = Path(__file__).parents[1] / "data" / "adas_fog_plugin"
@@ -86,13 +87,13 @@ def test_parameters_of_a_users_method_are_checked_in_the_file(tmp_path):
     with pytest.raises(InputError, match=r"own\.yaml:5: advice\.parameters\.headway: must be a number 0\.5 … 10 s"):
         load_scenario(file)
     scenario = load_scenario(file, ["sut.advice.parameters.headway=4.0"])
-    assert build.adviser(scenario).headway == 4.0
+    assert chosen_methods.adviser(build.method(scenario, scenario.advice)).headway == 4.0
     versions = Manifest(Status.RUNNING, 0, {}, datetime.now(UTC), own_methods=build.own_methods(scenario)).to_json()[
         "versions"
     ]
     assert versions["adas_fog:Cautious"].startswith("sha256:")
     with pytest.raises(InputError, match="uses a vehicle's own sensors"):
-        build.road_adviser(scenario)
+        chosen_methods.road_adviser(build.method(scenario, scenario.advice))
 
 
 @pytest.mark.parametrize(

@@ -120,6 +120,6 @@ def test_all_renderers_draw_the_same_road(place: Place, surface: RoadSurface) ->
 
 def test_a_scenario_says_what_its_roads_are_like() -> None:
     usual = load_scenario("motorway_fog_bank")
-    assert build.pavement(usual) == Pavement()
+    assert build.world_config(usual).pavement == Pavement()
     wet = load_scenario("motorway_fog_bank", ["pavement={surface: wet, wheel_tracks: -0.1, repairs: 0.05}"])
-    assert build.pavement(wet) == Pavement(RoadSurface.WET, -0.1, 0.05)
+    assert build.world_config(wet).pavement == Pavement(RoadSurface.WET, -0.1, 0.05)

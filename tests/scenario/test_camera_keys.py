@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fogsim.camera import Metering
+from fogsim.camera import AutoExposure, Metering
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario
 
@@ -29,15 +29,23 @@ def test_exposure_is_automatic_unless_it_is_fixed(overrides: list[str], automati
 
 def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:
     """Airlight of 10 000 lx: 0.406 · 10 000 / π · 1.02 in the brightest channel."""
-    assert build.sensor(scenario()).saturation_luminance == pytest.approx(0.406 * 1e4 / math.pi * 1.02 / 0.6)
-    assert build.sensor(scenario("camera.saturation_luminance_cdpm2=4000")).saturation_luminance == 4000.0
+    assert build.camera_config(scenario()).sensor.saturation_luminance == pytest.approx(
+        0.406 * 1e4 / math.pi * 1.02 / 0.6
+    )
+    assert build.camera_config(scenario("camera.saturation_luminance_cdpm2=4000")).sensor.saturation_luminance == 4000.0
+
+
+def exposure(*overrides: str) -> AutoExposure:
+    found = build.camera_config(scenario(*overrides)).exposure
+    assert found is not None
+    return found
 
 
 def test_what_is_metered_has_a_target_of_its_own() -> None:
-    assert build.auto_exposure(scenario()).target == 0.65
-    average = build.auto_exposure(scenario("camera.exposure.metering=log_average"))
+    assert exposure().target == 0.65
+    average = exposure("camera.exposure.metering=log_average")
     assert (average.metering, average.target) == (Metering.LOG_AVERAGE, 0.18)
-    assert build.auto_exposure(scenario("camera.exposure.target_percent=40")).target == 0.4
+    assert exposure("camera.exposure.target_percent=40").target == 0.4
 
 
 def test_told_errors_are_in_the_told_calibration_alone() -> None:
@@ -47,12 +55,12 @@ def test_told_errors_are_in_the_told_calibration_alone() -> None:
         "camera.told={pitch_error_deg: 1, roll_error_deg: -2, focal_length_error_percent: 10, "
         "mount_height_error_percent: -20}",
     )
-    true, told = build.camera(wrong), build.assumed_camera(wrong)
+    true, told = build.camera_config(wrong).on(), build.camera_config(wrong).assumed_on()
     assert math.degrees(told.pitch - true.pitch) == pytest.approx(1.0)
     assert math.degrees(told.roll) == pytest.approx(-1.0)
     assert told.focal_length == pytest.approx(1.1 * true.focal_length)
     assert told.mount_height == pytest.approx(0.8 * true.mount_height)
-    assert (true.bits, told.bits, build.sensor(wrong).bits) == (12, 12, 12)
+    assert (true.bits, told.bits, build.camera_config(wrong).sensor.bits) == (12, 12, 12)
 
 
 def test_mistakes_are_named() -> None:

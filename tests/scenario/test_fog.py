@@ -8,7 +8,7 @@ import pytest
 from fogsim.atmosphere import extinction
 from fogsim.errors import InputError
 from fogsim.scenario import build, load_scenario, resolved
-from fogsim.scenario.drivers import driver_sight
+from fogsim.scenario.parts.drivers import driver_sight
 from fogsim.simulation.ego.daylight import in_daylight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogChange, FogField, FogPatches
@@ -18,7 +18,7 @@ ROUTE = np.array([[0.0, 0.0, 412.0], [3000.0, 0.0, 430.0]])
 
 
 def fog(*settings: str) -> FogField:
-    return build.fog_field(load_scenario("motorway_fog_bank", [f"fog.{s}" for s in settings]), ROUTE)
+    return build.world_config(load_scenario("motorway_fog_bank", [f"fog.{s}" for s in settings])).fog.along(ROUTE)
 
 
 def test_heights_count_from_the_lowest_point_of_the_route() -> None:

@@ -205,7 +205,8 @@ def take_two_steps(scenario: Scenario) -> int:
         return taken  # large pictures take their time, and are tried elsewhere
     # An ego that does not appear is told when the traffic begins; wrong input is not, as it has been checked.
     with contextlib.suppress(SimulationError), ClosedLoop(scenario) as loop:
-        policy, step = AdvisedDriving(scenario), loop.start(seed=1)
+        config = scenario.run_config()
+        policy, step = AdvisedDriving(config.advice, config.periods.decision_frames), loop.start(seed=1)
         for _ in range(2):
             if step.ending is None:
                 step = loop.advance(policy.decide(step))

@@ -8,8 +8,8 @@ import yaml
 from fogsim.errors import InputError
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.scenario.loading import load_scenario
-from fogsim.scenario.parts import methods
 from fogsim.scenario.parts.lamp_file import load_lamps
+from fogsim.simulation import chosen_methods
 from fogsim.values import Camera
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -37,4 +37,4 @@ def test_lamps_lie_next_to_the_scenario(tmp_path: Path) -> None:
     (tmp_path / "lamps.yaml").write_text("height_m: 0.8\n", encoding="utf-8")
     for lamps in ("lamps.yaml", "unknown"):
         scenario = load_scenario(file, [named.replace("lamps.yaml", lamps)])
-        assert [type(one) for one in methods.estimators(scenario, CAMERA)] == [NightRoad]
+        assert [type(one) for one in chosen_methods.estimators(scenario.run_config().estimators, CAMERA)] == [NightRoad]

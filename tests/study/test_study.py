@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from fogsim.cli.app import app
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError
-from fogsim.scenario.parts import methods
+from fogsim.simulation import chosen_methods
 from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.execution import RunWatch, result_file, run_to_file
@@ -221,7 +221,7 @@ def test_a_policy_that_returns_no_speed_is_reported_with_its_name(
     signs = "duration_s=1, lighting=low_beam, drivers.advised=signs"
     study = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", signs)))
     broken = SimpleNamespace(advise=lambda *_: SpeedAdvice(math.nan))
-    monkeypatch.setattr(methods, "adviser", lambda _: broken)
+    monkeypatch.setattr(chosen_methods, "adviser", lambda _: broken)
     told = run_to_file(study.runs[-1].scenario, 1, tmp_path / "run.json")
     assert told == json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["message"]
     assert re.fullmatch(r"adviser 'fixed_speed': advise\(\): speed must be .* got nan", str(told))

@@ -8,6 +8,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.fusion import make as make_fusion
+from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
 from fogsim.simulation.advised_driving import AdvisedDriving
@@ -144,17 +145,17 @@ def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("motorway_fog_bank")
+    config = load_scenario("motorway_fog_bank").run_config()
     step = make_step(0, time=0.0)
-    driving = AdvisedDriving(scenario)
+    driving = AdvisedDriving(config.advice, 1)
     monkeypatch.setattr(driving, "_ask_adviser", lambda *_: None)
     with pytest.raises(InputError, match="stopping_sight_distance"):
         driving.decide(step)
     for method in ("lamps", "choose_lamps"):
         without_lamps = type("Mine", (), {method: lambda *_: None})()
-        monkeypatch.setattr("fogsim.simulation.loop.build.lighting_policy", lambda _, mine=without_lamps: mine)
+        monkeypatch.setattr(LIGHTING_POLICIES, "find", lambda *_, mine=without_lamps: lambda: mine)
         with pytest.raises(InputError, match=rf"'fog_lamp_rules': {method}\(\) must be of type"):
-            AdvisedDriving(scenario).decide(step)
+            AdvisedDriving(config.advice, 1).decide(step)
 
 
 def test_recorders() -> None:

@@ -15,8 +15,8 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, MissingDependencyError
 from fogsim.scenario import Scenario, build, load_scenario, override
-from fogsim.scenario.road_sections import road_sections, stations
 from fogsim.simulation.road_advice import RoadAdvice, stretch_advices
+from fogsim.simulation.road_sections import road_sections, stations
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net, route_axis
 from fogsim.values import Command, Display, Ending, TrafficStep
@@ -61,7 +61,7 @@ def signed_road(scenario: Scenario) -> SignedRoad:
     roads = read_net(net)
     axis, _ = route_axis(roads, scenario.traffic.along)
     length = float(stations(axis)[-1])
-    starts = tuple(section.start for section in road_sections(scenario, length))
+    starts = tuple(section.start for section in road_sections(build.sections_config(scenario), length))
     if not starts:
         raise InputError(f"FogCorridor: no sign of drivers.signs stands on the road of {length:.0f} m")
     lanes = sum(roads.lanes[place].kind is LaneKind.CARRIAGEWAY for place in roads.edges[scenario.traffic.along[0]])
@@ -220,7 +220,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             loop_places(self._road.starts, self._road.length), self._road.axis, scenario.traffic.along
         )
         self._meters = np.random.default_rng((3, run_seed))
-        self._rule = RoadAdvice(scenario)
+        self._rule = RoadAdvice(build.advice_config(scenario))
         self._frames = build.periods(scenario).decision_frames
         self._standard, self._duration = build.safety_standard(scenario), scenario.duration_s
         self._shown = (math.inf,) * len(self.possible_agents)

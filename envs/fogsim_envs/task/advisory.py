@@ -162,10 +162,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._step: Step | None = None
         first = self._source.first_scenario()
         self._check(first)
-        self._camera = build.camera(first)
+        self._camera = build.camera_config(first).on()
         if self._source.may_be_dark and first.renderer != "none":
             # Once a process; else the first night's reset would take half a second longer than others.
-            prepare_lamplight(first)
+            prepare_lamplight(first.run_config())
         self.observation_space = task_space(observation, self._camera)
         if continuous and discrete:
             raise InputError("continuous and discrete: expected one of them at most")
@@ -201,8 +201,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._check_camera(scenario)
         self._step = self._completed(self._begin(scenario, run_seed))
         self._episode, self._driver = drawn.episode, OwnDriver(drawn.episode.driver)
-        self._adviser = AdvisedDriving(scenario)
-        self._frames = build.periods(scenario).decision_frames
+        self._advice, self._frames = build.advice_config(scenario), build.periods(scenario).decision_frames
+        self._adviser = AdvisedDriving(self._advice, self._frames)
         self._standard = build.safety_standard(scenario)
         if self._is_measured:
             self._measured = RunMetrics(self._standard)
@@ -230,7 +230,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
     def _check_camera(self, scenario: Scenario) -> None:
         self._check(scenario)
-        camera = build.camera(scenario)
+        camera = build.camera_config(scenario).on()
         ours = (self._camera.width, self._camera.height, self._camera.bits)
         if (camera.width, camera.height, camera.bits) != ours:
             raise InputError(
@@ -298,11 +298,11 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
     def _drive(self, before: Step) -> Step:
         """The last step of a decision period, which begins after one."""
-        step, scenario, simulation = before, self._running, self._simulation
-        if scenario is None or simulation is None:
+        step, simulation = before, self._simulation
+        if simulation is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         for _ in range(self._frames):
-            asked = spread_advice(self._own, scenario, before.truth.sections)
+            asked = spread_advice(self._own, self._advice, before.truth.sections)
             step = self._completed(simulation.advance(self._driver.follow(asked, step)))
             if self._is_measured:
                 # What the ego's own driver chooses is no advice.

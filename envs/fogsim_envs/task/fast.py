@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import extinction
 from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
-from fogsim.fusion import DatedFusion
+from fogsim.fusion import FUSIONS, DatedFusion
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.section import Method
@@ -112,7 +112,10 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         """Any scenario will do: nothing is drawn."""
 
     def _begin(self, scenario: Scenario, seed: int) -> Step:
-        self._fusion, self._illuminance = DatedFusion(build.fusion(scenario)), scenario.light.illuminance_lx
+        self._fusion, self._illuminance = (
+            DatedFusion(build.method(scenario, scenario.fusion).make(FUSIONS)),
+            scenario.light.illuminance_lx,
+        )
         self._surrogate.reset(np.random.default_rng((2, seed)))
         # The belief is made here, of estimates that the loop knows nothing of.
         return super()._begin(scenario.model_copy(update={"fusion": Method(method="none")}), seed)

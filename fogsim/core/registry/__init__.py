@@ -2,12 +2,13 @@
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from fogsim.core.parameters import parameter_mistakes
+from fogsim.core.parameters import parameter_mistakes, paths_in
 from fogsim.core.registry.guard import guarded
 from fogsim.core.registry.user_code import (
     MayImport,
@@ -170,3 +171,39 @@ def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **
     if mistakes:
         raise InputError(f"{registry.kind} {name!r}: " + "; ".join(mistakes))
     return factory(*arguments, **options)
+
+
+@dataclass(frozen=True, slots=True)
+class MethodConfig:
+    """A method of a registry, and its parameters.
+
+    Parameters
+    ----------
+    name : str
+        Name in the registry, of an entry point, ``module:Class``, or of a file in `folder`.
+    parameters : mapping from str to object
+        Keyword arguments of the method, in SI units; names of files are relative to `folder`.
+    folder : Path
+        Folder of the user's modules and files.
+    time_limit : float or None
+        Longest time that one call of a user's method may take [s].
+    """
+
+    name: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    folder: Path = Path()
+    time_limit: float | None = None
+
+    def make(self, registry: Registry[Callable[..., T]], *given: object) -> T:
+        """Call the factory that a registry has under the name.
+
+        Parameters
+        ----------
+        registry : Registry
+            The registry.
+        *given : object
+            Arguments before the parameters.
+        """
+        factory = registry.find(self.name, self.folder, self.time_limit)
+        paths = paths_in(factory, self.parameters, self.folder)
+        return factory(*given, **{**self.parameters, **{name: str(path) for name, path in paths.items()}})

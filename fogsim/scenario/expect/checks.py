@@ -14,13 +14,13 @@ from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.units import clock_time
 
 if TYPE_CHECKING:
-    from fogsim.scenario.schema import Scenario
+    from fogsim.scenario.schema import ScenarioFile
 
 _MOST_SHOWN = 5
 """Maximum number of metrics in a message."""
 
 
-def check_expectations(scenario: "Scenario", *, is_shortened: bool = False) -> None:
+def check_expectations(scenario: "ScenarioFile", *, is_shortened: bool = False) -> None:
     """Raise ValidationError if a run of the scenario could not evaluate its expectations.
 
     A run that ``--set`` has shortened is for a look, and may end before its expectations are decided.
@@ -30,13 +30,13 @@ def check_expectations(scenario: "Scenario", *, is_shortened: bool = False) -> N
     refuse((("expect", *place), mistake) for place, mistake in mistakes)
 
 
-def last_time(scenario: "Scenario") -> float:
+def last_time(scenario: "ScenarioFile") -> float:
     """Time of the last frame of a scenario's longest run [s]."""
     period = scenario.clocks.camera_period_s
     return clock_time(max(1, round(scenario.duration_s / period)) * period)
 
 
-def run_content(scenario: "Scenario") -> RunContent:
+def run_content(scenario: "ScenarioFile") -> RunContent:
     """What the conditions of a scenario can refer to."""
     has_ego = scenario.traffic.has_ego
     methods = tuple(one.method for one in scenario.estimators)

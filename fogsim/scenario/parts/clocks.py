@@ -1,26 +1,10 @@
 """The clocks of a scenario as whole numbers."""
 
-import dataclasses
-
-from fogsim.scenario.schema import Scenario
-from fogsim.units import clock_time
+from fogsim.scenario.schema import ScenarioFile
+from fogsim.simulation.run_config import Periods
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Periods:
-    """The clocks as whole numbers."""
-
-    camera_period: float  # Time between frames [s]
-    traffic_steps: int  # Traffic steps in one camera period
-    decision_frames: int  # Camera periods in one decision period
-    frames: int  # Most camera periods that a run may last
-
-    def time(self, index: int) -> float:
-        """Time of a camera period since the run began [s]."""
-        return clock_time(index * self.camera_period)
-
-
-def periods(scenario: Scenario) -> Periods:
+def periods(scenario: ScenarioFile) -> Periods:
     """Clocks of a scenario."""
     clocks = scenario.clocks
     return Periods(

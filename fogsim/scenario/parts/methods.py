@@ -1,81 +1,39 @@
-"""From a scenario to its methods: estimators, fusion, advisers, lighting, and what measures them."""
+"""From a scenario to its methods: which advice and lamps a run has, and whom the advice reaches."""
 
-import dataclasses
-from collections.abc import Callable
-from importlib import import_module
-from typing import TypeVar
+import math
 
-from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
-from fogsim.core.parameters import paths_in
-from fogsim.core.registry import Registry
+from fogsim.advice import ADVISERS
+from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
-from fogsim.estimators import ESTIMATORS, Estimator
-from fogsim.estimators.protocol import TakesCalibrations
-from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
-from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
+from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import SafetyStandard
-from fogsim.scenario.parts.lamp_file import load_lamps
-from fogsim.scenario.schema import NO_RENDERER, Scenario
+from fogsim.scenario.drivers_schema import Harmonisation as WrittenHarmonisation
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import Method
-from fogsim.values import Camera
+from fogsim.simulation import chosen_methods
+from fogsim.simulation.run_config import NO_RENDERER, AdviceConfig, Harmonisation, SectionsConfig, check_ego
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Display, Stretch, StretchAdvice
 
-T = TypeVar("T")
-
-
-def check_ego(scenario: Scenario, who: str) -> None:
-    """Refuse a scenario without an ego."""
-    if not scenario.traffic.has_ego:
-        raise InputError(
-            f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim "
-            "run, fogsim study or fogsim.run_traffic"
-        )
+DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Display.LAW}
+"""How drivers hear advice that is given to sections of road, by `drivers.advised`."""
 
 
-def check_frames(scenario: Scenario, who: str) -> None:
+def check_frames(scenario: ScenarioFile, who: str) -> None:
     """Refuse a scenario that draws no frames."""
-    check_ego(scenario, who)
+    check_ego(scenario.traffic.ego if scenario.traffic.has_ego else None, who)
     if scenario.renderer == NO_RENDERER:
         raise InputError(f"{who} needs frames, and renderer: none draws none; choose auto, opengl, cpu or reference")
 
 
-def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
-    """Estimators of a scenario, with the calibration that the vehicle assumes."""
-    made = tuple(_made(ESTIMATORS, one, scenario, assumed) for one in scenario.estimators)
-    for estimator in made:
-        supply(estimator)
-    return made
+def method(scenario: ScenarioFile, written: Method) -> MethodConfig:
+    """A method of a scenario."""
+    return MethodConfig(written.method, written.parameters, scenario.directory, scenario.method_timeout_s)
 
 
-def supply(estimator: Estimator) -> None:
-    """Give an estimator cached calibrations to take where it was given no files of them."""
-    if isinstance(estimator, TakesCalibrations):
-        # What draws staged scenes is imported when a calibration may be needed.
-        calibrations = import_module("fogsim.calibration.cached").CachedCalibrations(load_lamps)
-        estimator.take_calibrations(calibrations)
-
-
-def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
-    """Fusion of a scenario."""
-    return _made(FUSIONS, scenario.fusion, scenario)
-
-
-def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
-    """Speed adviser of a scenario."""
-    return _made(ADVISERS, scenario.advice, scenario)
-
-
-def road_adviser(scenario: Scenario) -> Adviser:
-    """Speed adviser of a scenario, who advises roads."""
-    advising = adviser(scenario)
-    if isinstance(advising, VehicleAdviser):
-        raise InputError(
-            f"advice: {scenario.advice.method!r} uses a vehicle's own sensors (advise_vehicle), which roads do not "
-            f"have; with drivers.advised: {scenario.drivers.advised} take an adviser with advise()"
-        )
-    return advising
-
-
-def own_methods(scenario: Scenario) -> dict[str, str]:
+def own_methods(scenario: ScenarioFile) -> dict[str, str]:
     """Versions of the methods of a scenario that are not FogSim's, by their names."""
     folder, roadside = scenario.directory, scenario.sensors.reports.roadside
     beside_road = () if roadside is None or roadside.camera is None else (roadside.camera.estimator,)
@@ -88,22 +46,45 @@ def own_methods(scenario: Scenario) -> dict[str, str]:
     return {name: version for name, version in found.items() if version is not None}
 
 
-def safety_standard(scenario: Scenario) -> SafetyStandard:
-    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them."""
-    advising, usual = adviser(scenario), SafetyStandard()
-    return dataclasses.replace(
-        usual,
-        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
-        deceleration=getattr(advising, "deceleration", usual.deceleration),
+def safety_standard(scenario: ScenarioFile) -> SafetyStandard:
+    """What a run is judged by."""
+    return chosen_methods.safety_standard(method(scenario, scenario.advice))
+
+
+def advice_config(scenario: ScenarioFile) -> AdviceConfig:
+    """Advice and lamps, and whom the advice reaches."""
+    drivers, stretch = scenario.drivers, scenario.drivers.advised_stretch
+    on_stretch = Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along)
+    return AdviceConfig(
+        adviser=method(scenario, scenario.advice),
+        lighting=method(scenario, scenario.lighting),
+        informed_by=scenario.advice.informed_by,
+        lighting_informed_by=scenario.lighting.informed_by,
+        reach=scenario.traffic.reading_radius_m if drivers.advised == "all" else 0.0,
+        stretch=StretchAdvice(math.inf, on_stretch, stretch.display) if drivers.advised == "stretch" else None,
+        sections=sections_config(scenario),
     )
 
 
-def lighting_policy(scenario: Scenario) -> LightingPolicy | VehicleLightingPolicy:
-    """Lighting policy of a scenario."""
-    return _made(LIGHTING_POLICIES, scenario.lighting, scenario)
+def sections_config(scenario: ScenarioFile) -> SectionsConfig | None:
+    """Sections of the route that are advised each by itself; None where there are none."""
+    drivers, signs, along = scenario.drivers, scenario.drivers.signs, scenario.traffic.along
+    if drivers.advised not in DISPLAYS:
+        return None
+    harmonisation = None if drivers.harmonisation is None else _harmonisation(drivers.harmonisation)
+    if drivers.advised != "signs":
+        return SectionsConfig(DISPLAYS[drivers.advised], harmonisation=harmonisation, along=along)
+    return SectionsConfig(
+        Display.MESSAGE_SIGN,
+        signs.spacing_m,
+        signs.from_m,
+        signs.to_m,
+        signs.at_m,
+        signs.reading_distance_m,
+        harmonisation,
+        along,
+    )
 
 
-def _made(registry: Registry[Callable[..., T]], written: Method, scenario: Scenario, *given: object) -> T:
-    factory = registry.find(written.method, scenario.directory, scenario.method_timeout_s)
-    paths = paths_in(factory, written.parameters, scenario.directory)
-    return factory(*given, **{**written.parameters, **{name: str(path) for name, path in paths.items()}})
+def _harmonisation(written: WrittenHarmonisation) -> Harmonisation:
+    return Harmonisation(written.largest_step_kmh / KMH_PER_MPS, written.deceleration_mps2)

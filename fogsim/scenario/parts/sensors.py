@@ -1,45 +1,85 @@
-"""From a scenario to the ego's sensors, and what these know of themselves."""
+"""From a scenario to the ego's camera and other sensors, and to senders of reports."""
 
-import dataclasses
 import math
+from dataclasses import replace
 
 from fogsim.atmosphere import airlight_from_illuminance
-from fogsim.camera import USUAL_MOUNTS, AutoExposure, BodyPitch, CameraMount, CameraSensor, Metering, Sensor, Suspension
-from fogsim.scenario.camera_schema import CameraSection
-from fogsim.scenario.schema import Scenario
-from fogsim.scenario.sensors.reports import RoadsideCamera
-from fogsim.sensors import Gps, LeadSensor, Scatterometer
+from fogsim.camera import (
+    USUAL_MOUNTS,
+    AutoExposure,
+    CalibrationErrors,
+    CameraConfig,
+    CameraMount,
+    Metering,
+    Sensor,
+    Shutter,
+    StereoConfig,
+    Suspension,
+)
+from fogsim.scenario.camera_schema import CalibrationErrors as WrittenErrors
+from fogsim.scenario.camera_schema import CameraSection, Exposure, StereoSection
+from fogsim.scenario.parts.methods import method
+from fogsim.scenario.schema import ScenarioFile
+from fogsim.scenario.sensors.faults import fault_of
+from fogsim.scenario.sensors.reports import CameraReports, RoadsideCamera, RoadsideReports, VehicleReports
+from fogsim.scenario.sensors.schema import ScatterometerSection, Sensors
+from fogsim.sensors import Gps, LeadSensor
+from fogsim.simulation.run_config import (
+    LightSensor,
+    MastCamera,
+    RadioSender,
+    ReportsConfig,
+    RoadsideSender,
+    ScatterometerConfig,
+    SensorsConfig,
+)
 from fogsim.values import Camera
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
 
-CAR = "car"
-"""Body kind of an ego by default."""
-
 METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
 """Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""
 
 
-def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
-    """Where on the ego its camera is."""
-    section, usual = scenario.camera, USUAL_MOUNTS[body]
-    return CameraMount(
-        height=usual.height if section.mount_height_m is None else section.mount_height_m,
-        setback=usual.setback if section.setback_m is None else section.setback_m,
+def camera_config(scenario: ScenarioFile) -> CameraConfig:
+    """Camera of the ego."""
+    return _camera(scenario, scenario.camera)
+
+
+def _camera(scenario: ScenarioFile, section: CameraSection) -> CameraConfig:
+    mounts = {
+        body: CameraMount(
+            height=usual.height if section.mount_height_m is None else section.mount_height_m,
+            setback=usual.setback if section.setback_m is None else section.setback_m,
+        )
+        for body, usual in USUAL_MOUNTS.items()
+    }
+    blur, body = section.motion_blur, section.body
+    return CameraConfig(
+        camera=_calibration(section, mounts["car"].height),
+        sensor=_sensor(scenario, section),
+        exposure=_auto_exposure(section.exposure) if section.automatic else None,
+        errors=_errors(section.told),
+        mounts=mounts,
+        samples=section.samples,
+        has_bonnet=section.bonnet,
+        lens_shading=section.lens_shading,
+        lens_glare=section.lens_glare,
+        shutter=Shutter(blur.open_time_s, blur.instants, blur.follows_exposure),
+        suspension=Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s),
+        stereo=None if section.stereo is None else _stereo(section.stereo),
     )
 
 
-def camera(scenario: Scenario, body: str = CAR) -> Camera:
-    """Calibration of the ego's camera."""
-    section = scenario.camera
+def _calibration(section: CameraSection, height: float) -> Camera:
     by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
     return Camera(
         width=section.width,
         height=section.height,
         focal_length=section.focal_length_px or by_view,
         principal_point=section.principal_point_px or (section.width / 2, section.height / 2),
-        mount_height=camera_mount(scenario, body).height,
+        mount_height=height,
         pitch=math.radians(section.pitch_deg),
         roll=math.radians(section.roll_deg),
         response=section.response,
@@ -48,29 +88,8 @@ def camera(scenario: Scenario, body: str = CAR) -> Camera:
     )
 
 
-def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
-    """Calibration that the ego's estimators assume, with the scenario's errors in it."""
-    true, errors = camera(scenario, body), scenario.camera.told
-    return dataclasses.replace(
-        true,
-        mount_height=true.mount_height * (1.0 + errors.mount_height_error_percent / 100.0),
-        pitch=true.pitch + math.radians(errors.pitch_error_deg),
-        roll=true.roll + math.radians(errors.roll_error_deg),
-        focal_length=true.focal_length * (1.0 + errors.focal_length_error_percent / 100.0),
-    )
-
-
-def camera_sensor(scenario: Scenario) -> CameraSensor:
-    """What takes the pictures of the ego's camera."""
-    section = scenario.camera
-    auto = auto_exposure(scenario) if section.automatic else None
-    period = scenario.clocks.camera_period_s
-    return CameraSensor(camera(scenario), sensor(scenario), auto, section.lens_shading, period, section.lens_glare)
-
-
-def sensor(scenario: Scenario) -> Sensor:
-    """Image sensor of the ego's camera, at the exposure that it has if it is fixed."""
-    section = scenario.camera
+def _sensor(scenario: ScenarioFile, section: CameraSection) -> Sensor:
+    """Image sensor, at the exposure that it has if it is fixed."""
     airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx, scenario.fog.airlight_share))
     return Sensor(
         saturation_luminance=section.saturation_luminance_cdpm2 or airlight / AIRLIGHT_EXPOSURE,
@@ -82,9 +101,7 @@ def sensor(scenario: Scenario) -> Sensor:
     )
 
 
-def auto_exposure(scenario: Scenario) -> AutoExposure:
-    """How the ego's camera sets its own exposure."""
-    section = scenario.camera.exposure
+def _auto_exposure(section: Exposure) -> AutoExposure:
     percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
     return AutoExposure(
         metering=section.metering,
@@ -96,39 +113,86 @@ def auto_exposure(scenario: Scenario) -> AutoExposure:
     )
 
 
-def body_pitch(scenario: Scenario) -> BodyPitch:
-    """How the ego's body pitches when it brakes."""
-    body = scenario.camera.body
-    suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
-    return BodyPitch(suspension, scenario.clocks.camera_period_s)
+def _errors(written: WrittenErrors) -> CalibrationErrors:
+    return CalibrationErrors(
+        pitch=math.radians(written.pitch_error_deg),
+        roll=math.radians(written.roll_error_deg),
+        focal_length_ratio=1.0 + written.focal_length_error_percent / 100.0,
+        mount_height_ratio=1.0 + written.mount_height_error_percent / 100.0,
+    )
 
 
-def roadside_scenario(scenario: Scenario, section: RoadsideCamera) -> Scenario:
-    """The scenario with a roadside camera in place of the ego's, and the estimator that reads it."""
+def _stereo(section: StereoSection) -> StereoConfig:
+    return StereoConfig(
+        section.baseline_m,
+        section.baseline_m * (1.0 + section.baseline_error_percent / 100.0),
+        math.radians(section.yaw_error_deg),
+        math.radians(section.pitch_error_deg),
+        math.radians(section.roll_error_deg),
+    )
+
+
+def sensors_config(sensors: Sensors) -> SensorsConfig:
+    """Sensors next to the camera, and the faults of all."""
+    lead, gps, light = sensors.lead, sensors.gps, sensors.light
+    view = math.radians(lead.field_of_view_deg)
+    return SensorsConfig(
+        radar=LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view),
+        gps=Gps(gps.position_deviation_m, math.radians(gps.heading_deviation_deg)),
+        light=LightSensor(light.reach_m, light.tail_reach_m, math.radians(light.field_of_view_deg)),
+        sign_reach=sensors.sign_reach_m,
+        scatterometer=None if sensors.scatterometer is None else _scatterometer(sensors.scatterometer),
+        faults=tuple(fault_of(written) for written in sensors.faults),
+    )
+
+
+def _scatterometer(section: ScatterometerSection) -> ScatterometerConfig:
+    return ScatterometerConfig(section.relative_deviation, section.calibration_deviation, section.averaging_time_s)
+
+
+def reports_config(scenario: ScenarioFile) -> ReportsConfig:
+    """Senders of reports."""
+    reports = scenario.sensors.reports
+    return ReportsConfig(
+        roadside=None if reports.roadside is None else _roadside(scenario, reports.roadside),
+        vehicles=None if reports.vehicles is None else _measuring_vehicles(reports.vehicles),
+        cameras=None if reports.cameras is None else _radio(reports.cameras),
+    )
+
+
+def _roadside(scenario: ScenarioFile, section: RoadsideReports) -> RoadsideSender:
+    return RoadsideSender(
+        period=section.period_s,
+        delay=section.delay_s,
+        loss=section.loss,
+        clock_deviation=section.clock_deviation_s,
+        deviation=section.deviation,
+        wrong=section.wrong,
+        spacing=section.every_m,
+        first=section.first_m,
+        camera=None if section.camera is None else _mast(scenario, section.camera),
+    )
+
+
+def _mast(scenario: ScenarioFile, section: RoadsideCamera) -> MastCamera:
+    """A roadside camera, which is like the ego's where its section has no key."""
     place = {
         name: getattr(section, name) for name in type(section).model_fields.keys() & CameraSection.model_fields.keys()
     }
     alone = {"focal_length_px": None, "principal_point_px": None, "roll_deg": 0.0}
     camera = scenario.camera.model_copy(update={**place, **alone})
-    return scenario.model_copy(update={"camera": camera, "estimators": (section.estimator,)})
+    return MastCamera(_camera(scenario, camera), method(scenario, section.estimator), section.right_of_route_m)
 
 
-def lead_sensor(scenario: Scenario) -> LeadSensor:
-    """Radar of the ego."""
-    lead = scenario.sensors.lead
-    view = math.radians(lead.field_of_view_deg)
-    return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view)
+def _radio(section: VehicleReports | CameraReports) -> RadioSender:
+    return RadioSender(
+        period=section.period_s,
+        delay=section.delay_s,
+        loss=section.loss,
+        clock_deviation=section.clock_deviation_s,
+        reach=section.range_m,
+    )
 
 
-def gps(scenario: Scenario) -> Gps:
-    """Satellite positioning of the ego."""
-    section = scenario.sensors.gps
-    return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))
-
-
-def scatterometer(scenario: Scenario) -> Scatterometer | None:
-    """The ego's forward-scatter visibility sensor, if it has one."""
-    section = scenario.sensors.scatterometer
-    if section is None:
-        return None
-    return Scatterometer(section.relative_deviation, section.calibration_deviation, section.averaging_time_s)
+def _measuring_vehicles(section: VehicleReports) -> RadioSender:
+    return replace(_radio(section), deviation=section.deviation, wrong=section.wrong, equipped=section.equipped)

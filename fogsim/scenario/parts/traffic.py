@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from fogsim.scenario.drivers import driver_setup, driver_sight
+from fogsim.scenario.parts.drivers import driver_setup, driver_sight
 from fogsim.scenario.roads.files import actors_of, traffic_files
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.timeline.lamps import LampActions, lamp_switches
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.traffic import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, TrafficSetup, Trigger
@@ -15,7 +15,7 @@ from fogsim.units import KMH_PER_MPS
 _CONDITIONS = ("at_position_m", "at_time_s", "at_gap_to_ego_m")
 
 
-def traffic_setup(scenario: Scenario) -> TrafficSetup:
+def traffic_setup(scenario: ScenarioFile) -> TrafficSetup:
     """What the traffic stage needs to know."""
     traffic, folder, files = scenario.traffic, scenario.directory, traffic_files(scenario)
     return TrafficSetup(
@@ -50,12 +50,12 @@ def _option_text(value: OptionValue, folder: Path) -> str:
     return ",".join(str(folder / name) if name and (folder / name).is_file() else name for name in value.split(","))
 
 
-def _staying_actors(scenario: Scenario) -> Iterator[str]:
+def _staying_actors(scenario: ScenarioFile) -> Iterator[str]:
     """Actors that stay in their lanes."""
     return (name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)
 
 
-def _switched_lamps(scenario: Scenario) -> Iterator[Event]:
+def _switched_lamps(scenario: ScenarioFile) -> Iterator[Event]:
     """Actors whose lamps are not their own when the run begins."""
     for name, actor in scenario.actors.items():
         if actor.lamps != "on":

@@ -1,13 +1,10 @@
 """Vehicles of free types and ways that a timeline brings onto the road: where each begins."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 from fogsim.errors import suggest
 from fogsim.scenario.roads.files import road_layout, traffic_files
-from fogsim.scenario.schema import Scenario
-from fogsim.scenario.timeline import operations
-from fogsim.scenario.timeline.schema import DepartAction, VehicleActions
+from fogsim.scenario.schema import ScenarioFile
+from fogsim.scenario.timeline import Entries, operations
+from fogsim.scenario.timeline.vehicle_actions import DepartAction, VehicleActions
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net_edges
 from fogsim.traffic.templates import Actor, Placed, PlacementError, check_placement, read_ways
@@ -15,15 +12,10 @@ from fogsim.traffic.templates.placement import Ways, edge_at
 from fogsim.units import KMH_PER_MPS
 from fogsim.values.script import Enter
 
-Entries = Mapping[tuple[str, DepartAction], Enter]
-"""What vehicles do that depart by themselves, by their ids and what the file says."""
-
-_NO_ENTRIES: Entries = MappingProxyType({})
-
 _NUMBERS = {"right": 0, "left": -1}
 
 
-def entering_vehicles(scenario: Scenario) -> Entries:
+def entering_vehicles(scenario: ScenarioFile) -> Entries:
     """Vehicles that a timeline brings onto the road with a way of their own."""
     doings = [pair for entry in scenario.timeline for pair in operations(entry)]
     wanted = {
@@ -32,7 +24,7 @@ def entering_vehicles(scenario: Scenario) -> Entries:
         if isinstance(doing, VehicleActions) and doing.depart and doing.depart.like is None
     }
     if not wanted:
-        return _NO_ENTRIES
+        return {}
     if scenario.road is not None:
         layout, _ = road_layout(scenario)
         return {key: _on_template(*key, layout) for key in wanted}
@@ -45,7 +37,7 @@ def _on_template(vehicle: str, action: DepartAction, layout: Ways) -> Enter:
     return _entry(vehicle, action, layout, action.on or "same_way")
 
 
-def _on_net(vehicle: str, action: DepartAction, scenario: Scenario) -> Enter:
+def _on_net(vehicle: str, action: DepartAction, scenario: ScenarioFile) -> Enter:
     if action.on is not None or not action.edges:
         raise PlacementError(vehicle, "on goes with a road by template; on a network write edges, its way")
     traffic, folder = scenario.traffic, scenario.directory

@@ -7,11 +7,12 @@ the same files, and one that is changed has others.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from fogsim.core.files.generated_files import write_generated
 from fogsim.errors import InputError, suggest
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
     WALKING_SPEED,
@@ -38,6 +39,7 @@ from fogsim.traffic.templates import (
 
 _NET, _ROUTES, _BESIDE = "road.net.xml", "road.rou.xml", "road.add.xml"
 _SECONDS_PER_HOUR = 3600.0
+AnyScenario = TypeVar("AnyScenario", bound=ScenarioFile)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class TrafficFiles:
     additional: tuple[Path, ...]
 
 
-def traffic_files(scenario: Scenario) -> TrafficFiles:
+def traffic_files(scenario: ScenarioFile) -> TrafficFiles:
     """Files of a scenario; those of a road by template are written where they are not there yet."""
     traffic, folder = scenario.traffic, scenario.directory
     net = None if traffic.net is None else folder / traffic.net
@@ -74,7 +76,7 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     return TrafficFiles(made / _NET, (made / _ROUTES, *routes), (*([made / _BESIDE] if beside else []), *additional))
 
 
-def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
+def road_layout(scenario: ScenarioFile) -> tuple[Layout, tuple[Placed, ...]]:
     """Road of a scenario and where its actors are."""
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
@@ -87,7 +89,7 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
     return layout, placed
 
 
-def with_way(scenario: Scenario) -> Scenario:
+def with_way(scenario: AnyScenario) -> AnyScenario:
     """A scenario of traffic alone on a road by template, with the whole way as that along which places count."""
     traffic = scenario.traffic
     if scenario.road is None or traffic.has_ego or traffic.along:
@@ -96,7 +98,7 @@ def with_way(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"traffic": traffic.model_copy(update={"along": tuple(layout.way("same_way"))})})
 
 
-def _actors_on(net: Path, scenario: Scenario) -> str:
+def _actors_on(net: Path, scenario: ScenarioFile) -> str:
     """Text of a route file with the actors of a scenario that has a network of its own."""
     sections = scenario.actors
     for name, section in sections.items():
@@ -151,14 +153,14 @@ def _check_ways(layout: Layout, section: DemandSection) -> None:
             raise DemandError(key, f"the road has no way {way!r}; {suggest(way, dict(layout.ways))}")
 
 
-def actors_of(scenario: Scenario) -> dict[str, ActorSection]:
+def actors_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     """Actors of a scenario by their ids; on a road by template the ego is one of them, also where it is not written."""
     if scenario.road is None or not scenario.traffic.has_ego:
         return dict(scenario.actors)
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
 
 
-def vehicles_of(scenario: Scenario) -> dict[str, ActorSection]:
+def vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     """Actors of a scenario that are vehicles, by their ids."""
     return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
 
@@ -176,7 +178,7 @@ def _walker(name: str, section: ActorSection) -> Walker:
     )
 
 
-def _footfall(scenario: Scenario, layout: Layout) -> Footfall:
+def _footfall(scenario: ScenarioFile, layout: Layout) -> Footfall:
     persons, traffic = (scenario.demand or DemandSection()).persons, scenario.traffic
     for key, lacks in (("along_pph", not layout.net.edges[0].footway), ("across_pph", not layout.net.zebras)):
         if lacks and getattr(persons, key):

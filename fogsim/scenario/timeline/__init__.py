@@ -1,7 +1,7 @@
 """What a scenario makes happen while it runs: the block ``timeline``, and the actions that its entries stand for."""
 
 from fogsim.scenario.timeline.actions import (
-    Situation,
+    Entries,
     actions_of,
     departing_vehicles,
     entry_name,
@@ -16,9 +16,9 @@ from fogsim.scenario.timeline.checks import check_timeline, named_vehicles, poin
 from fogsim.scenario.timeline.schema import FogActions, LightActions, Timeline, TimelineEntry
 
 __all__ = [
+    "Entries",
     "FogActions",
     "LightActions",
-    "Situation",
     "Timeline",
     "TimelineEntry",
     "actions_of",

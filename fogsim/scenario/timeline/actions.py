@@ -2,28 +2,25 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
-from typing import Protocol
+from collections.abc import Iterator, Mapping, Sequence
 
+from fogsim.atmosphere import FogConfig
 from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
-from fogsim.scenario.timeline.schema import (
+from fogsim.scenario.timeline.schema import Doing, FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import (
     LONGEST_CHANGE,
     ArriveAction,
     DepartAction,
-    Doing,
-    FogActions,
     LaneAction,
-    LightActions,
     PathAction,
-    SignalActions,
     SpeedAction,
     StopAction,
-    TimelineEntry,
     VehicleActions,
 )
+from fogsim.simulation.run_config import Situation
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
-from fogsim.values import Fault, FogChange, FogField, Lamp
+from fogsim.values import Fault, FogChange, Lamp
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import (
     Actions,
@@ -51,26 +48,11 @@ _SLOWEST = 0.01  # Speed at which a change of lane over any distance takes as lo
 _STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
 
 
-class Situation(Protocol):
-    """Where vehicles are when an entry begins; None for what is not known of them now."""
-
-    def vehicle_id(self, vehicle: str) -> str:
-        """Id of a vehicle: the ego's own for ``ego``."""
-
-    def speed(self, vehicle: str) -> float | None:
-        """Speed of a vehicle [m/s]."""
-
-    def position(self, vehicle: str) -> float | None:
-        """How far along the route its front bumper is [m]."""
-
-    def lane(self, vehicle: str) -> int | None:
-        """Number of its lane from the right."""
-
-    def entry(self, vehicle: str, action: DepartAction) -> Enter:
-        """Where a vehicle begins that departs on a way of its own."""
+Entries = Mapping[tuple[str, DepartAction], Enter]
+"""What vehicles do that depart by themselves, by their ids and what the file says."""
 
 
-def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Actions | None:
+def actions_of(entry: TimelineEntry, reference: float, entering: Entries, now: Situation) -> Actions | None:
     """What an entry begins.
 
     Returns None while someone it involves is not on the road, or not at a place that it needs. Takes `reference`
@@ -83,7 +65,7 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Action
     for subject, doing in operations(entry):
         match doing:
             case VehicleActions():
-                moves = _of_vehicle(subject, doing, now)
+                moves = _of_vehicle(subject, doing, entering, now)
                 if moves is None:
                     return None
                 traffic += moves
@@ -141,10 +123,10 @@ def _endless(duration: float | None) -> float:
     return math.inf if duration is None else duration
 
 
-def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[TrafficAction] | None:
+def _of_vehicle(subject: str, doing: VehicleActions, entering: Entries, now: Situation) -> list[TrafficAction] | None:
     vehicle, speed = now.vehicle_id(subject), now.speed(subject)
     if doing.depart:
-        return _departure(vehicle, doing.depart, now) if speed is None else None
+        return _departure(vehicle, doing.depart, entering, now) if speed is None else None
     if speed is None:
         # A path may bring a vehicle onto the road.
         return [_path(vehicle, doing.path)] if doing.path and doing.model_fields_set == {"path"} else None
@@ -184,9 +166,9 @@ def _motions(
         yield _stopping(vehicle, doing.stop, now.position(subject))
 
 
-def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[TrafficAction] | None:
+def _departure(vehicle: str, action: DepartAction, entering: Entries, now: Situation) -> list[TrafficAction] | None:
     if action.like is None or action.gap_m is None:
-        return [now.entry(vehicle, action)]
+        return [entering[vehicle, action]]
     speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
     lane = action.lane if isinstance(action.lane, int) else None
     departing = Depart(vehicle, now.vehicle_id(action.like), action.gap_m, lane, speed, action.type or "")
@@ -301,17 +283,19 @@ def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[f
     return min(levels), max(levels)
 
 
-def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:
+def scripted_fog(entries: Sequence[TimelineEntry], config: FogConfig) -> FogConfig:
     """A fog that can become what a timeline makes of it.
 
     Returns with the densities that it may come to; where the air is clear, fog of density 0 in its place.
     """
+    fog = config.field
     reference = fog_reference(entries, fog.extinction)
     changes = [doing for entry in entries for _, doing in operations(entry) if isinstance(doing, FogActions)]
     if not changes:
-        return fog
+        return config
     densities = tuple(_density(change, reference) for change in changes)
-    if fog.extinction > 0.0 or reference == 0.0 or fog.banks:
-        return dataclasses.replace(fog, reachable_densities=densities)
-    clear = FogChange(0.0, 0.0, fog.base, fog.top)
-    return dataclasses.replace(fog, extinction=reference, changes=(clear,), reachable_densities=densities)
+    fog = dataclasses.replace(fog, reachable_densities=densities)
+    if not (fog.extinction > 0.0 or reference == 0.0 or config.banks):
+        clear = FogChange(0.0, 0.0, fog.base, fog.top)
+        fog = dataclasses.replace(fog, extinction=reference, changes=(clear,))
+    return dataclasses.replace(config, field=fog)

@@ -12,18 +12,12 @@ from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.timeline.actions import departing_vehicles, entry_name, operations, vehicles_of
 from fogsim.scenario.timeline.lamps import lamp_mistake
-from fogsim.scenario.timeline.schema import (
-    Doing,
-    FogActions,
-    LightActions,
-    SignalActions,
-    TimelineEntry,
-    VehicleActions,
-)
+from fogsim.scenario.timeline.schema import Doing, FogActions, LightActions, SignalActions, TimelineEntry
+from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.units import DAY_ILLUMINANCE
 
 if TYPE_CHECKING:
-    from fogsim.scenario.schema import Scenario
+    from fogsim.scenario.schema import ScenarioFile
 
 PHOTONS_BY_DAY = f"fog.airlight: photons is of the sky's light by day, from {DAY_ILLUMINANCE:g} lx on"
 """Why there is none by lamplight."""
@@ -32,7 +26,7 @@ _DAYLIGHT_RENDERER = "reference"
 """Name of the renderer that draws by daylight only."""
 
 
-def check_timeline(scenario: "Scenario") -> None:
+def check_timeline(scenario: "ScenarioFile") -> None:
     """Refuse a timeline that a run of its scenario could not play."""
     refuse((("timeline", *place), mistake) for place, mistake in _mistakes(scenario))
     if scenario.end_when is not None:
@@ -40,7 +34,7 @@ def check_timeline(scenario: "Scenario") -> None:
         refuse((("end_when",), one) for one in mistakes)
 
 
-def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
+def pointless_triggers(document: Document, scenario: "ScenarioFile", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
     """Say which triggers, and which ``end_when``, can never come as they are written.
 
     Triggers of OpenSCENARIO files may: what was not played is reported at the end of the run. So may those that come
@@ -58,7 +52,7 @@ def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits)
                 yield at, f"this can never come: {reason}"
 
 
-def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
+def _mistakes(scenario: "ScenarioFile") -> Iterator[tuple[KeyPath, str]]:
     names = [entry_name(entry, number) for number, entry in enumerate(scenario.timeline)]
     content = run_content(scenario) if scenario.timeline else None
     for number, entry in enumerate(scenario.timeline):
@@ -78,7 +72,7 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
                 yield (number, "do", subject), mistake
 
 
-def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:
+def _person_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str | None:
     """What persons and vehicles cannot do that the others can."""
     if not isinstance(doing, VehicleActions):
         return None
@@ -94,7 +88,7 @@ def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | N
     return None
 
 
-def _lamp_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:
+def _lamp_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str | None:
     """Lamps that a vehicle does not have, where its type is known."""
     if not isinstance(doing, VehicleActions) or doing.lamps is None:
         return None
@@ -102,7 +96,7 @@ def _lamp_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | Non
     return None if kind is None else lamp_mistake(kind, doing.lamps)
 
 
-def _kind(subject: str, scenario: "Scenario") -> str | None:
+def _kind(subject: str, scenario: "ScenarioFile") -> str | None:
     """Type of an actor, or with which a vehicle comes onto the road; None if the file does not say it."""
     if subject in scenario.actors:
         return scenario.actors[subject].type
@@ -114,7 +108,7 @@ def _kind(subject: str, scenario: "Scenario") -> str | None:
     return None
 
 
-def _mistake(doing: Doing, scenario: "Scenario") -> str | None:
+def _mistake(doing: Doing, scenario: "ScenarioFile") -> str | None:
     if isinstance(doing, VehicleActions | SignalActions):
         return None
     if isinstance(doing, FogActions):
@@ -124,7 +118,7 @@ def _mistake(doing: Doing, scenario: "Scenario") -> str | None:
     return _light_mistake(doing, scenario) if isinstance(doing, LightActions) else None
 
 
-def _light_mistake(doing: LightActions, scenario: "Scenario") -> str | None:
+def _light_mistake(doing: LightActions, scenario: "ScenarioFile") -> str | None:
     if scenario.renderer == _DAYLIGHT_RENDERER and doing.illuminance_lx < DAY_ILLUMINANCE:
         return (
             f"illuminance_lx is {doing.illuminance_lx:g}, and the renderer {_DAYLIGHT_RENDERER} knows no lamplight, "
@@ -137,7 +131,7 @@ def _light_mistake(doing: LightActions, scenario: "Scenario") -> str | None:
     return None
 
 
-def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
+def _fog_mistake(doing: FogActions, scenario: "ScenarioFile") -> str | None:
     visibility = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
     is_clear, has_banks = math.isinf(visibility), bool(scenario.fog.banks)
     if doing.density is not None and is_clear and not has_banks:

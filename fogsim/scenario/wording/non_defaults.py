@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import key_descriptions
 
 _WORDS = frozenset({"name", "description", "expect", "directory"})
@@ -21,9 +21,9 @@ class Setting(NamedTuple):
     meaning: str
 
 
-def non_default_settings(scenario: Scenario) -> dict[str, Setting]:
+def non_default_settings(scenario: ScenarioFile) -> dict[str, Setting]:
     """Settings by key path, as in a scenario file."""
-    return dict(_of_section(scenario, Scenario.model_construct(), ()))
+    return dict(_of_section(scenario, type(scenario).model_construct(), ()))
 
 
 def _of_section(section: BaseModel, usual: object, path: tuple[str, ...]) -> Iterator[tuple[str, Setting]]:

@@ -11,11 +11,13 @@ from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
 from fogsim.scenario.fog import Fog
+from fogsim.scenario.parts.methods import DISPLAYS
 from fogsim.scenario.parts.traffic import traffic_setup
-from fogsim.scenario.road_sections import DISPLAYS, stations
 from fogsim.scenario.roads.files import traffic_files
-from fogsim.scenario.schema import NO_RENDERER, Scenario
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.wording.non_defaults import shown_value
+from fogsim.simulation.road_sections import stations
+from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.traffic import FOLLOWING_MODELS, SPEED_CHOICES
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.traffic.road.configuration import configured_demand, configured_files
@@ -29,7 +31,7 @@ _CITATION = re.compile(r"[A-Z][\w-]+(?:(?:,| &| et al\.| van der| [A-Z][\w-]+)+)
 _VISIBILITY = "Meteorological: the distance at which 5 % contrast is left, ln 20 over the extinction coefficient k."
 
 
-def _run_words(scenario: Scenario) -> str:
+def _run_words(scenario: ScenarioFile) -> str:
     traffic, clocks = scenario.traffic, scenario.clocks
     if not traffic.has_ego:
         begin = f"Traffic alone; each run lasts at most {scenario.duration_s:g} s after a warm-up of "
@@ -45,7 +47,7 @@ def _run_words(scenario: Scenario) -> str:
     )
 
 
-def empty_start(scenario: Scenario) -> str:
+def empty_start(scenario: ScenarioFile) -> str:
     """A warning if the network of a run without ego is empty at its start; "" if it is not."""
     if scenario.traffic.has_ego or scenario.road is not None or scenario.traffic.warm_up_s > 0.0:
         return ""
@@ -55,12 +57,12 @@ def empty_start(scenario: Scenario) -> str:
     )
 
 
-def _net_of(scenario: Scenario) -> Path | None:
+def _net_of(scenario: ScenarioFile) -> Path | None:
     config = scenario.traffic.config
     return traffic_files(scenario).net if config is None else configured_files(scenario.directory / config)[0]
 
 
-def _road_words(scenario: Scenario) -> str:
+def _road_words(scenario: ScenarioFile) -> str:
     net, way = _net_of(scenario), scenario.traffic.along
     if net is None:
         return "The network is that of the running simulation."
@@ -86,7 +88,7 @@ def _span(values: Iterator[float]) -> str:
     return f"{known[0]}" if len(known) == 1 else f"{known[0]} to {known[-1]}"
 
 
-def _demand_words(scenario: Scenario) -> str:
+def _demand_words(scenario: ScenarioFile) -> str:
     if scenario.road is not None:
         demand = scenario.demand
         rates = {} if demand is None else {key: value for key, value in demand if key.endswith("_vph") and value}
@@ -104,7 +106,7 @@ def _demand_words(scenario: Scenario) -> str:
     return text + ("." if found.is_whole else "; not all demand files could be read.") + _actors(scenario)
 
 
-def _actors(scenario: Scenario) -> str:
+def _actors(scenario: ScenarioFile) -> str:
     scripted = len(scenario.traffic.events) + len(scenario.timeline)
     actors = f" Actors placed by the scenario: {', '.join(scenario.actors)}." if scenario.actors else ""
     return actors + (f" Scripted events: {scripted}." if scripted else "")
@@ -115,7 +117,7 @@ def _shares(numbers: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {100.0 * n / total:.3g} %" for name, n in numbers.items())
 
 
-def _fog_words(scenario: Scenario) -> str:
+def _fog_words(scenario: ScenarioFile) -> str:
     fog, outside = scenario.fog, scenario.fog.outside_visibility_m
     if fog.visibility_m is not None:
         everywhere = f"Meteorological visibility {fog.visibility_m:g} m everywhere"
@@ -144,7 +146,7 @@ def _layers(fog: Fog) -> str:
     return "".join(f", {part}" for part in parts)
 
 
-def _sensor_words(scenario: Scenario) -> str:
+def _sensor_words(scenario: ScenarioFile) -> str:
     drivers, reports = scenario.drivers, scenario.sensors.reports
     roadside = f" Roadside sensors: {shown_value(reports.roadside)}." if reports.roadside is not None else ""
     if scenario.traffic.has_ego and scenario.renderer != NO_RENDERER:
@@ -163,7 +165,7 @@ def _sensor_words(scenario: Scenario) -> str:
     return text + roadside
 
 
-def _advice_words(scenario: Scenario) -> str:
+def _advice_words(scenario: ScenarioFile) -> str:
     advice, drivers = scenario.advice, scenario.drivers
     if advice.method == "none":
         return "No speed is advised."
@@ -183,7 +185,7 @@ def _advice_words(scenario: Scenario) -> str:
     return text
 
 
-def _driver_words(scenario: Scenario) -> str:
+def _driver_words(scenario: ScenarioFile) -> str:
     drivers = scenario.drivers
     kinds = drivers.following or (OBSERVED_MIXTURE if drivers.speed_choice == "observed" else {"unaffected": 1.0})
     sight = (
@@ -208,7 +210,7 @@ def _cited(registry: Registry[Any], names: Iterable[str]) -> str:
     return f" ({'; '.join(cited)})" if cited else ""
 
 
-SENTENCES: Mapping[str, Callable[[Scenario], str]] = {
+SENTENCES: Mapping[str, Callable[[ScenarioFile], str]] = {
     "Scenario": _run_words,
     "Road": _road_words,
     "Demand": _demand_words,

@@ -2,20 +2,16 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from fogsim.atmosphere import field_at, with_change
-from fogsim.camera import Delivered, FaultyLens, FrameDelivery, Pixels, knocked, mounted_pose, unexposed
+from fogsim.camera import CAR, BodyPitch, knocked, mounted_pose
 from fogsim.core.randomness import Streams
 from fogsim.errors import SimulationError
-from fogsim.fusion import DatedFusion
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.schema import NO_RENDERER
-from fogsim.scenario.sensors.faults import fault_of
+from fogsim.fusion import FUSIONS, DatedFusion
 from fogsim.sensors import check_sign_ids, faulty_signs
+from fogsim.simulation.chosen_methods import estimators
+from fogsim.simulation.ego.camera_rig import CameraRig
 from fogsim.simulation.ego.daylight import Ramp, in_daylight
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.fog_truth import KnownWay, carriageways, fog_truth
@@ -24,14 +20,12 @@ from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.simulation.ego.measurements import EgoSensors
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras
-from fogsim.simulation.ego.second_camera import SecondCamera
 from fogsim.simulation.ego.sensor_faults import FaultSchedule
-from fogsim.simulation.ego.shutter import Shutter, exposed
 from fogsim.simulation.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
+from fogsim.simulation.run_config import NO_RENDERER, RunConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Belief,
-    Camera,
     CameraPose,
     Command,
     Ending,
@@ -43,7 +37,6 @@ from fogsim.values import (
     Observation,
     RoadNetwork,
     RunningFault,
-    SecondView,
     SignMap,
     Step,
     TrafficSnapshot,
@@ -67,32 +60,28 @@ class _RunParts(NamedTuple):
 
 
 class EgoEquipment:
-    """The ego's camera, sensors, estimators and belief, in the fog of a scenario.
+    """The ego's camera, sensors, estimators and belief, in the fog of a run.
 
     Parameters
     ----------
-    scenario : Scenario
-        The scenario; of its traffic, nothing is used.
+    config : RunConfig
+        The run; of its traffic, only the reading radius is used.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._camera_sensor = build.camera_sensor(scenario)
-        self._second = SecondCamera(scenario) if scenario.camera.stereo is not None else None
-        self._body_pitch = build.body_pitch(scenario)
-        blur = scenario.camera.motion_blur
-        self._shutter = Shutter(blur.open_time_s, blur.instants, blur.follows_exposure)
-        self._sensors = EgoSensors(scenario)
-        self._light_sensing = LightSensing(scenario)
-        self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
+    def __init__(self, config: RunConfig) -> None:
+        camera, period = config.camera, config.periods.camera_period
+        self._config = config
+        self._rig = CameraRig(camera, period)
+        self._body_pitch = BodyPitch(camera.suspension, period)
+        self._sensors = EgoSensors(config.sensors)
+        self._light_sensing = LightSensing(config.sensors.light)
         self._schedule: FaultSchedule | None = None
-        self._light = Ramp(scenario.light.illuminance_lx)
+        self._light = Ramp(config.world.illuminance)
         self._daylight = self._light.first
         self._fog: FogField | None = None
         self._fog_now: FogField | None = None
-        self._glass, self._delivery = FaultyLens(), FrameDelivery()
         self._watch, self._leads = FrameWatch(), LeadHistory()
-        self._fusion = DatedFusion(build.fusion(scenario), scenario.fusion.method)
+        self._fusion = DatedFusion(config.fusion.make(FUSIONS), config.fusion.name)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
@@ -101,20 +90,16 @@ class EgoEquipment:
         self._way = KnownWay()
         self._network: tuple[RoadNetwork, SignMap] | None = None
         self._sign_faults: tuple[FaultKind, ...] = ()
-        self._mount_camera(build.CAR)
+        self._mount_camera(CAR)
 
     def _mount_camera(self, body: str) -> None:
         """Put the camera where it belongs on a kind of body, and pass its calibration to the estimators."""
-        scenario = self._scenario
         self._body = body
-        self._camera = build.camera(scenario, body)
-        self._setback = build.camera_mount(scenario, body).setback
-        self._assumed_camera = build.assumed_camera(scenario, body)
-        self._unexposed = unexposed(self._camera)
-        self._estimators = build.estimators(scenario, self._assumed_camera)
+        self._rig.mount_on(body)
+        self._estimators = estimators(self._config.estimators, self._rig.assumed)
 
     def start_run(
-        self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = build.CAR
+        self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = CAR
     ) -> FogField:
         """Forget earlier runs, and lay the scenario's fog along the route.
 
@@ -143,23 +128,19 @@ class EgoEquipment:
             self._mount_camera(body)
         if self._view_renderer is None:
             self._network = road, _ = network()
-            self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
-            self._reporters = FogReports(self._scenario, road.route)
+            self._meters = RoadMeters(self._config.advice.sections, road.route, road.route_limits)
+            self._reporters = FogReports(self._config.reports, road.route)
             self._way = KnownWay(road.route, carriageways(road.lanes))
             self._sensors.enter_road(road.structures)
         self._schedule = FaultSchedule(streams.faults)
-        self.begin_faults(self._faults, 0.0)
+        self.begin_faults(self._config.sensors.faults, 0.0)
         view = self._view_of_world(())
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
-        self._camera_sensor.reset()
-        if self._second is not None:
-            self._second.reset(streams.camera.spawn(1)[0])
+        self._rig.reset(streams.camera)
         self._body_pitch.reset()
         self._sensors.reset(streams)
-        self._glass.reset()
-        self._delivery.reset()
         self._watch.reset()
         self._leads.reset()
         self._streams, self._roadside_cameras = streams, None
@@ -167,11 +148,11 @@ class EgoEquipment:
             self._reporters.reset(streams.reports)
         if self._meters is not None:
             self._meters.reset()
-        self._light = Ramp(self._scenario.light.illuminance_lx)
+        self._light = Ramp(self._config.world.illuminance)
         self._daylight = self._light.first
         if self._fog is None:
             self._fog = view.fog
-        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
+        self._fog = self._config.world.fog.of_run(self._fog, streams.patch_seed)
         self._enter_fog(self._fog)
         return self._fog
 
@@ -184,9 +165,10 @@ class EgoEquipment:
         if self._view_renderer is None or of_signs != self._sign_faults:
             if self._view_renderer is not None:
                 self._view_renderer.close()
-            kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
+            world = self._config.world
+            kind = NoView if world.renderer == NO_RENDERER else ViewRenderer
             standing = faulty_signs(signs, of_signs, Where.WORLD) if of_signs else signs
-            self._view_renderer = kind(self._scenario, road, standing, self._body)
+            self._view_renderer = kind(world, self._config.camera, road, standing, self._body)
             self._sign_faults = of_signs
             if self._fog_now is not None:
                 self._view_renderer.enter_fog(self._fog_now)
@@ -289,7 +271,7 @@ class EgoEquipment:
         parts = self._run_parts()
         faults = parts.schedule.at(time)
         renderer, light = self._lit_world(faults, time)
-        state, ego, camera = snapshot.state, snapshot.ego, knocked(self._camera, [one.kind for one in faults])
+        state, ego, camera = snapshot.state, snapshot.ego, knocked(self._rig.camera, [one.kind for one in faults])
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         reports = parts.reporters.heard(time, state, ego, fog, sent)
         parts.meters.hear(reports)
@@ -306,15 +288,16 @@ class EgoEquipment:
         )
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
-        second = self._second_image(renderer, snapshot, pose, time, light)
-        view, radiance = exposed(
-            lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
-            self._shutter.at(self._camera_sensor.share_of_longest_exposure),
+        view, frame, right = self._rig.take(
+            lambda state, pose, camera: renderer.render(state, ego, pose, time, camera, light),
             state,
             ego,
             pose,
+            camera,
+            faults,
+            parts.streams.camera,
+            time,
         )
-        frame, right = self._frame(radiance, second, camera, faults, parts.streams, time)
         speed = float(state.speed[ego])
         old = self._watch.stale_reason(frame, speed) if self._estimators else ""
         observation = Observation(
@@ -322,7 +305,7 @@ class EgoEquipment:
             speed=speed,
             lead=self._sensors.lead(snapshot, faults, parts.streams),
             signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
-            camera_setback=self._setback,
+            camera_setback=self._rig.setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,
@@ -348,7 +331,7 @@ class EgoEquipment:
             belief=self._believe(estimates, observation, time, snapshot.route_position),
             command=command,
             ending=ending,
-            reading_radius=self._scenario.traffic.reading_radius_m,
+            reading_radius=self._config.traffic.reading_radius,
         )
 
     def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
@@ -361,13 +344,13 @@ class EgoEquipment:
         state : TrafficState
             Traffic at that time.
         """
-        sensors = self._scenario.sensors.reports.roadside
+        sensors = self._config.reports.roadside
         if sensors is None or sensors.camera is None:
             return ()
         parts = self._run_parts()
         if self._roadside_cameras is None:
-            rng = parts.streams.reports.spawn(1)[0]
-            self._roadside_cameras = RoadsideCameras(self._scenario, sensors, sensors.camera, parts.road.route, rng)
+            period, rng = self._config.periods.camera_period, parts.streams.reports.spawn(1)[0]
+            self._roadside_cameras = RoadsideCameras(sensors, sensors.camera, period, parts.road.route, rng)
         renderer, light = self._lit_world(parts.schedule.at(time), time)
         reports = self._roadside_cameras.look(
             time, light, lambda pose, camera: renderer.render(state, None, pose, time, camera, light)[1]
@@ -394,44 +377,6 @@ class EgoEquipment:
         """What is believed after this step."""
         return self._fusion.update_at(estimates, time, place, observation.reports)
 
-    def _second_image(
-        self, renderer: EgoView, snapshot: TrafficSnapshot, pose: CameraPose, time: float, light: float
-    ) -> Pixels | None:
-        """What the second camera takes, drawn first: arrays of the picture that is drawn last are kept."""
-        if self._second is None:
-            return None
-        state, ego = snapshot.state, snapshot.ego
-        taken = self._second.take(
-            lambda traffic, place, camera: renderer.render(traffic, ego, place, time, camera, light),
-            self._shutter,
-            state,
-            ego,
-            pose,
-            self._camera,
-        )
-        return self._unexposed if taken is None else taken
-
-    def _frame(
-        self,
-        radiance: NDArray[np.float32] | None,
-        second: Pixels | None,
-        camera: Camera,
-        faults: Sequence[RunningFault],
-        streams: Streams,
-        time: float,
-    ) -> tuple[Frame, SecondView | None]:
-        """What the cameras deliver of the light that falls on the first one's glass; None where nothing is drawn."""
-        image = self._unexposed
-        if radiance is not None:
-            image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
-        if self._second is None or second is None:
-            return Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera), None
-        # Both pictures go one way, and are late, lost or frozen together.
-        pair = cast("Pixels", np.concatenate((image, second), axis=1))
-        when, both = self._delivery.deliver(Delivered(time, pair), faults)
-        left, right = (np.ascontiguousarray(half) for half in np.split(both, 2, axis=1))
-        return Frame(when, left, self._assumed_camera), SecondView(right, self._second.stated_baseline)
-
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Describe the surroundings of the camera.
 
@@ -456,7 +401,7 @@ class EgoEquipment:
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
         body_pitch = self._body_pitch.update(float(state.acceleration[ego]))
         heading, grade = float(state.heading[ego]), float(state.grade[ego])
-        return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
+        return mounted_pose(self._rig.camera, state.position[ego], heading, self._rig.setback, grade, body_pitch)
 
     def _estimate(self, frame: Frame, observation: Observation, time: float, old: str) -> tuple[Estimate, ...]:
         """Results of all estimators; a frame that shows nothing new is rejected with a reason."""
@@ -468,8 +413,8 @@ class EgoEquipment:
         # A late frame belongs with what the radar measured when it was taken.
         observation = replace(observation, lead=self._leads.at(frame.time))
         return tuple(
-            checked_estimate(section.method, estimator.update(observation))
-            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
+            checked_estimate(chosen.name, estimator.update(observation))
+            for chosen, estimator in zip(self._config.estimators, self._estimators, strict=True)
         )
 
     def close(self) -> None:

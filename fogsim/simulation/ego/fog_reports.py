@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
 from fogsim.core.randomness import named_generator
-from fogsim.scenario import Scenario
-from fogsim.scenario.sensors.reports import (
-    CameraReports,
-    MeasuredReports,
-    ReportsFrom,
-    RoadsideReports,
-    VehicleReports,
-)
 from fogsim.simulation.ego.route_places import RoutePlaces
+from fogsim.simulation.run_config import RadioSender, ReportsConfig, ReportSender, RoadsideSender
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate, FogField, FogReport, TrafficState
 
@@ -43,9 +36,9 @@ def is_of_sensor(report: FogReport) -> bool:
     return report.source.startswith(SENSOR + " ")
 
 
-def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
+def sensor_places(sensors: RoadsideSender, length: float) -> Floats:
     """Places of sensors next to a route of a length [m] along it [m]."""
-    return np.arange(sensors.first_m, length, sensors.every_m)
+    return np.arange(sensors.first, length, sensors.spacing)
 
 
 def place_seen(place: float, estimate: Estimate) -> float:
@@ -75,12 +68,10 @@ class Beats:
 
 
 class FogReports:
-    """The senders of a scenario, and what is on its way from them (`route` (n, 3) [m])."""
+    """The senders of a run, and what is on its way from them (`route` (n, 3) [m])."""
 
-    def __init__(self, scenario: Scenario, route: Floats) -> None:
-        section = scenario.sensors.reports
-        self._roadside, self._vehicles = section.roadside, section.vehicles
-        self._cameras = section.cameras
+    def __init__(self, senders: ReportsConfig, route: Floats) -> None:
+        self._roadside, self._vehicles, self._cameras = senders.roadside, senders.vehicles, senders.cameras
         self._route, self._places = route, RoutePlaces(route)
         self.reset(np.random.default_rng(0))
 
@@ -113,66 +104,64 @@ class FogReports:
         self._under_way = [(due, report) for due, report in self._under_way if due > time + 1e-9]
         return arrived
 
-    def _measure_roadside(self, sensors: RoadsideReports, time: float, fog: FogField) -> None:
+    def _measure_roadside(self, sensors: RoadsideSender, time: float, fog: FogField) -> None:
         places = sensor_places(sensors, self._places.stations[-1])
-        due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period_s, time)]
+        due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period, time)]
         if not due:
             return
         # A run begins with the sensors' earlier reports, made in the fog of that moment.
-        time = time if self._has_begun else time - sensors.delay_s
+        time = time if self._has_begun else time - sensors.delay
         self._has_begun = True
         points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
         measured = extinction(fog, points + np.array([0.0, 0.0, _METER_HEIGHT]))
         for i, k in zip(due, measured.tolist(), strict=True):
             self._send(f"{SENSOR} {i}", float(places[i]), k, sensors, time)
 
-    def _measure_vehicles(
-        self, radio: VehicleReports, time: float, state: TrafficState, ego: int, fog: FogField
-    ) -> None:
+    def _measure_vehicles(self, radio: RadioSender, time: float, state: TrafficState, ego: int, fog: FogField) -> None:
         for row, place in self._senders(radio, state, ego):
             name = state.ids[row]
-            if self._beats.is_due(name, radio.period_s, time):
+            if self._beats.is_due(name, radio.period, time):
                 eyes = state.position[row] + np.array([0.0, 0.0, _METER_HEIGHT])
                 self._send(name, place, float(extinction(fog, eyes)), radio, time)
 
-    def _senders(self, radio: VehicleReports, state: TrafficState, ego: int) -> Iterator[tuple[int, float]]:
+    def _senders(self, radio: RadioSender, state: TrafficState, ego: int) -> Iterator[tuple[int, float]]:
         """Rows of equipped vehicles that are in range and go the ego's way on its road, with their places on it [m]."""
         along, _, on_way = self._places.of(state)
-        for row in np.flatnonzero(on_way & (_apart(state, ego) <= radio.range_m)).tolist():
+        for row in np.flatnonzero(on_way & (_apart(state, ego) <= radio.reach)).tolist():
             if row != ego and self._is_equipped(state.ids[row], radio.equipped):
                 yield row, float(along[row])
 
     def _take_from_cameras(
-        self, radio: CameraReports, sent: Iterable[tuple[str, FogReport]], state: TrafficState, ego: int
+        self, radio: RadioSender, sent: Iterable[tuple[str, FogReport]], state: TrafficState, ego: int
     ) -> None:
         """Let what others have seen be on its way to the ego, as far as it is in range of them."""
         apart = dict(zip(state.ids, _apart(state, ego).tolist(), strict=True))
         for vehicle, report in sent:
-            in_range = vehicle != state.ids[ego] and apart.get(vehicle, math.inf) <= radio.range_m
-            if in_range and self._beats.is_due(report.source, radio.period_s, report.time):
+            in_range = vehicle != state.ids[ego] and apart.get(vehicle, math.inf) <= radio.reach
+            if in_range and self._beats.is_due(report.source, radio.period, report.time):
                 self._forward(report, radio)
 
-    def _take_from_sensors(self, sensors: RoadsideReports, sent: Iterable[tuple[str, FogReport]]) -> None:
+    def _take_from_sensors(self, sensors: RoadsideSender, sent: Iterable[tuple[str, FogReport]]) -> None:
         """Let what roadside cameras have seen be on its way to the ego."""
         for _, report in sent:
             if is_of_sensor(report):
                 self._forward(report, sensors)
 
-    def _forward(self, report: FogReport, sender: ReportsFrom) -> None:
+    def _forward(self, report: FogReport, sender: ReportSender) -> None:
         """Let a report with the time of its picture be on its way, with that of the sender's clock in it."""
-        ahead = self._clock_error(report.source, sender.clock_deviation_s)
+        ahead = self._clock_error(report.source, sender.clock_deviation)
         self._let_travel(replace(report, time=report.time + ahead), report.time, sender)
 
     def _is_equipped(self, name: str, share: float) -> bool:
         """Whether a vehicle is, which in one run it is always or never."""
         return zlib.crc32(f"{self._draw} {name}".encode()) < share * 2**32
 
-    def _send(self, name: str, place: float, k: float, sender: MeasuredReports, time: float) -> None:
+    def _send(self, name: str, place: float, k: float, sender: ReportSender, time: float) -> None:
         wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
         reported = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
             reported = _WRONG[0] * (_WRONG[1] / _WRONG[0]) ** any_k
-        stated_time = time + self._clock_error(name, sender.clock_deviation_s)
+        stated_time = time + self._clock_error(name, sender.clock_deviation)
         number = self._beats.number(name)
         self._let_travel(FogReport(name, number, place, stated_time, reported, sender.deviation), time, sender)
 
@@ -180,9 +169,9 @@ class FogReports:
         """How far a sender's clock is ahead [s]; in one run always the same."""
         return deviation * float(named_generator(self._draw, name).standard_normal()) if deviation else 0.0
 
-    def _let_travel(self, report: FogReport, time: float, sender: ReportsFrom) -> None:
+    def _let_travel(self, report: FogReport, time: float, sender: ReportSender) -> None:
         if self._rng.random() >= sender.loss:
-            self._under_way.append((time + sender.delay_s, report))
+            self._under_way.append((time + sender.delay, report))
 
 
 def _apart(state: TrafficState, ego: int) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fogsim.atmosphere import optical_depth
 from fogsim.lighting.own_sight import headlamp_sight_distance
-from fogsim.scenario import Scenario
+from fogsim.simulation.run_config import LightSensor
 from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn, intensity_toward
 from fogsim.traffic.sumo_drivers.oncoming_glare import LAMP_HEIGHT, MIRROR_ANGLE, MIRROR_SHARE
@@ -41,10 +41,9 @@ class Other(NamedTuple):
 class LightSensing:
     """The light sensor behind the ego's windscreen, and what its lamps do."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        section = scenario.sensors.light
-        self._reach, self._tail_reach = section.reach_m, section.tail_reach_m
-        self._half_view = math.radians(0.5 * section.field_of_view_deg)
+    def __init__(self, sensor: LightSensor) -> None:
+        self._reach, self._tail_reach = sensor.reach, sensor.tail_reach
+        self._half_view = 0.5 * sensor.field_of_view
 
     def measure(self, state: TrafficState, ego: int, fog: FogField, illuminance: float) -> LightMeasurement:
         """Measure how bright it is, and by night whether others' lamps are ahead; vehicles do not hide one another.

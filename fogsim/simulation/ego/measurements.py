@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
 from fogsim.core.randomness import Streams
-from fogsim.scenario import Scenario, build
 from fogsim.sensors import (
     Fix,
     RadarShadow,
+    Scatterometer,
     faulty_fix,
     faulty_lead,
     faulty_lead_sensor,
@@ -22,6 +22,7 @@ from fogsim.sensors import (
     signs_ahead,
 )
 from fogsim.sensors.lead import HEIGHT
+from fogsim.simulation.run_config import SensorsConfig
 from fogsim.values import FogField, LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
 from fogsim.values.fault import Where
 from fogsim.values.traffic import rear_of
@@ -35,10 +36,13 @@ _BUMPER_HEIGHT = 0.6
 class EgoSensors:
     """Radar, satellite positioning, sign map and scatterometer of an ego."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._radar, self._gps = build.lead_sensor(scenario), build.gps(scenario)
-        self._sign_reach = scenario.sensors.sign_reach_m
-        self._scatterometer = build.scatterometer(scenario)
+    def __init__(self, sensors: SensorsConfig) -> None:
+        self._sensors, own = sensors, sensors.scatterometer
+        self._scatterometer = (
+            None
+            if own is None
+            else Scatterometer(own.relative_deviation, own.calibration_deviation, own.averaging_time)
+        )
         self._shadow = RadarShadow(())
 
     def reset(self, streams: Streams) -> None:
@@ -52,7 +56,7 @@ class EgoSensors:
 
     def lead(self, snapshot: TrafficSnapshot, faults: Faults, streams: Streams) -> LeadMeasurement | None:
         """The vehicle ahead by radar."""
-        speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._radar, faults)
+        speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._sensors.radar, faults)
         share = self._share_of_reach(snapshot)
         measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot), share)
         return faulty_lead(measured, faults)
@@ -69,13 +73,13 @@ class EgoSensors:
     ) -> tuple[SignSighting, ...]:
         """Signs ahead by the map, from where the vehicle takes itself to be."""
         state, ego = snapshot.state, snapshot.ego
-        fix = measure_fix(state.position[ego], float(state.heading[ego]), self._gps, streams.gps)
+        fix = measure_fix(state.position[ego], float(state.heading[ego]), self._sensors.gps, streams.gps)
         measured: Fix | None = faulty_fix(fix, faults)
         if measured is None:
             return ()
         known = faulty_signs(known, (fault.kind for fault in faults), Where.MAP)
         grade = float(state.grade[ego])
-        return signs_ahead(known, measured.position, measured.heading, self._sign_reach, grade=grade)
+        return signs_ahead(known, measured.position, measured.heading, self._sensors.sign_reach, grade=grade)
 
     def scattering(self, snapshot: TrafficSnapshot, fog: FogField, time: float, faults: Faults) -> float | None:
         """Extinction coefficient at the front bumper as the scatterometer measures it [1/m]; None without one.

@@ -7,18 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
-from fogsim.scenario import Scenario
-from fogsim.scenario.road_sections import meter_places, road_sections, section_limits, stations
 from fogsim.simulation.ego.fog_reports import is_of_sensor
+from fogsim.simulation.road_sections import meter_places, road_sections, section_limits, stations
+from fogsim.simulation.run_config import SectionsConfig
 from fogsim.values import FogField, FogReport, RoadSection
 
 
 class RoadMeters:
-    """The meters of a scenario along a route (`route` (n, 3) [m], `limits` (n,) [m/s])."""
+    """Meters along a route (`route` (n, 3) [m], `limits` (n,) [m/s])."""
 
-    def __init__(self, scenario: Scenario, route: NDArray[np.float64], limits: NDArray[np.float64]) -> None:
-        self._stretches = road_sections(scenario, float(stations(route)[-1]))
-        self._places = meter_places(scenario, self._stretches, route)
+    def __init__(
+        self, sections: SectionsConfig | None, route: NDArray[np.float64], limits: NDArray[np.float64]
+    ) -> None:
+        self._stretches = road_sections(sections, float(stations(route)[-1]))
+        self._places = meter_places(sections, self._stretches, route)
         self._limits = section_limits(self._stretches, route, limits)
         self._along = [stretch.start for stretch in self._stretches]
         self._reported: dict[str, tuple[float, float]] = {}

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from fogsim.camera import Pixels, mounted_pose
 from fogsim.core.randomness import named_generator
 from fogsim.estimators import Estimator
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.road_sections import stations
-from fogsim.scenario.sensors.reports import RoadsideCamera, RoadsideReports
+from fogsim.simulation.chosen_methods import estimators
 from fogsim.simulation.ego.fog_reports import SENSOR, Beats, place_seen, sensor_places
+from fogsim.simulation.road_sections import stations
+from fogsim.simulation.run_config import MastCamera, RoadsideSender
 from fogsim.values import Camera, CameraPose, Estimate, FogReport, Frame, LightMeasurement, Observation
 from fogsim.values.result_checks import checked_estimate
 
@@ -31,15 +31,15 @@ class RoadsideCameras:
 
     def __init__(
         self,
-        scenario: Scenario,
-        sensors: RoadsideReports,
-        section: RoadsideCamera,
+        sensors: RoadsideSender,
+        mast: MastCamera,
+        period: float,
         route: NDArray[np.float64],
         rng: np.random.Generator,
     ) -> None:
-        self._scenario, self._sensors = build.roadside_scenario(scenario, section), sensors
-        self._camera, self._assumed = build.camera(self._scenario), build.assumed_camera(self._scenario)
-        self._sensor, self._aside = build.camera_sensor(self._scenario), section.right_of_route_m
+        self._estimator_config, self._sensors = mast.estimator, sensors
+        self._camera, self._assumed = mast.camera.on(), mast.camera.assumed_on()
+        self._sensor, self._aside = mast.camera.make_sensor(period), mast.right_of_route
         self._route, self._stations = route, stations(route)
         self._places = sensor_places(sensors, float(self._stations[-1])).tolist()
         self._draw = int(rng.integers(2**32))
@@ -52,10 +52,10 @@ class RoadsideCameras:
         due = [
             (f"{SENSOR} {i}", place)
             for i, place in enumerate(self._places)
-            if self._beats.is_due(f"{SENSOR} {i}", self._sensors.period_s, time)
+            if self._beats.is_due(f"{SENSOR} {i}", self._sensors.period, time)
         ]
         # A run begins with what cameras have reported before of the fog as it is then.
-        taken = time if self._has_begun else time - self._sensors.delay_s
+        taken = time if self._has_begun else time - self._sensors.delay
         self._has_begun = self._has_begun or bool(due)
         found = (self._read(name, place, taken, illuminance, draw) for name, place in due)
         return tuple(report for report in found if report is not None)
@@ -69,7 +69,7 @@ class RoadsideCameras:
         image = self._sensor.take(radiance, named_generator(self._draw, f"{name} {number}"))
         frame = Frame(time, over_road(image, self._assumed, self._aside), self._assumed)
         estimate = checked_estimate(
-            self._scenario.estimators[0].method,
+            self._estimator_config.name,
             self._estimator(name).update(Observation(frame, light=LightMeasurement(illuminance))),
         )
         if not (estimate.valid and estimate.standard_deviation > 0.0):
@@ -79,7 +79,7 @@ class RoadsideCameras:
 
     def _estimator(self, name: str) -> Estimator:
         if name not in self._estimators:
-            (self._estimators[name],) = build.estimators(self._scenario, self._assumed)
+            (self._estimators[name],) = estimators([self._estimator_config], self._assumed)
         return self._estimators[name]
 
     def _pose(self, place: float) -> CameraPose:

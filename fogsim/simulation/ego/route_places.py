@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scenario.road_sections import stations
+from fogsim.simulation.road_sections import stations
 from fogsim.values import TrafficState
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What the ego's camera looks at: the scene of a scenario, the renderer that draws it, and the air and lamps in it."""
+"""What the ego's camera looks at: the scene of a run, the renderer that draws it, and the air and lamps in it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air, TunnelLight, side_light
-from fogsim.camera import averaged, middle_samples, supersampled
+from fogsim.camera import CAR, CameraConfig, averaged, middle_samples, supersampled
 from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.render.bonnet import Bonnet, with_bonnet
-from fogsim.scenario import Scenario, build
-from fogsim.scenario.timeline import light_range
 from fogsim.scene import (
     Corridor,
     ScenePlan,
@@ -27,6 +25,7 @@ from fogsim.scene import (
     traffic_batches,
 )
 from fogsim.simulation.ego.near_scene import FEW_LANES, NearScene
+from fogsim.simulation.run_config import RunConfig, WorldConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Batch,
@@ -105,7 +104,7 @@ class NoView:
 
     Parameters
     ----------
-    scenario, network, signs, body
+    world, camera, network, signs, body
         See `ViewRenderer`.
 
     Attributes
@@ -114,11 +113,10 @@ class NoView:
         See `ViewRenderer`.
     """
 
-    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
+    def __init__(self, world: WorldConfig, camera: CameraConfig, network: RoadNetwork, signs: SignMap, _: str) -> None:
         self.signs = signs
-        self.fog: FogField = build.fog_field(scenario, network.route, network.structures)
-        camera = build.camera(scenario, body)
-        size = (camera.height, camera.width)
+        self.fog: FogField = world.fog.along(network.route, network.structures)
+        size = (camera.camera.height, camera.camera.width)
         empty = np.full(size, np.inf, np.float32), np.zeros(size, np.int32)
         self._view = View(np.zeros((*size, 3), np.float32), *empty)
 
@@ -138,21 +136,23 @@ class NoView:
         """Do nothing: there is nothing to be freed."""
 
 
-def prepare_lamplight(scenario: Scenario, body: str = build.CAR) -> None:
+def prepare_lamplight(config: RunConfig) -> None:
     """Compute once a process what every `ViewRenderer` by lamplight needs, whatever its road, before it is needed."""
-    camera, setback = build.camera(scenario, body), build.camera_mount(scenario, body).setback
-    mount, air = LampMount(), Air(FogField(0.0, airlight=(0.0, 0.0, 0.0)), scenario.fog.droplets)
+    camera, setback = config.camera.on(), config.camera.mount().setback
+    mount, air = LampMount(), Air(FogField(0.0, airlight=(0.0, 0.0, 0.0)), config.world.fog.droplets)
     lamps = [own_head_lamps(lit, camera.mount_height, setback, mount) for lit in _USUAL]
-    air.prepare(supersampled(camera, scenario.camera.samples), lamps)
+    air.prepare(supersampled(camera, config.camera.samples), lamps)
 
 
 class ViewRenderer:
-    """The world of a scenario as the camera on its ego sees it.
+    """The world as the camera on an ego sees it.
 
     Parameters
     ----------
-    scenario : Scenario
-        The scenario; of its traffic, nothing is used.
+    world : WorldConfig
+        Fog, light, and what is drawn.
+    camera : CameraConfig
+        The camera.
     network : RoadNetwork
         The roads.
     signs : SignMap
@@ -173,23 +173,25 @@ class ViewRenderer:
         If the renderer does not work here.
     """
 
-    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
+    def __init__(
+        self, world: WorldConfig, camera: CameraConfig, network: RoadNetwork, signs: SignMap, body: str = CAR
+    ) -> None:
         self.signs = signs
-        self.fog: FogField = build.fog_field(scenario, network.route, network.structures)
-        self._camera, self._samples = build.camera(scenario, body), scenario.camera.samples
+        self.fog: FogField = world.fog.along(network.route, network.structures)
+        self._camera, self._samples = camera.on(body), camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
-        self._setback = build.camera_mount(scenario, body).setback
-        has_bonnet = scenario.camera.bonnet and body == build.CAR
+        self._setback = camera.mount(body).setback
+        has_bonnet = camera.has_bonnet and body == CAR
         self._bonnet = Bonnet(self._setback - _BEHIND_BUMPER) if has_bonnet else None
-        self._scenario, self._network = scenario, network
-        self._daylight = scenario.light.illuminance_lx
+        self._world, self._network = world, network
+        self._daylight = world.illuminance
         # Lamps that were lit in the picture only from a moment on would be a jump in it.
-        self._by_lamplight = light_range(scenario.timeline, self._daylight)[0] < DAY_ILLUMINANCE
+        self._by_lamplight = min(world.darkest, self._daylight) < DAY_ILLUMINANCE
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
-        self._air = Air(self.fog, scenario.fog.droplets)
+        self._air = Air(self.fog, world.fog.droplets)
         photons = self.fog.ground_albedo is not None
-        self._sides = side_light(self.fog, scenario.fog.droplets) if photons else EVEN_LIGHT
+        self._sides = side_light(self.fog, world.fog.droplets) if photons else EVEN_LIGHT
         self._renderer: Renderer | None = None
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False
@@ -199,15 +201,15 @@ class ViewRenderer:
 
     def _plan_scene_along(self, line: NDArray[np.float64]) -> None:
         """Find out what there is in the scene along a line (n, 3) [m]."""
-        scenario, around = self._scenario, surroundings(self._network, self.signs, line)
-        rng = np.random.default_rng(scenario.scenery_seed)
+        world, around = self._world, surroundings(self._network, self.signs, line)
+        rng = np.random.default_rng(world.scenery_seed)
         plan = ScenePlan(
-            around.network, around.signs, rng, street_lamps=scenario.street_lamps, pavement=build.pavement(scenario)
+            around.network, around.signs, rng, street_lamps=world.has_street_lamps, pavement=world.pavement
         )
         self._origin, self._shifted = around.origin, bool(np.any(around.origin))
         self._known = None if around.whole else Corridor(line, _LEEWAY)
         # Other renderers may draw what is farther away.
-        self._near_scene = NearScene(plan, FEW_LANES if scenario.renderer in LIMITED else plan.lanes)
+        self._near_scene = NearScene(plan, FEW_LANES if world.renderer in LIMITED else plan.lanes)
         self._street_lamps = street_lamp_heads(self._near_scene.scene) + around.origin
         self._streets = None
         self._sky = self._sky_of(self._daylight)
@@ -234,7 +236,7 @@ class ViewRenderer:
 
     def _make_renderer(self) -> Renderer:
         self._free_renderer()
-        self._renderer = make_renderer(self._scenario.renderer, self._near_scene.scene, self._sky)
+        self._renderer = make_renderer(self._world.renderer, self._near_scene.scene, self._sky)
         self._renderer.set_daylight(self._sky, self._sides)
         return self._renderer
 
@@ -258,7 +260,7 @@ class ViewRenderer:
         illuminance: float | None = None,
     ) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air (`time` [s], `illuminance` [lx])."""
-        self._set_daylight(self._scenario.light.illuminance_lx if illuminance is None else illuminance)
+        self._set_daylight(self._world.illuminance if illuminance is None else illuminance)
         self._go_to(np.array(pose.position) if ego is None else state.position[ego])
         drawn = self._drawn_camera
         if camera is not None and camera != self._camera:
@@ -303,7 +305,7 @@ class ViewRenderer:
     def _unlit(self) -> Renderer:
         """A renderer of the same scene without the sky's light, which shows what shines by itself."""
         if self._unlit_renderer is None:
-            self._unlit_renderer = make_renderer(self._scenario.renderer, self._near_scene.scene, DARKEST_SKY)
+            self._unlit_renderer = make_renderer(self._world.renderer, self._near_scene.scene, DARKEST_SKY)
         return self._unlit_renderer
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:

@@ -13,9 +13,9 @@ import numpy as np
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.randomness import named_generator
 from fogsim.errors import SimulationError
-from fogsim.scenario import Scenario
 from fogsim.simulation.ego.route_places import Places, RoutePlaces
 from fogsim.simulation.fleet.on_board_unit import Instant, Lookout, UnitPool
+from fogsim.simulation.run_config import RunConfig, Script
 from fogsim.values import (
     Command,
     EquippedVehicle,
@@ -35,8 +35,9 @@ _LONGEST_END = 5.0
 class UnitProcess:
     """A `UnitPool` in another process, which is asked and answers when it is done."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(self, config: RunConfig) -> None:
+        # The script, which may hold functions of the user's, is played where the traffic is.
+        self._config = replace(config, script=Script())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._link: Connection | None = None
         self._is_asked = False
@@ -48,7 +49,7 @@ class UnitProcess:
             # None of this process's simulation, threads and contexts in it.
             context = multiprocessing.get_context("forkserver")
             self._link, theirs = context.Pipe()
-            self._process = context.Process(target=_serve, args=(theirs, self._scenario), daemon=True)
+            self._process = context.Process(target=_serve, args=(theirs, self._config), daemon=True)
             self._process.start()
             theirs.close()
         if self._is_asked:
@@ -101,11 +102,11 @@ class UnitProcess:
         self._process, self._link, self._is_asked = None, None, False
 
 
-def _serve(link: Connection, scenario: Scenario) -> None:
+def _serve(link: Connection, config: RunConfig) -> None:
     """Do what is asked over a link until it is closed."""
     # Ctrl-C, which a terminal sends to all, ends the process that asks, and that this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    pool = UnitPool(scenario)
+    pool = UnitPool(config)
     with contextlib.suppress(EOFError, OSError), contextlib.closing(pool):
         while True:
             what, arguments = link.recv()
@@ -122,12 +123,11 @@ class EquippedFleet:
     What they see does not go by who draws it: each has random numbers of its own, by its id.
     """
 
-    def __init__(self, scenario: Scenario, processes: int = 0) -> None:
-        traffic = scenario.traffic
-        self._share, self._named = traffic.equipped, frozenset(traffic.equipped_vehicles)
+    def __init__(self, config: RunConfig, processes: int = 0) -> None:
+        self._share, self._named = config.equipped_share, frozenset(config.equipped_vehicles)
         self._pools: Sequence[UnitPool | UnitProcess] = ()
-        if traffic.has_equipped:
-            self._pools = [UnitProcess(scenario) for _ in range(processes)] or [UnitPool(scenario)]
+        if config.has_equipped:
+            self._pools = [UnitProcess(config) for _ in range(processes)] or [UnitPool(config)]
         self._draw = 0
         self._order: list[str] = []
         self._pool_of: dict[str, int] = {}

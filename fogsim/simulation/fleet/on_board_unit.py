@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from fogsim.core.randomness import spawn_streams
-from fogsim.scenario import Scenario
-from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.simulation.ego.equipment import EgoEquipment
+from fogsim.simulation.run_config import RunConfig
 from fogsim.values import (
     Command,
     EquippedVehicle,
@@ -47,21 +46,23 @@ class Instant:
 class OnBoardUnit:
     """Camera, sensors, estimators, belief, adviser and lighting policy of an equipped vehicle.
 
-    Faults of sensors that a scenario asks for are the ego's alone. Where drivers are advised by signs, in every car or
+    Faults of sensors are the ego's alone. Where drivers are advised by signs, in every car or
     by law, it hears what all hear there, and has no advice of its own.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        sensors = scenario.sensors.model_copy(update={"faults": ()})
-        self._scenario = scenario.model_copy(update={"sensors": sensors})
-        self._equipment = EgoEquipment(self._scenario)
-        self._hears_all = scenario.drivers.advised in DISPLAYS
-        self._policy = AdvisedDriving(self._scenario)
+    def __init__(self, config: RunConfig) -> None:
+        self._config = replace(config, sensors=replace(config.sensors, faults=()))
+        self._equipment = EgoEquipment(self._config)
+        self._hears_all = config.advice.sections is not None
+        self._policy = self._new_policy()
         self._command = Command()
+
+    def _new_policy(self) -> AdvisedDriving:
+        return AdvisedDriving(self._config.advice, self._config.periods.decision_frames)
 
     def start(self, seed: int, vehicle: str, body: str, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> None:
         """Begin to ride in a vehicle."""
-        self._policy, self._command = AdvisedDriving(self._scenario), Command()
+        self._policy, self._command = self._new_policy(), Command()
         self._equipment.start_run(spawn_streams(seed, vehicle), network, body)
 
     def begin(self, actions: Actions, time: float, first_time: float) -> None:
@@ -95,8 +96,8 @@ class OnBoardUnit:
 class UnitPool:
     """On-board units of several vehicles in one process; one that is free again rides in the next vehicle."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(self, config: RunConfig) -> None:
+        self._config = config
         self._riding: dict[str, OnBoardUnit] = {}
         self._free: list[OnBoardUnit] = []
         self._seed = 0
@@ -135,7 +136,7 @@ class UnitPool:
             network = self._network
             if network is None:
                 raise RuntimeError("start_run comes before look")
-            unit = self._free.pop() if self._free else OnBoardUnit(self._scenario)
+            unit = self._free.pop() if self._free else OnBoardUnit(self._config)
             unit.start(self._seed, vehicle, traffic.types[traffic.ids.index(vehicle)], lambda: network)
             for begun in self._begun:
                 unit.begin(*begun)

@@ -1,15 +1,11 @@
-"""Entries of a timeline whose conditions are watched, and what of them begins, is over, or has never begun."""
+"""Entries of a script whose conditions are watched, and what of them begins, is over, or has never begun."""
 
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from fogsim.conditions import History, Moment, Watch
-from fogsim.scenario import Scenario
-from fogsim.scenario.roads.departures import Entries, entering_vehicles
-from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, entry_text, fog_reference, vehicles_of
-from fogsim.scenario.timeline.schema import DepartAction
-from fogsim.units import extinction_from_visibility
+from fogsim.simulation.run_config import Script, ScriptEntry
 from fogsim.values import Ending, Reason, TrafficStep, Unplayed, UnplayedEvent
 from fogsim.values.script import (
     Actions,
@@ -18,7 +14,6 @@ from fogsim.values.script import (
     ChangeLane,
     ChangeLight,
     ChangeSpeed,
-    Enter,
     Follow,
     SetSignal,
     TrafficAction,
@@ -43,14 +38,11 @@ _NOTHING_DUE = Due()
 
 
 class Timeline:
-    """Watches the conditions of a scenario's timeline, and says what begins."""
+    """Watches the conditions of a script, and says what begins."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._entries = tuple(_Entry(written, number) for number, written in enumerate(scenario.timeline))
-        fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
-        self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
-        self._entering = entering_vehicles(scenario)
-        self._end = None if scenario.end_when is None else Watch(scenario.end_when)
+    def __init__(self, script: Script) -> None:
+        self._entries = tuple(_Entry(entry) for entry in script.entries)
+        self._end = None if script.end_when is None else Watch(script.end_when)
         self._history = History()
         self._seen: set[str] = set()
         self._ends: list[Begun] = []
@@ -63,13 +55,13 @@ class Timeline:
         if not self._entries:
             return _NOTHING_DUE
         moment = self._history.moment(step)
-        now = _Now(moment, self._entering)
+        now = _Now(moment)
         self._seen.update(step.traffic.ids)
         self._seen.update(step.traffic.persons.ids)
         parts: list[tuple[Begun, Actions]] = []
         for entry in self._entries:
             entry.look(moment)
-            actions = actions_of(entry.written, now, self._reference) if entry.is_due(step.time) else None
+            actions = entry.config.actions(now) if entry.is_due(step.time) else None
             if actions is not None:
                 parts.append((entry.begin(step.time, moment), actions))
         self._ends += [end for begun, actions in parts if (end := _end(begun, actions)) is not None]
@@ -78,7 +70,7 @@ class Timeline:
         return Due(_together([actions for _, actions in parts]), tuple((b, a.traffic) for b, a in parts), over)
 
     def ended(self, step: TrafficStep) -> Ending | None:
-        """Whether a finished step is the last one by the scenario's ``end_when``; None if the run goes on."""
+        """Whether a finished step is the last one by the script's ``end_when``; None if the run goes on."""
         return Ending.END_CONDITION if self._end is not None and self._end.update(step) else None
 
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
@@ -94,7 +86,7 @@ class Timeline:
         reasons = [(entry, entry.why_not(self._seen, step)) for entry in self._entries]
         names = {vehicle for entry in self._entries for vehicle in entry.vehicles(step)}
         return Unplayed(
-            tuple(UnplayedEvent(f"{e.name} ({entry_text(e.written)})", why) for e, why in reasons if why is not None),
+            tuple(UnplayedEvent(f"{e.name} ({e.config.text})", why) for e, why in reasons if why is not None),
             tuple(sorted(names.difference(self._seen))),
         )
 
@@ -102,24 +94,24 @@ class Timeline:
 class _Entry:
     """An entry, and what has become of it."""
 
-    def __init__(self, written: TimelineEntry, number: int) -> None:
-        self.written, self.name, self.key = written, entry_name(written, number), f"timeline.{number}"
+    def __init__(self, config: ScriptEntry) -> None:
+        self.config, self.name = config, config.name
         self.was_refused = False
-        self._watch = Watch(written.when)
+        self._watch = Watch(config.when)
         self._held = False
         self._has_held = self._has_begun = False
         self._waiting: list[tuple[float, str]] = []
 
     def look(self, moment: Moment) -> None:
         """See whether the condition holds now; what has begun once for all is not looked at again."""
-        if self._has_held and self.written.repeat == "once":
+        if self._has_held and self.config.happens_once:
             return
         holds = bool(self._watch.look(moment))
         comes = holds and not self._held
         self._held = holds
         self._has_held |= holds
         if comes:
-            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.readings()))
+            self._waiting.append((moment.step.time + self.config.delay, self._watch.readings()))
 
     def is_due(self, time: float) -> bool:
         """Whether it is time to begin."""
@@ -129,13 +121,13 @@ class _Entry:
         """Begin."""
         _, why = self._waiting.pop(0)
         self._has_begun = True
-        who = tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
-        return Begun(self.name, time, entry_text(self.written), why, who, self.key)
+        who = tuple(moment.vehicle_id(vehicle) for vehicle in self.config.vehicles)
+        return Begun(self.name, time, self.config.text, why, who, self.config.key)
 
     def vehicles(self, step: TrafficStep) -> tuple[str, ...]:
         """Ids of its vehicles."""
         moment = History().moment(step)
-        return tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
+        return tuple(moment.vehicle_id(vehicle) for vehicle in self.config.vehicles)
 
     def why_not(self, seen: Collection[str], step: TrafficStep) -> Reason | None:
         """Why it has not begun; None if it has."""
@@ -150,11 +142,10 @@ class _Entry:
 
 
 class _Now:
-    """Where vehicles are at one moment; see `fogsim.scenario.timeline.Situation`."""
+    """Where vehicles are at one moment; see `Situation`."""
 
-    def __init__(self, moment: Moment, entering: Entries) -> None:
+    def __init__(self, moment: Moment) -> None:
         self._moment = moment
-        self._entering = entering
 
     def vehicle_id(self, vehicle: str) -> str:
         return self._moment.vehicle_id(vehicle)
@@ -176,9 +167,6 @@ class _Now:
         if lane in beside:
             return beside.index(lane)
         return int(number) if number.isdecimal() else None
-
-    def entry(self, vehicle: str, action: DepartAction) -> Enter:
-        return self._entering[vehicle, action]
 
 
 def _together(parts: list[Actions]) -> Actions:

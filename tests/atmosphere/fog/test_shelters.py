@@ -50,7 +50,7 @@ def tunnel_field(*settings: str) -> FogField:
     sizes = ((0.6, 0.0, 5.2), (12.0, 5.2, 6.0))
     structures = [Structure("t", StructureKind.TUNNEL, line, *size) for size in sizes]
     scenario = load_scenario("motorway_fog_bank", [f"fog.{s}" for s in ("visibility_m=50", *settings)])
-    return build.fog_field(scenario, np.array([[0.0, 0.0, 0.0], [900.0, 0.0, 0.0]]), structures)
+    return build.world_config(scenario).fog.along(np.array([[0.0, 0.0, 0.0], [900.0, 0.0, 0.0]]), structures)
 
 
 def test_a_scenarios_tunnels_keep_its_fog_out_unless_asked() -> None:

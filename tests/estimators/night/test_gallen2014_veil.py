@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.estimators import make
+from fogsim.estimators import make, supply
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.veil_correlation import (
     VeilScores,
@@ -11,7 +11,6 @@ from fogsim.estimators.night.veil_correlation import (
     otsu_threshold,
     visibility_by_parabola,
 )
-from fogsim.scenario.parts.methods import supply
 from fogsim.values import Estimate, Lamp, Observation
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture
 

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import InputError
-from fogsim.estimators import make
+from fogsim.estimators import make, supply
 from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods
 from fogsim.estimators.night.night_road import DAYLIGHT, NightRoad
 from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of, without_cut_noise
-from fogsim.scenario.parts.methods import supply
 from fogsim.values import Camera, Estimate, Lamp, LeadMeasurement, Observation
 from fogsim.values.observation import LightMeasurement
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture

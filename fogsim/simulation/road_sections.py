@@ -5,11 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scenario.schema import Scenario
+from fogsim.simulation.run_config import SectionsConfig
 from fogsim.values import Display, Stretch
-
-_IN_CAR_SECTION = 100.0
-"""Length of the sections for which advice in cars, and drivers who apply a law, go each by one visibility [m]."""
 
 _SHORTEST = 10.0
 """No section begins nearer to the end of the route than this [m], which two ways of measuring it agree about."""
@@ -17,38 +14,30 @@ _SHORTEST = 10.0
 EYES = (0.0, 0.0, 1.2)
 """Where a meter next to the road measures, above it [m]: at drivers' eyes."""
 
-DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Display.LAW}
-"""How drivers hear advice that is given to sections of road, by `drivers.advised`."""
 
-
-def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
+def road_sections(config: SectionsConfig | None, length: float) -> tuple[Stretch, ...]:
     """Sections of the ego's route that are advised each by itself, in the direction of travel (`length` [m])."""
-    drivers = scenario.drivers
-    if drivers.advised not in DISPLAYS:
+    if config is None:
         return ()
-    first, end, spacing = 0.0, length, _IN_CAR_SECTION
-    if drivers.advised == "signs":
-        first, end, spacing = drivers.signs.from_m, min(drivers.signs.to_m, length), drivers.signs.spacing_m
-        starts = list(drivers.signs.at_m) or np.arange(first, end, spacing).tolist()
-    else:
-        starts = np.arange(first, end, spacing).tolist()
+    end = min(config.end, length)
+    starts = list(config.at) or np.arange(config.first, end, config.spacing).tolist()
     starts = [start for start in starts if start < end and start <= length - _SHORTEST]
     # What ends with the route has no end of its own: whoever is there has not left it.
     last = math.inf if end >= length else end
-    return tuple(
-        Stretch(start, stop, scenario.traffic.along) for start, stop in zip(starts, [*starts[1:], last], strict=True)
-    )
+    return tuple(Stretch(start, stop, config.along) for start, stop in zip(starts, [*starts[1:], last], strict=True))
 
 
-def meter_places(scenario: Scenario, sections: tuple[Stretch, ...], route: NDArray[np.float64]) -> NDArray[np.float64]:
+def meter_places(
+    config: SectionsConfig | None, sections: tuple[Stretch, ...], route: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Where the visibility of each section is measured: at its sign; in the middle where there are none.
 
     Returns places at the height of drivers' eyes [m] (m, 3). Takes `route` (n, 3) [m].
     """
-    if not sections:
+    if config is None or not sections:
         return np.empty((0, 3))
     station = stations(route)
-    aside = 0.0 if scenario.drivers.advised == "signs" else 0.5
+    aside = 0.0 if config.display == Display.MESSAGE_SIGN else 0.5
     at = [s.start + aside * (min(s.end, float(station[-1])) - s.start) for s in sections]
     return np.stack([np.interp(at, station, route[:, axis]) for axis in range(3)], axis=-1) + EYES
 

@@ -1,14 +1,14 @@
-"""From a scenario to its drivers: how they see, choose their speed and follow advice, and where it reaches them."""
+"""From a scenario to its drivers: how they see, choose their speed and follow advice."""
 
 import dataclasses
 
-from fogsim.scenario.schema import Scenario
-from fogsim.scenario.traffic_schema import ComplianceSection
+from fogsim.scenario.drivers_schema import ComplianceSection
+from fogsim.scenario.schema import ScenarioFile
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
-from fogsim.values import Display, Stretch, StretchAdvice
+from fogsim.values import Display
 
 
-def driver_sight(scenario: Scenario) -> DriverSight | None:
+def driver_sight(scenario: ScenarioFile) -> DriverSight | None:
     """Eyes of the drivers; None if they see through the fog."""
     drivers = scenario.drivers
     if drivers.see_through_fog:
@@ -21,7 +21,7 @@ def driver_sight(scenario: Scenario) -> DriverSight | None:
     )
 
 
-def driver_setup(scenario: Scenario) -> DriverSetup:
+def driver_setup(scenario: ScenarioFile) -> DriverSetup:
     """How drivers choose their speed and follow advice."""
     drivers = scenario.drivers
     compliance, given = _compliance(drivers.compliance), drivers.compliance_by_display
@@ -51,9 +51,3 @@ def _compliance(written: ComplianceSection) -> Compliance:
         written.trust,
         written.foreseen,
     )
-
-
-def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
-    """Advice to all on the scenario's advised stretch (`speed` [m/s])."""
-    stretch = scenario.drivers.advised_stretch
-    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along), stretch.display)

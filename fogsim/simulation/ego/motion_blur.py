@@ -1,36 +1,18 @@
 """Pictures of what moves while the shutter is open: the mean of the light of several instants."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.camera import Shutter
 from fogsim.values import CameraPose, TrafficState, View
 
 _LEAST_WAY = 0.01
 """Way [m] below which nothing is drawn smeared: of the road 4 m ahead it is half a pixel of a picture 640 wide."""
 
 Drawn = tuple[View, NDArray[np.float32] | None]
-
-
-@dataclass(frozen=True, slots=True)
-class Shutter:
-    """How long the camera looks, and how finely that is drawn."""
-
-    open_time: float = 0.0  # Time for which it is open [s]; 0 freezes what moves
-    instants: int = 1  # Instants in it that are drawn, odd, so that one is in the middle
-    follows_exposure: bool = False  # Whether that time is the longest of an automatic exposure
-
-    def at(self, share: float) -> "Shutter":
-        """The shutter at an exposure."""
-        return replace(self, open_time=share * self.open_time) if self.follows_exposure else self
-
-    def offsets(self) -> tuple[float, ...]:
-        """Times from the middle of the exposure at which is drawn [s], the middle itself last."""
-        half = self.instants // 2
-        steps = self.open_time / self.instants
-        return (*(steps * n for n in range(-half, half + 1) if n), 0.0)
 
 
 def moved(state: TrafficState, seconds: float) -> TrafficState:

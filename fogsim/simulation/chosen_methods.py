@@ -1,0 +1,45 @@
+"""The methods that a run has chosen: estimators and advisers, and what judges a run by its advice."""
+
+import dataclasses
+from collections.abc import Iterable
+
+from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
+from fogsim.core.registry import MethodConfig
+from fogsim.errors import InputError
+from fogsim.estimators import ESTIMATORS, Estimator, supply
+from fogsim.metrics import SafetyStandard
+from fogsim.values import Camera
+
+
+def estimators(chosen: Iterable[MethodConfig], assumed: Camera) -> tuple[Estimator, ...]:
+    """Estimators with the calibration that the vehicle assumes, supplied with cached calibrations."""
+    made = tuple(one.make(ESTIMATORS, assumed) for one in chosen)
+    for estimator in made:
+        supply(estimator)
+    return made
+
+
+def adviser(chosen: MethodConfig) -> Adviser | VehicleAdviser:
+    """A speed adviser."""
+    return chosen.make(ADVISERS)
+
+
+def road_adviser(chosen: MethodConfig) -> Adviser:
+    """A speed adviser who advises roads."""
+    advising = adviser(chosen)
+    if isinstance(advising, VehicleAdviser):
+        raise InputError(
+            f"advice: {chosen.name!r} uses a vehicle's own sensors (advise_vehicle), which roads do not have; "
+            "where roads are advised, take an adviser with advise()"
+        )
+    return advising
+
+
+def safety_standard(chosen: MethodConfig) -> SafetyStandard:
+    """What a run is judged by: the reaction time and deceleration that its adviser counts with, where it has them."""
+    advising, usual = adviser(chosen), SafetyStandard()
+    return dataclasses.replace(
+        usual,
+        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
+        deceleration=getattr(advising, "deceleration", usual.deceleration),
+    )

@@ -8,12 +8,14 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any
 
 import pytest
 import sumo
 from hypothesis import HealthCheck, settings
 
 from fogsim.cli import app
+from tests.helpers.attached import libsumo_in_town, traci_in_town
 
 # How long an example takes says more about the machine than about what is tested.
 settings.register_profile("fogsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -53,6 +55,13 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
                 process.kill()
 
     return start
+
+
+@pytest.fixture(params=["libsumo", "traci"])
+def api(request: pytest.FixtureRequest, sumo_process: SumoProcess) -> Iterator[Any]:
+    """A town that a user simulates, in this process and over a connection."""
+    with libsumo_in_town() if request.param == "libsumo" else traci_in_town(sumo_process) as simulation:
+        yield simulation
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from tests.helpers.vehicles import vehicles
 
 CAMERA = Camera(640, 480, 577.0, (320.0, 240.0), 1.38, pitch=math.radians(2.0))
 SMALL = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
@@ -69,22 +70,7 @@ def one_vehicle(
     kind: str, gap: float, lamps: int = 0, size: tuple[float, float, float] = (16.5, 2.5, 4.0)
 ) -> TrafficState:
     """A vehicle on y = 0 whose rear is `gap` metres ahead of the origin."""
-    length, width, height = size
-    return TrafficState(
-        time=0.0,
-        ids=("lead",),
-        types=(kind,),
-        position=np.array([[gap + length, 0.0, 0.0]]),
-        heading=np.zeros(1),
-        speed=np.zeros(1),
-        acceleration=np.zeros(1),
-        length=np.array([length]),
-        width=np.array([width]),
-        height=np.array([height]),
-        lane=("",),
-        lamps=np.array([lamps], np.int32),
-        paint=np.full((1, 3), 0.3),
-    )
+    return vehicles([gap + size[0]], ids=["lead"], kinds=kind, size=size, lamps=lamps)
 
 
 def rays(camera: Camera, pose: CameraPose) -> np.ndarray:

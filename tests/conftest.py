@@ -14,14 +14,13 @@ import pytest
 import sumo
 from hypothesis import HealthCheck, settings
 
-from fogsim.cli import app
 from tests.helpers.attached import libsumo_in_town, traci_in_town
+from tests.helpers.command import Command, run_command
 
 # How long an example takes says more about the machine than about what is tested.
 settings.register_profile("fogsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("fogsim")
 
-Command = Callable[..., "CompletedProcess[str]"]
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
 
 
@@ -65,17 +64,15 @@ def api(request: pytest.FixtureRequest, sumo_process: SumoProcess) -> Iterator[A
 
 
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    """Run a command line in this process, in a folder or here: one of its own would spend its time on imports."""
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run a command line in this process, in a folder or here, and capture what it prints."""
 
     def run(*arguments: str, cwd: Path | None = None) -> "CompletedProcess[str]":
-        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
-        monkeypatch.setenv("COLUMNS", "300")
         capsys.readouterr()
-        with contextlib.chdir(cwd or "."), pytest.raises(SystemExit) as ended:
-            app.main()
+        with contextlib.chdir(cwd or "."):
+            code = run_command(*arguments)
         told = capsys.readouterr()
-        return CompletedProcess(arguments, int(ended.value.code or 0), told.out, told.err)
+        return CompletedProcess(arguments, code, told.out, told.err)
 
     return run
 

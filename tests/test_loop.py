@@ -189,7 +189,7 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
 
 def test_importing_starts_no_sumo_and_no_gl() -> None:
     code = (
-        "import sys, fogsim, fogsim_envs, fogsim.simulation.loop; "
+        "import sys, fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop; "
         "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)

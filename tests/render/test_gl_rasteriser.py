@@ -1,3 +1,4 @@
+import functools
 import math
 import os
 import subprocess
@@ -185,6 +186,7 @@ print(len(np.unique(triangle_ids)), hashlib.sha256(triangle_ids.tobytes()).hexdi
 """
 
 
+@functools.cache
 def drawn(**environment: str) -> tuple[str, str]:
     """OpenGL's version and a digest of a picture, drawn by another process."""
     code = DRAW.format(folder=str(Path(__file__).parent))

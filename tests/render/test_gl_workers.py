@@ -36,10 +36,14 @@ def run(*arguments: str, **environment: str) -> str:
 
 
 @pytest.mark.usefixtures("_opengl")
-# The other two, fork with cpu and spawn with opengl, draw below, where the parent drew first.
+# Fork with cpu and spawn with opengl draw below, where the parent drew first.
 @pytest.mark.parametrize(
     ("method", "renderer"),
-    [("fork", "opengl"), ("spawn", "cpu"), pytest.param("forkserver", "opengl", marks=pytest.mark.nightly)],
+    [
+        ("fork", "opengl"),
+        pytest.param("spawn", "cpu", marks=pytest.mark.nightly),
+        pytest.param("forkserver", "opengl", marks=pytest.mark.nightly),
+    ],
 )
 def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
@@ -15,7 +14,7 @@ import sumo
 from hypothesis import HealthCheck, settings
 
 from tests.helpers.attached import libsumo_in_town, traci_in_town
-from tests.helpers.command import Command, run_command
+from tests.helpers.command import Command, Ran, run_command
 
 # How long an example takes says more about the machine than about what is tested.
 settings.register_profile("fogsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -67,12 +66,12 @@ def api(request: pytest.FixtureRequest, sumo_process: SumoProcess) -> Iterator[A
 def command(capsys: pytest.CaptureFixture[str]) -> Command:
     """Run a command line in this process, in a folder or here, and capture what it prints."""
 
-    def run(*arguments: str, cwd: Path | None = None) -> "CompletedProcess[str]":
+    def run(*arguments: str, cwd: Path | None = None) -> Ran:
         capsys.readouterr()
         with contextlib.chdir(cwd or "."):
             code = run_command(*arguments)
         told = capsys.readouterr()
-        return CompletedProcess(arguments, code, told.out, told.err)
+        return Ran(code, told.out, told.err)
 
     return run
 

@@ -171,8 +171,9 @@ def drive(grade: float, visibility: float) -> list[Step]:
     return steps
 
 
-@pytest.mark.parametrize("visibility", [100.0, 500.0])
-@pytest.mark.parametrize("grade", [0.0, *GRADES])
+@pytest.mark.parametrize(
+    ("grade", "visibility"), [(0.0, 100.0), (0.0, 500.0), *zip(GRADES, (100.0, 500.0, 100.0, 500.0), strict=True)]
+)
 def test_estimates_and_belief_hold_the_truth_on_every_grade(grade: float, visibility: float) -> None:
     """With the same bounds as on the level: what estimators are told is relative to the vehicle."""
     steps = drive(grade, visibility)

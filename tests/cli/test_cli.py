@@ -15,20 +15,13 @@ from early_motorway import EARLY
 from pyarrow import parquet
 
 from fogsim.scenario import catalogue
-from tests.helpers.command import Command, run_command
+from tests.helpers.command import Command, run_command, run_python
 
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3", "--set", EARLY)
 RARE = ("--set", "clocks.camera_period_s=1", "--set", "clocks.decision_period_s=1")
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet", "video.mp4", "report.html"}
-
-
-def fogsim(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
-    return subprocess.run(
-        [*FOGSIM, *arguments], capture_output=True, text=True, timeout=240, env=environment, check=False, **options
-    )  # type: ignore[call-overload]  # options are subprocess.run's own
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +54,7 @@ def test_steps_and_video_have_a_row_and_a_frame_for_each_camera_period(finished:
 
 
 def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, tmp_path: Path) -> None:
-    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--out", str(tmp_path / "b"), *SMALL)
-    assert done.returncode == 0, done.stderr
+    done = run_python("-m", "fogsim", "run", "motorway_fog_bank", "--seed", "3", "--out", tmp_path / "b", *SMALL)
     assert "ended: time" in done.stdout
     for name in ("steps.parquet", "metrics.json", "video.mp4"):
         assert (finished / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
@@ -226,5 +218,5 @@ def test_version_and_help(command: Command) -> None:
 
 def test_the_command_line_starts_without_what_only_its_commands_need() -> None:
     code = "import sys, fogsim.cli.app\nprint({'numpy', 'numba', 'cv2', 'pyarrow', 'matplotlib'} & {*sys.modules})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = run_python("-c", code)
     assert done.stdout.strip() == "set()"

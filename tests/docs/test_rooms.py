@@ -2,10 +2,10 @@
 
 import ast
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
+
+from tests.helpers.command import run_script
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGE = (CHECKOUT / "docs" / "explanation" / "code_layout.md").read_text(encoding="utf-8")
@@ -19,9 +19,7 @@ CONSTANTS_ONLY = CHECKOUT / "fogsim" / "render" / "shading" / "surfaces.py"
 
 
 def test_the_drawing_is_of_today() -> None:
-    done = subprocess.run(
-        [sys.executable, CHECKOUT / "tools" / "rooms.py", "--check"], capture_output=True, text=True, check=False
-    )
+    done = run_script(CHECKOUT / "tools" / "rooms.py", "--check")
     assert done.returncode == 0, done.stderr
 
 

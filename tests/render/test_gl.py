@@ -1,7 +1,5 @@
 import math
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -22,6 +20,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from tests.helpers.command import run_python
 from tests.helpers.vehicles import vehicles
 
 CAMERA = Camera(640, 480, 577.0, (320.0, 240.0), 1.38, pitch=math.radians(2.0))
@@ -300,11 +299,6 @@ def test_the_report_names_the_version(renderer: Renderer) -> None:
     assert re.match(r"OpenGL \((EGL|OSMesa)\) [34]\.\d", gl_report())
 
 
-def run(code: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    return done.stdout + done.stderr
-
-
 def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer) -> None:
     code = (
         "import os\nfrom fogsim.render import gl_report\ngl_report()\n"
@@ -314,7 +308,8 @@ def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer
         "    os._exit(0)\n"
         "os.wait()\nprint('parent', gl_report())\n"
     )
-    said = run(code)
+    done = run_python("-c", code)
+    said = done.stdout + done.stderr
     assert "RenderError" in said
     assert "does not survive a fork" in said
     assert "parent" in said

@@ -1,14 +1,12 @@
 """Renderers in other processes, without OpenGL, and many of them one after another."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from fogsim.errors import MissingDependencyError
 from fogsim.render import gl_report
+from tests.helpers.command import run_python
 
 WORKERS = Path(__file__).with_name("workers.py")
 PACKAGES = "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
@@ -24,14 +22,7 @@ def _opengl() -> None:
 
 def run(*arguments: str, **environment: str) -> str:
     """What a fresh Python says."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-        env={**os.environ, **environment},
-    )
+    done = run_python(*arguments, environment=environment, check=False)
     return done.stdout + done.stderr
 
 

@@ -149,6 +149,7 @@ def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path, comm
         assert told in done.stderr
 
 
+@pytest.mark.filterwarnings("default")  # printed, as in a process of its own
 def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path, command: Command) -> None:
     """Also one that would listen for clients and take its seed from the clock: it is told, and does neither."""
     config = tmp_path / "mine.sumocfg"

@@ -24,11 +24,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
     ("name", "arguments", "keys"),
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
-        (
-            "photograph_roads.py",
-            ("--images", "1"),
-            {"pool", "method", "visibility_m", "pictures", "valid_share"},
-        ),
+        ("photograph_roads.py", ("--images", "1"), {"pool", "method", "visibility_m", "pictures", "valid_share"}),
         pytest.param(
             "environments.py",
             ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),

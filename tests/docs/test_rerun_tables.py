@@ -114,10 +114,7 @@ def root(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def rerun(
-    root: Path,
-    docs: Callable[[str], ModuleType],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    root: Path, docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Run:
     """docs/rerun_tables.py in that checkout, on two cores and with its own measurements."""
     monkeypatch.chdir(root)

@@ -40,11 +40,7 @@ def run_command(*arguments: str) -> int:
 def run_script(script: Path, *arguments: str | Path) -> Ran:
     """Run a script of benchmarks/ or docs/."""
     out, err, code = io.StringIO(), io.StringIO(), None
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-    ):
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         for folder in ("docs", "benchmarks"):
             patch.syspath_prepend(Path(__file__).parents[2] / folder)
         patch.setattr(sys, "argv", [str(script), *map(str, arguments)])

@@ -106,10 +106,7 @@ def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        ("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"),
-    ],
+    ("name", "told"), [("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic")]
 )
 def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> None:
     with pytest.raises(InputError, match=told):

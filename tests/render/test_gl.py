@@ -8,18 +8,7 @@ import pytest
 from fogsim.errors import InputError, MissingDependencyError, UnknownNameError
 from fogsim.render import Renderer, RenderError, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.values import (
-    Camera,
-    CameraPose,
-    Lamp,
-    Lane,
-    LaneMarking,
-    RoadNetwork,
-    Scene,
-    SignMap,
-    TrafficState,
-    View,
-)
+from fogsim.values import Camera, CameraPose, Lamp, Lane, LaneMarking, RoadNetwork, Scene, SignMap, TrafficState, View
 from tests.helpers.command import run_python
 from tests.helpers.vehicles import vehicles
 

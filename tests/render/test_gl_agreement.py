@@ -144,8 +144,7 @@ def walls(*distances: float) -> Scene:
 
 @pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 @pytest.mark.parametrize(
-    ("distance", "tolerance"),
-    [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)],
+    ("distance", "tolerance"), [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)]
 )
 def test_a_wall_is_as_far_as_it_is_and_hides_what_is_hardly_farther(
     renderer: str, distance: float, tolerance: float

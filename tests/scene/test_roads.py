@@ -10,18 +10,7 @@ from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.road import KERB, transverse_markings
 from fogsim.scene.terrain import Terrain
-from fogsim.values import (
-    Lane,
-    LaneEnd,
-    LaneKind,
-    LaneMarking,
-    Mesh,
-    PavedArea,
-    RoadNetwork,
-    Scene,
-    SignMap,
-    Surface,
-)
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
 from tests.scene.conftest import road_under
 
 L_SHAPE = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [4, 4, 0], [4, 10, 0], [0, 10, 0]])

@@ -29,7 +29,7 @@ SMALL = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5",)}
 MOTORWAY = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5", EARLY)}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def env() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(ID, **MOTORWAY)
     yield made
@@ -197,8 +197,8 @@ def _a_step(env: gymnasium.Env[Any, Any]) -> Any:
     return environment._step
 
 
-def test_steps_need_a_reset() -> None:
-    with gymnasium.make(ID, scenario=ROAD, **SMALL) as env, pytest.raises(gymnasium.error.ResetNeeded):
+def test_steps_need_a_reset(env: gymnasium.Env[Any, Any]) -> None:
+    with pytest.raises(gymnasium.error.ResetNeeded):
         env.unwrapped.step(np.array([0, 0]))
 
 

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 import make_airlight_table
 from fogsim.atmosphere import fogged_radiance
 from fogsim.atmosphere.fog.koschmieder import daytime_luminance, transmittance
-from fogsim.atmosphere.fog.layer_airlight import layer_table, path_means, side_light, sines, slant_airlight
+from fogsim.atmosphere.fog.layer_airlight import (
+    layer_table,
+    path_means,
+    side_light,
+    sines,
+    slant_airlight,
+)
 from fogsim.atmosphere.fog.layer_airlight_kernels import PATHS
 from fogsim.atmosphere.lamps.phase_function import Droplets, phase_function
 from fogsim.errors import InputError

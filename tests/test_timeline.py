@@ -13,9 +13,8 @@ from fogsim.errors import UnplayedWarning
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.simulation.timeline import Timeline
-from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficStep, Truth
+from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
 from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Depart, Stop
-from tests.helpers.vehicles import vehicles
 
 BLIND = (EARLY, "renderer=none", "estimators=[]", "traffic.events=[]")
 
@@ -24,9 +23,16 @@ def scenario(*timeline: str, settings: tuple[str, ...] = ()) -> Scenario:
     return load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{', '.join(timeline)}]", *settings])
 
 
-def step(time: float, *, speed: float = 20.0, lane: str = "e_1", **cars: float) -> TrafficStep:
+def step(time: float, *, speed: float = 20.0, lane: str = "e_1", **vehicles: float) -> TrafficStep:
     """An instant in which vehicles are at places along a straight road to the east."""
-    state = vehicles(list(cars.values()), time=time, ids=cars, speed=speed, size=(5.0, 1.0, 1.0), lane=lane)
+    ids = tuple(vehicles)
+    n = len(ids)
+    position = np.column_stack([list(vehicles.values()), np.zeros(n), np.zeros(n)])
+    zeros, ones = np.zeros(n), np.ones(n)
+    state = TrafficState(
+        time, ids, ("car",) * n, position, zeros, speed * ones, zeros, 5 * ones, ones, ones, (lane,) * n,
+        np.zeros(n, np.int32), np.zeros((n, 3)),
+    )  # fmt: skip
     truth = Truth(0.01, 0.01, route=np.array([[0.0, 0, 0], [5000.0, 0, 0]]))
     return TrafficStep(
         index=round(10 * time), time=time, traffic=state, collisions=(), truth=truth, command=Command(), ending=None
@@ -48,7 +54,14 @@ def test_an_entry_begins_once_or_each_time_and_after_its_delay() -> None:
     )
     speeds = [5.0, 20.0, 20.0, 20.0, 5.0, 20.0]
     steps = [step(0.1 * i, speed=speed, lead=100.0) for i, speed in enumerate(speeds)]
-    assert names(timeline, *steps) == [[], ["first", "timeline.1"], [], ["timeline.2"], [], ["timeline.1"]]
+    assert names(timeline, *steps) == [
+        [],
+        ["first", "timeline.1"],
+        [],
+        ["timeline.2"],
+        [],
+        ["timeline.1"],
+    ]
 
 
 def test_an_entry_waits_for_its_vehicles() -> None:
@@ -193,7 +206,10 @@ def test_speeds_and_lanes_as_others_have_them() -> None:
     # Nobody is called ego in traffic alone: what refers to it waits.
     assert names(timeline, step(0.0, speed=20.0, lead=100.0)) == [[]]
     due = timeline.due(step(0.1, speed=20.0, lead=100.0, ego=0.0))
-    assert due.actions.traffic == (ChangeSpeed("lead", 31.0, pytest.approx(5.5)), ChangeLane("lead", 1, 60.0))
+    assert due.actions.traffic == (
+        ChangeSpeed("lead", 31.0, pytest.approx(5.5)),
+        ChangeLane("lead", 1, 60.0),
+    )
 
 
 def test_an_entry_that_does_nothing_remembers_and_a_condition_ends_the_run() -> None:

@@ -7,19 +7,19 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from subprocess import CompletedProcess
+from typing import Any
 
 import pytest
 import sumo
 from hypothesis import HealthCheck, settings
 
-from fogsim.cli import app
+from tests.helpers.attached import libsumo_in_town, traci_in_town
+from tests.helpers.command import Command, Ran, run_command
 
 # How long an example takes says more about the machine than about what is tested.
 settings.register_profile("fogsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("fogsim")
 
-Command = Callable[..., "CompletedProcess[str]"]
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
 
 
@@ -55,18 +55,23 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
     return start
 
 
-@pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    """Run a command line in this process, in a folder or here: one of its own would spend its time on imports."""
+@pytest.fixture(params=["libsumo", "traci"])
+def api(request: pytest.FixtureRequest, sumo_process: SumoProcess) -> Iterator[Any]:
+    """A town that a user simulates, in this process and over a connection."""
+    with libsumo_in_town() if request.param == "libsumo" else traci_in_town(sumo_process) as simulation:
+        yield simulation
 
-    def run(*arguments: str, cwd: Path | None = None) -> "CompletedProcess[str]":
-        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
-        monkeypatch.setenv("COLUMNS", "300")
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run a command line in this process, in a folder or here, and capture what it prints."""
+
+    def run(*arguments: str, cwd: Path | None = None) -> Ran:
         capsys.readouterr()
-        with contextlib.chdir(cwd or "."), pytest.raises(SystemExit) as ended:
-            app.main()
+        with contextlib.chdir(cwd or "."):
+            code = run_command(*arguments)
         told = capsys.readouterr()
-        return CompletedProcess(arguments, int(ended.value.code or 0), told.out, told.err)
+        return Ran(code, told.out, told.err)
 
     return run
 

@@ -30,6 +30,7 @@ from fogsim.values import (
     TrafficState,
 )
 from fogsim.values.pinhole import camera_axes
+from tests.helpers.vehicles import vehicles
 
 GRADES = (-0.04, -0.02, 0.02, 0.04)
 SETTINGS = ("renderer=cpu", "camera.width=320", "camera.height=240", "camera.read_noise_e=0")
@@ -59,20 +60,14 @@ def road(grade: float) -> RoadNetwork:
 
 def traffic(grade: float, station: float, lamps: Lamp = Lamp.POSITION) -> TrafficState:
     """The ego and a car ahead of it in the same lane."""
-    return TrafficState(
-        time=0.0,
+    return vehicles(
+        [place(grade, station), place(grade, station + GAP + 4.5)],
         ids=("ego", "other"),
-        types=("car", "car"),
-        position=np.stack((place(grade, station), place(grade, station + GAP + 4.5))),
-        heading=np.zeros(2),
-        speed=np.full(2, 20.0),
-        acceleration=np.zeros(2),
-        length=np.full(2, 4.5),
-        width=np.full(2, 1.8),
-        height=np.full(2, 1.5),
-        lane=("a_1", "a_1"),
-        lamps=np.full(2, int(lamps), np.int32),
-        paint=np.full((2, 3), 0.4),
+        speed=20.0,
+        size=(4.5, 1.8, 1.5),
+        lane="a_1",
+        lamps=int(lamps),
+        paint=0.4,
         grade=np.full(2, math.atan(grade)),
     )
 
@@ -183,8 +178,9 @@ def drive(grade: float, visibility: float) -> list[Step]:
     return steps
 
 
-@pytest.mark.parametrize("visibility", [100.0, 500.0])
-@pytest.mark.parametrize("grade", [0.0, *GRADES])
+@pytest.mark.parametrize(
+    ("grade", "visibility"), [(0.0, 100.0), (0.0, 500.0), *zip(GRADES, (100.0, 500.0, 100.0, 500.0), strict=True)]
+)
 def test_estimates_and_belief_hold_the_truth_on_every_grade(grade: float, visibility: float) -> None:
     """With the same bounds as on the level: what estimators are told is relative to the vehicle."""
     steps = drive(grade, visibility)

@@ -1,15 +1,14 @@
 """Compiled code that is kept on disk is never older than the sources it came from."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from numba.core import codegen
 
 import fogsim.core.jit  # noqa: F401 - lets numba use LinkedLibrary
 from fogsim.core.compiling.code_libraries import LinkedLibrary
+from tests.helpers.command import run_python
 
 CALLED = """
 from fogsim.core.jit import kernel
@@ -45,34 +44,20 @@ def write(folder: Path, twice: float, factor: float) -> None:
 
 def ask(folder: Path) -> list[str]:
     """What a new process gets."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join((str(folder), *sys.path)),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    environment.pop("NUMBA_CACHE_DIR", None)
-    told = subprocess.run([sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True)
-    return told.stdout.split()
+    path = os.pathsep.join((str(folder), *sys.path))
+    environment = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
+    return run_python("-c", ASK, environment=environment).stdout.split()
 
 
-@pytest.mark.parametrize(("twice", "factor", "answer"), [(3.0, 1.0, "31.0"), (2.0, 5.0, "25.0")])
-def test_a_changed_source_is_compiled_into_those_who_call_it(
-    tmp_path: Path, twice: float, factor: float, answer: str
-) -> None:
+def test_what_one_process_compiled_the_next_one_loads_until_a_source_that_is_called_changes(tmp_path: Path) -> None:
     """Neither numba's stamp of the caller's own file nor its time says that a module it calls has changed."""
-    (tmp_path / "caller.py").write_text(CALLER.format(called="called"))
-    write(tmp_path, 2.0, 1.0)
-    assert ask(tmp_path)[:2] == ["21.0", "answer"]
-    write(tmp_path, twice, factor)
-    assert ask(tmp_path)[0] == answer
-
-
-def test_unchanged_sources_are_not_compiled_again(tmp_path: Path) -> None:
-    """What one process compiled the next one loads."""
     (tmp_path / "caller.py").write_text(CALLER.format(called="called"))
     write(tmp_path, 2.0, 1.0)
     assert ask(tmp_path) == ["21.0", "answer", "0"]
     assert ask(tmp_path) == ["21.0", "answer", "1"]
+    for twice, factor, answer in ((3.0, 1.0, "31.0"), (2.0, 5.0, "25.0")):
+        write(tmp_path, twice, factor)
+        assert ask(tmp_path)[0] == answer
 
 
 def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path: Path) -> None:
@@ -84,8 +69,7 @@ def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path
     )
     for name in ("Old", "New"):
         module.write_text(text.replace("Old", name), encoding="utf-8")
-        done = subprocess.run([sys.executable, module], capture_output=True, text=True, check=False)
-        assert done.stdout.strip() == "42.0", done.stderr
+        assert run_python(module).stdout.strip() == "42.0"
 
 
 INTERRUPTED = """
@@ -117,9 +101,7 @@ print(dict(raised))
 
 
 def test_a_signal_in_a_kernels_call_is_a_keyboard_interrupt_and_no_crash() -> None:
-    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "{'KeyboardInterrupt': 5000}"
+    assert run_python("-c", INTERRUPTED).stdout.strip() == "{'KeyboardInterrupt': 5000}"
 
 
 SCRATCH = """
@@ -172,13 +154,8 @@ def test_a_kernel_within_another_gets_no_code_of_its_own_until_python_calls_it(t
     (tmp_path / "scratch" / "kernels.py").write_text(SCRATCH)
     error = "('less than nothing', -1.0)"
     for compiled in ("['doubled_root']" if DEFERS else "[]", "[]"):
-        done = subprocess.run(
-            [sys.executable, "-c", WHAT_SCRATCH_DOES],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), *sys.path))},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        path = os.pathsep.join((str(tmp_path), *sys.path))
+        done = run_python("-c", WHAT_SCRATCH_DOES, environment={"PYTHONPATH": path})
         assert done.stdout.splitlines() == [f"4.0 {error}", compiled, f"3.0 {error} True False"]
 
 
@@ -214,8 +191,7 @@ print(each(np.arange(3.0)).tolist(), apply(inner, 1.0), callback.ctypes(3.0), le
 
 
 def test_functions_that_others_compile_with_numba_are_compiled_as_ever() -> None:
-    done = subprocess.run([sys.executable, "-c", OTHERS], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == f"[1.0, 2.0, 3.0] 2.0 4.0 {DEFERS}"
+    assert run_python("-c", OTHERS).stdout.strip() == f"[1.0, 2.0, 3.0] 2.0 4.0 {DEFERS}"
 
 
 LITERALS = """
@@ -234,9 +210,7 @@ print(answer(10.0, 3), len(scaled.get_overload.__self__.overloads))
 
 
 def test_a_kernel_is_compiled_once_for_all_numbers_of_a_type(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
     (tmp_path / "literals.py").write_text(LITERALS)
-    done = subprocess.run(
-        [sys.executable, "literals.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
-    )
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = run_python("literals.py", cwd=tmp_path, environment=kept)
     assert done.stdout.split() == ["50.0", "1"]

@@ -2,8 +2,6 @@
 
 import itertools
 import math
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +18,7 @@ from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Display, Ending, FogChange, FogField, Lamp, SpeedAdvice, Step, Stretch, StretchAdvice
+from tests.helpers.command import run_python
 
 SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=4")
 
@@ -28,27 +27,29 @@ def small(*overrides: str) -> Scenario:
     return fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides])
 
 
-def test_steps_follow_the_clocks_and_end_in_time() -> None:
-    steps = list(fogsim.run(small(), seed=1))
-    assert [s.index for s in steps] == list(range(41))
-    assert [s.time for s in steps] == [i / 10 for i in range(41)]  # 3.8 is 3.8, not 3.8000000000000003
-    assert [s.ending for s in steps[:-1]] == [None] * 40
-    assert steps[-1].ending is Ending.TIME
+@pytest.fixture(scope="module")
+def foggy() -> list[Step]:
+    return list(fogsim.run(small("fog.visibility_m=60"), seed=1))
 
 
-def test_a_command_is_decided_once_a_decision_period() -> None:
-    steps = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
-    changes = [s.index for a, s in itertools.pairwise(steps) if s.command is not a.command]
+def test_steps_follow_the_clocks_and_end_in_time(foggy: list[Step]) -> None:
+    assert [s.index for s in foggy] == list(range(41))
+    assert [s.time for s in foggy] == [i / 10 for i in range(41)]  # 3.8 is 3.8, not 3.8000000000000003
+    assert [s.ending for s in foggy[:-1]] == [None] * 40
+    assert foggy[-1].ending is Ending.TIME
+
+
+def test_a_command_is_decided_once_a_decision_period(foggy: list[Step]) -> None:
+    changes = [s.index for a, s in itertools.pairwise(foggy) if s.command is not a.command]
     assert changes == list(range(1, 41, 5))
 
 
-def test_advice_may_go_to_every_vehicle_near_the_ego() -> None:
+def test_advice_may_go_to_every_vehicle_near_the_ego(foggy: list[Step]) -> None:
     steps = list(fogsim.run(small("fog.visibility_m=60", "drivers.advised=all"), seed=1))
-    alone = list(fogsim.run(small("fog.visibility_m=60"), seed=1))
     assert steps[-1].command.advice_reach == 1000.0
-    assert not alone[-1].command.is_for_others
+    assert not foggy[-1].command.is_for_others
     # 2 s at 2 m/s², after the delay of 2 s.
-    assert np.mean(steps[-1].traffic.speed) < np.mean(alone[-1].traffic.speed) - 2.0
+    assert np.mean(steps[-1].traffic.speed) < np.mean(foggy[-1].traffic.speed) - 2.0
 
 
 def test_others_follow_advice_in_clear_air_too() -> None:
@@ -105,7 +106,7 @@ def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
     assert np.all(moved > 10.0)  # half a second at more than 20 m/s
 
 
-@pytest.mark.parametrize("visibility", [50.0, 100.0, 200.0])
+@pytest.mark.parametrize("visibility", [50.0, pytest.param(100.0, marks=pytest.mark.nightly), 200.0])
 def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_belief(visibility: float) -> None:
     scenario = fogsim.load_scenario(
         "motorway_fog_bank",
@@ -118,20 +119,19 @@ def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_
     assert last.command.advice.speed < 110 / 3.6
 
 
-def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_estimators_never_see_the_truth(foggy: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
     """Deleting the truth from every step changes no estimate, belief or command."""
-    honest = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
     monkeypatch.setattr("fogsim.simulation.ego.equipment.fog_truth", lambda *_: None)
-    blind = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
-    for a, b in zip(honest, blind, strict=True):
+    blind = list(fogsim.run(small("fog.visibility_m=60"), seed=1))
+    for a, b in zip(foggy, blind, strict=True):
         assert b.truth is None
         assert [e.extinction for e in a.estimates] == [e.extinction for e in b.estimates]
         assert np.array_equal(a.belief.probability, b.belief.probability)
         assert a.command == b.command
 
 
-def test_a_vehicle_knows_which_of_its_lamps_are_switched_on() -> None:
-    first, *_, last = fogsim.run(small("fog.visibility_m=60", "duration_s=2"), seed=1)
+def test_a_vehicle_knows_which_of_its_lamps_are_switched_on(foggy: list[Step]) -> None:
+    first, *_, last = foggy
     assert first.observation.lamps == Lamp.POSITION | Lamp.LOW_BEAM
     assert last.observation.lamps == first.observation.lamps | Lamp.FRONT_FOG == last.command.lamps
 
@@ -158,9 +158,8 @@ def fingerprint(steps: Iterator[Step]) -> list[bytes]:
 
 
 def test_the_same_seed_gives_the_same_run_bit_for_bit() -> None:
-    first = fingerprint(fogsim.run(small(), seed=7))
-    assert fingerprint(fogsim.run(small(), seed=7)) == first
-    assert fingerprint(fogsim.run(small(), seed=8)) != first
+    first, again, other = (fingerprint(fogsim.run(small("duration_s=2"), seed)) for seed in (7, 7, 8))
+    assert first == again != other
 
 
 def test_a_restarted_loop_replays_a_fresh_one() -> None:
@@ -189,10 +188,10 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
 
 def test_importing_starts_no_sumo_and_no_gl() -> None:
     code = (
-        "import sys, fogsim, fogsim_envs, fogsim.simulation.loop; "
+        "import sys, fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop; "
         "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+    run_python("-c", code)
 
 
 def test_public_names_are_there() -> None:

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,27 +16,22 @@ from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Lamp, SpeedAdvice, Step
+from tests.helpers.attached import ARGUMENTS, GRID, libsumo_in_town, traci_in_town
 
-GRID = Path(__file__).resolve().parent / "data" / "grid"
-ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
 SMALL = ("camera.width=96", "camera.height=72")
 EGO = "veh18"  # departs at 36 s and drives through the whole town
 
 
 @pytest.fixture
 def libsumo() -> Iterator[Any]:
-    library = load_libsumo()
-    library.start(["sumo", *ARGUMENTS])
-    yield library
-    library.close()
+    with libsumo_in_town() as library:
+        yield library
 
 
 @pytest.fixture
 def connection(sumo_process: Callable) -> Iterator[Any]:
-    with sumo_process(ARGUMENTS) as (port, _):
-        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+    with traci_in_town(sumo_process) as connection:
         yield connection
-        connection.close()
 
 
 def users_loop(api: Any, steps: int, **options: Any) -> list[Step | None]:
@@ -315,3 +309,17 @@ def test_a_timeline_is_played_in_the_users_loop_and_all_is_given_back(libsumo: A
     assert libsumo.vehicle.getSpeedMode(EGO) == mode
     libsumo.simulationStep(libsumo.simulation.getTime() + 4.0)
     assert libsumo.vehicle.getSpeed(EGO) > 6.0
+
+
+def test_an_ego_that_never_came_is_told_at_the_end(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego="vehicle3", visibility=120.0)
+    for _ in range(40):
+        libsumo.simulationStep()
+        assert session.observe() is None
+    with pytest.warns(UserWarning, match=r"ego 'vehicle3' did not appear while.*those that did: veh3, .* more"):
+        session.close()
+    session.close()
+
+
+def test_a_session_that_never_looked_says_nothing(libsumo: Any) -> None:
+    fogsim.attach(libsumo, ego="vehicle3", visibility=120.0).close()

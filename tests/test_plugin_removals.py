@@ -1,35 +1,15 @@
 """Vehicles that the user's own loop takes away, in simulations to which FogSim is attached."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-import traci
 
 import fogsim
 from fogsim.simulation.plugin import AttachedSession
-from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Step
 
-GRID = Path(__file__).resolve().parent / "data" / "grid"
-ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
 SMALL = ("camera.width=32", "camera.height=24")
 EGO = "veh3"
-
-
-@pytest.fixture(params=["libsumo", "traci"])
-def api(request: pytest.FixtureRequest, sumo_process: Callable) -> Iterator[Any]:
-    if request.param == "libsumo":
-        library = load_libsumo()
-        library.start(["sumo", *ARGUMENTS])
-        yield library
-        library.close()
-        return
-    with sumo_process(ARGUMENTS) as (port, _):
-        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
-        yield connection
-        connection.close()
 
 
 def until_the_ego_drives(api: Any, session: AttachedSession) -> Step:

@@ -1,38 +1,19 @@
 """Several sessions of FogSim in one simulation, and settings of the user's own beside them."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-import traci
 
 import fogsim
 from fogsim.simulation.plugin import AttachedSession
-from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Command, Stretch, StretchAdvice
+from tests.helpers.attached import ARGUMENTS, libsumo_in_town
 
-GRID = Path(__file__).resolve().parent / "data" / "grid"
-ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
 SMALL = ("camera.width=32", "camera.height=24")
 ADVISED = ("drivers.compliance.reached_share=1", "drivers.compliance.rate=1", "drivers.compliance.delay_s=0")
 # Speeds, shares of the own speed and headways change.
 CHANGING = ("drivers.speed_choice=observed", "drivers.following=careful")
 EGO, OTHER_EGO = "veh0", "veh1"
-
-
-@pytest.fixture(params=["libsumo", "traci"])
-def api(request: pytest.FixtureRequest, sumo_process: Callable) -> Iterator[Any]:
-    if request.param == "libsumo":
-        library = load_libsumo()
-        library.start(["sumo", *ARGUMENTS])
-        yield library
-        library.close()
-        return
-    with sumo_process(ARGUMENTS) as (port, _):
-        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
-        yield connection
-        connection.close()
 
 
 def session(api: Any, ego: str, *settings: str, visibility: float = 120.0) -> AttachedSession:
@@ -136,9 +117,7 @@ def test_what_the_user_sets_meanwhile_stays(api: Any) -> None:
 
 
 def test_a_session_of_another_simulation_gives_nothing_back_here() -> None:
-    libsumo = load_libsumo()
-    libsumo.start(["sumo", *ARGUMENTS])
-    try:
+    with libsumo_in_town() as libsumo:
         one = session(libsumo, EGO, *ADVISED)
         drive(libsumo, 20, (one, 4.0))
         libsumo.load(ARGUMENTS)
@@ -149,16 +128,12 @@ def test_a_session_of_another_simulation_gives_nothing_back_here() -> None:
         one.close()
         assert set(top_speeds(libsumo).values()) == {4.0}
         other.close()
-    finally:
-        libsumo.close()
 
 
 def test_a_session_may_outlive_its_simulation() -> None:
-    libsumo = load_libsumo()
-    libsumo.start(["sumo", *ARGUMENTS])
-    one = session(libsumo, EGO, *ADVISED)
-    drive(libsumo, 5, (one, 4.0))
-    libsumo.close()
+    with libsumo_in_town() as libsumo:
+        one = session(libsumo, EGO, *ADVISED)
+        drive(libsumo, 5, (one, 4.0))
     one.close()
 
 

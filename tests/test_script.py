@@ -32,7 +32,7 @@ def patchy():
                 never=fs.condition("ego.collision"),
                 always=fs.signal("ego.ttc") >= "1.5 s",
                 during=fs.negated(fs.signal("ego.speed") < "5 km/h"),
-            ),
+            )
         },
     )
 

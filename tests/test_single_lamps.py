@@ -116,11 +116,7 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
         ("{left: failed}", "{}", "actors.slow.lamps.position: no action given; allowed: left, right"),
         ("{left: failed}", "{middle: failed}", "actors.slow.lamps.position.middle: unknown key"),
         ("{position: {left", "{indicator_left: {left", "actors.slow.lamps.indicator_left"),
-        (
-            "ahead_of",
-            "type: motorcycle, ahead_of",
-            "slow: lamps: position and low_beam of a motorcycle are single",
-        ),
+        ("ahead_of", "type: motorcycle, ahead_of", "slow: lamps: position and low_beam of a motorcycle are single"),
         (
             "lamps: {position",
             "type: truck, lamps: {position",

@@ -169,8 +169,7 @@ def test_a_cohort_is_due_in_its_time_and_the_run_ends_when_it_has_left(tmp_path:
     """Three are due at 2 s on one lane, where two wait; the first is there from the beginning, the last comes late."""
     due = (("first", 0.0), ("a", 2.0), ("b", 2.0), ("c", 2.0), ("late", 9.0))
     config = demand(
-        tmp_path,
-        "".join(f'<vehicle id="{v}" route="r" depart="{t}" departLane="0" departSpeed="20"/>' for v, t in due),
+        tmp_path, "".join(f'<vehicle id="{v}" route="r" depart="{t}" departLane="0" departSpeed="20"/>' for v, t in due)
     )
     keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.warm_up_s=1", "traffic.cohort_s=4")
     steps = list(fogsim.run_traffic(scenario_from_config(config, "none", [EVEN, *keys, "duration_s=400"]), 1))

@@ -1,44 +1,30 @@
 """Every benchmark runs and prints the records that it promises; what it times is not judged here."""
 
 import json
-import runpy
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.helpers.command import run_script
+
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SLOW = pytest.mark.nightly
-Records = Callable[..., list[dict[str, Any]]]
 
 
-@pytest.fixture
-def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Records:
-    """Run a benchmark in this process, for one of its own would spend its time on imports: gives what it prints."""
-
-    def run(name: str, *arguments: str) -> list[dict[str, Any]]:
-        monkeypatch.syspath_prepend(FOLDER.parent / "docs")
-        monkeypatch.syspath_prepend(FOLDER)
-        monkeypatch.setattr(sys, "argv", [name, "--json", *arguments])
-        capsys.readouterr()
-        runpy.run_path(str(FOLDER / name), run_name="__main__")
-        result: list[dict[str, Any]] = json.loads(capsys.readouterr().out)
-        return result
-
-    return run
+def records(name: str, *arguments: str) -> list[dict[str, Any]]:
+    """What a benchmark prints."""
+    done = run_script(FOLDER / name, "--json", *arguments)
+    assert done.returncode == 0, done.stderr
+    result: list[dict[str, Any]] = json.loads(done.stdout)
+    return result
 
 
 @pytest.mark.parametrize(
     ("name", "arguments", "keys"),
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
-        (
-            "photograph_roads.py",
-            ("--images", "1"),
-            {"pool", "method", "visibility_m", "pictures", "valid_share"},
-        ),
+        ("photograph_roads.py", ("--images", "1"), {"pool", "method", "visibility_m", "pictures", "valid_share"}),
         pytest.param(
             "environments.py",
             ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
@@ -119,13 +105,13 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )
-def test_records(name: str, arguments: tuple[str, ...], keys: set[str], records: Records) -> None:
+def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:
     for record in records(name, *arguments):
         assert keys <= set(record)
 
 
 @pytest.mark.nightly
-def test_fog_costs_lives_and_an_oracle_saves_some(records: Records) -> None:
+def test_fog_costs_lives_and_an_oracle_saves_some() -> None:
     """The scenario that the closing figures come from, with few seeds; the full study is the benchmark itself."""
     dense = records("collisions.py", "--seeds", "1", "--visibility", "40", "--protocol", "from_the_beginning")
     none, oracle = (next(r for r in dense if r["policy"] == p) for p in ("none", "oracle"))
@@ -150,10 +136,9 @@ expect:
 """
 
 
-def test_a_broken_device_is_caught(records: Records, tmp_path: Path) -> None:
+def test_a_broken_device_is_caught(tmp_path: Path) -> None:
     (tmp_path / "scenario.yaml").write_text(EXPECTING, encoding="utf-8")
     sound, blind = "none: the sound device", "adviser ignores the belief"
-    with pytest.raises(SystemExit, match="0"):
-        records("broken_devices.py", "--devices", sound, blind, "--scenarios", str(tmp_path))
-    with pytest.raises(SystemExit, match="1"):
-        records("broken_devices.py", "--devices", "no fog lamps", "--scenarios", str(tmp_path))
+    for devices, code in (((sound, blind), 0), (("no fog lamps",), 1)):
+        done = run_script(FOLDER / "broken_devices.py", "--json", "--devices", *devices, "--scenarios", tmp_path)
+        assert done.returncode == code, done.stderr

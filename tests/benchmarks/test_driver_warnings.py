@@ -1,11 +1,11 @@
 """Figures of benchmarks/driver_warnings.py from drives by hand, which it goes on from and does not drive again."""
 
 import json
-import runpy
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.helpers.command import run_script
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 FOGS = (20_000, 5000, 3000, 1500, 400, 300, 200, 150, 100, 60)
@@ -26,20 +26,14 @@ def drive(about: str, visibility: int, seed: int, lead: float | None = None, fal
     }
 
 
-def test_leads_and_false_warnings_an_hour(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_leads_and_false_warnings_an_hour(tmp_path: Path) -> None:
     drives = [drive("bank", 20_000, seed, lead) for seed, lead in ((1, 250.0), (2, 0.0), (3, 300.0))]
     drives += [drive("even", fog, seed, false=fog == 400) for seed in (1, 2) for fog in FOGS]
     kept = tmp_path / "kept.jsonl"
     units = ([[one["about"], one["visibility_m"], one["seed"]], one] for one in drives)
     kept.write_text("\n".join(map(json.dumps, ["driver_warnings", *units])) + "\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(FOLDER)
-    monkeypatch.setattr(
-        sys, "argv", ["driver_warnings.py", "--json", "--seeds", "3", "--drives", "2", "--keep", str(kept)]
-    )
-    runpy.run_path(str(FOLDER / "driver_warnings.py"), run_name="__main__")
-    bank, *fogs = json.loads(capsys.readouterr().out)
+    done = run_script(FOLDER / "driver_warnings.py", "--json", "--seeds", "3", "--drives", "2", "--keep", kept)
+    bank, *fogs = json.loads(done.stdout)
     assert bank == {
         "about": "bank", "drives": 3, "median_m": 250.0, "least_m": 0.0, "most_m": 300.0, "missed": 1, "false": 0,
     }  # fmt: skip

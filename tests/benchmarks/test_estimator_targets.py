@@ -1,17 +1,14 @@
 """The table of targets says what it measured, and "met" follows from its numbers; how good they are is not judged."""
 
 import ast
-import io
 import json
 import math
-import runpy
-import subprocess
-import sys
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.helpers.command import run_script
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "benchmarks" / "estimator_targets.py"
@@ -23,22 +20,6 @@ FIELDS = {
 }  # fmt: skip
 
 
-def run(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
-    """What the program prints, and its exit code, in this process: one of its own would spend its time on imports."""
-    line, out, err = [str(PROGRAM), *map(str, arguments)], io.StringIO(), io.StringIO()
-    code: Any = 0
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.syspath_prepend(PROGRAM.parent)
-        patch.setattr(sys, "argv", line)
-        try:
-            runpy.run_path(line[0], run_name="__main__")
-        except SystemExit as end:
-            code = end.code
-    # What is no number is a program's last words.
-    told = f"{code}\n" if isinstance(code, str) else ""
-    return subprocess.CompletedProcess(line, 1 if told else int(code or 0), out.getvalue(), err.getvalue() + told)
-
-
 @pytest.fixture(scope="module")
 def keep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("targets") / "kept"
@@ -46,7 +27,7 @@ def keep(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def records(keep: Path) -> list[dict[str, Any]]:
-    done = run("--json", "--images", "1", "--keep", keep)
+    done = run_script(PROGRAM, "--json", "--images", "1", "--keep", keep)
     assert done.returncode == 0, done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found
@@ -87,17 +68,17 @@ def test_what_another_command_measures_is_not_copied(records: list[dict[str, Any
 
 
 def test_kept_rows_give_the_same_again_and_belong_to_their_seed(keep: Path, records: list[dict[str, Any]]) -> None:
-    assert json.loads(run("--json", "--images", "1", "--keep", keep).stdout) == records
-    other = run("--images", "1", "--keep", keep, "--seed", "1")
+    assert json.loads(run_script(PROGRAM, "--json", "--images", "1", "--keep", keep).stdout) == records
+    other = run_script(PROGRAM, "--images", "1", "--keep", keep, "--seed", "1")
     assert other.returncode != 0
     assert "other settings" in other.stderr
-    table = run("--images", "1", "--keep", keep).stdout.splitlines()
+    table = run_script(PROGRAM, "--images", "1", "--keep", keep).stdout.splitlines()
     assert len(table) == 2 + len(records)
     assert all(line.count("|") == table[0].count("|") for line in table)
 
 
 def test_no_image_is_too_few() -> None:
-    done = run("--images", "0")
+    done = run_script(PROGRAM, "--images", "0")
     assert done.returncode == 2
     assert "at least 1" in done.stderr
 

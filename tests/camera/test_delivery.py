@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.camera import Delivered, FrameDelivery
-from fogsim.values.fault import (
-    Blackout,
-    DroppedFrames,
-    Fault,
-    FaultKind,
-    FrozenFrame,
-    Latency,
-    RunningFault,
-    TimeStamp,
-)
+from fogsim.values.fault import Blackout, DroppedFrames, Fault, FaultKind, FrozenFrame, Latency, RunningFault, TimeStamp
 
 
 def handed_out(*kinds: FaultKind, begin: int = 3, end: int = 8, count: int = 12) -> list[tuple[float, int]]:

@@ -39,12 +39,7 @@ def test_noise_has_photon_and_read_variance() -> None:
 def test_noise_is_uncorrelated_between_neighbours_channels_and_frames() -> None:
     rng = np.random.default_rng(2)
     a, b = (expose(grey(2500.0), SENSOR, Response.LINEAR, rng).astype(float) - 127.5 for _ in range(2))
-    pairs = [
-        (a[:, 1:, 0], a[:, :-1, 0]),
-        (a[1:, :, 0], a[:-1, :, 0]),
-        (a[..., 0], a[..., 1]),
-        (a[..., 0], b[..., 0]),
-    ]
+    pairs = [(a[:, 1:, 0], a[:, :-1, 0]), (a[1:, :, 0], a[:-1, :, 0]), (a[..., 0], a[..., 1]), (a[..., 0], b[..., 0])]
     for one, other in pairs:
         assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 0.02  # 4 standard deviations of 200² samples
 

@@ -1,4 +1,4 @@
-"""The command line, in processes of its own."""
+"""The command line, in processes of its own where these are the subject."""
 
 import json
 import os
@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -18,8 +17,8 @@ from pyarrow import parquet
 
 from fogsim.cli.app import app
 from fogsim.scenario import catalogue
+from tests.helpers.command import Command, run_command, run_python
 
-Command = Callable[..., "subprocess.CompletedProcess[str]"]
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3", "--set", EARLY)
 RARE = ("--set", "clocks.camera_period_s=1", "--set", "clocks.decision_period_s=1")
@@ -27,19 +26,10 @@ TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet", "video.mp4", "report.html"}
 
 
-def fogsim(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
-    return subprocess.run(
-        [*FOGSIM, *arguments], capture_output=True, text=True, timeout=240, env=environment, check=False, **options
-    )  # type: ignore[call-overload]  # options are subprocess.run's own
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("run") / "out"
-    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--trajectories", "--out", str(out), *SMALL)
-    assert done.returncode == 0, done.stderr
-    assert "ended: time" in done.stdout
+    assert run_command("run", "motorway_fog_bank", "--seed", "3", "--trajectories", "--out", str(out), *SMALL) == 0
     return out
 
 
@@ -66,8 +56,8 @@ def test_steps_and_video_have_a_row_and_a_frame_for_each_camera_period(finished:
 
 
 def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, tmp_path: Path) -> None:
-    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--out", str(tmp_path / "b"), *SMALL)
-    assert done.returncode == 0, done.stderr
+    done = run_python("-m", "fogsim", "run", "motorway_fog_bank", "--seed", "3", "--out", tmp_path / "b", *SMALL)
+    assert "ended: time" in done.stdout
     for name in ("steps.parquet", "metrics.json", "video.mp4"):
         assert (finished / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
@@ -161,14 +151,15 @@ def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path, comm
         assert told in done.stderr
 
 
-def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("default")  # printed, as in a process of its own
+def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path, command: Command) -> None:
     """Also one that would listen for clients and take its seed from the clock: it is told, and does neither."""
     config = tmp_path / "mine.sumocfg"
     own = '<remote-port value="8813"/><num-clients value="2"/><random value="true"/>'
     text = Path(TOWN).read_text(encoding="utf-8").replace("grid.", f"{Path(TOWN).parent}/grid.")
     config.write_text(text.replace("</configuration>", f"{own}</configuration>"), encoding="utf-8")
     chosen = ("--sumocfg", str(config), "--ego", "veh18", "--visibility", "120", "--out", str(tmp_path / "out"))
-    done = fogsim("run", *chosen, *SMALL[:4], *RARE, "--set", "duration_s=600", "--no-video", "--no-report")
+    done = command("run", *chosen, *SMALL[:4], *RARE, "--set", "duration_s=600", "--no-video", "--no-report")
     assert done.returncode == 0, done.stderr
     assert "ended: arrived" in done.stdout
     assert [line.split("=")[0] for line in done.stderr.splitlines() if line.startswith("warning:")] == [
@@ -189,16 +180,7 @@ def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path, comma
     assert "Traceback" not in done.stderr
 
 
-def test_list_names_scenarios_and_methods(command: Command) -> None:
-    done = command("list")
-    assert done.returncode == 0
-    for name in ("motorway_fog_bank", "negru2013", "grid_filter", "stopping_sight_distance", "fog_lamp_rules"):
-        assert name in done.stdout
-    marked = {line.split()[0]: line.split()[1] for line in done.stdout.splitlines() if len(line.split()) > 1}
-    assert (marked["rising_sun"], marked["graded_motorway"]) == ("test", "A")
-
-
-def test_list_names_methods_of_installed_packages(
+def test_list_names_scenarios_and_methods_also_those_of_installed_packages(
     tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     info = tmp_path / "road_fade-0.1.0.dist-info"
@@ -209,6 +191,10 @@ def test_list_names_methods_of_installed_packages(
     done = command("list")
     assert done.returncode == 0, done.stderr
     assert "scatterometer, road_fade" in done.stdout
+    for name in ("motorway_fog_bank", "negru2013", "grid_filter", "stopping_sight_distance", "fog_lamp_rules"):
+        assert name in done.stdout
+    marked = {line.split()[0]: line.split()[1] for line in done.stdout.splitlines() if len(line.split()) > 1}
+    assert (marked["rising_sun"], marked["graded_motorway"]) == ("test", "A")
 
 
 def test_signs_are_written_as_geojson(tmp_path: Path, command: Command) -> None:
@@ -243,5 +229,5 @@ def test_help_shows_units_and_defaults() -> None:
 
 def test_the_command_line_starts_without_what_only_its_commands_need() -> None:
     code = "import sys, fogsim.cli.app\nprint({'numpy', 'numba', 'cv2', 'pyarrow', 'matplotlib'} & {*sys.modules})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = run_python("-c", code)
     assert done.stdout.strip() == "set()"

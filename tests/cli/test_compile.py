@@ -1,8 +1,5 @@
 """Compiling is announced, and what is compiled ahead is what a run needs."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +9,7 @@ from fogsim import Camera, Frame, Observation
 from fogsim.cli.compile import _foggy_road
 from fogsim.core import jit
 from fogsim.estimators import ESTIMATORS
+from tests.helpers.command import run_python
 
 COMPILE = """
 import numpy as np
@@ -28,13 +26,7 @@ def test_a_first_run_says_once_that_it_compiles(tmp_path: Path) -> None:
     """On stderr, since stdout is for results; a process that finds everything compiled says nothing."""
     told = []
     for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, "-c", COMPILE],
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        done = run_python("-c", COMPILE, environment={"NUMBA_CACHE_DIR": str(tmp_path)})
         assert done.stdout == ""
         told.append(done.stderr)
     assert told[0].count("compiling for this processor") == 1

@@ -1,14 +1,12 @@
 """A first run compiles in two processes, and nothing but its time differs by that."""
 
-import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 
 from fogsim.core.jit import CompilerProcess, processors
+from tests.helpers.command import run_python
 
 START = """
 import os, subprocess, sys
@@ -89,13 +87,7 @@ pytestmark = pytest.mark.skipif(processors() < 2, reason="one processor compiles
 
 
 def run(code: str, kept: Path) -> list[str]:
-    done = subprocess.run(
-        [sys.executable, "-c", START + code],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(kept)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python("-c", START + code, environment={"NUMBA_CACHE_DIR": str(kept)}, check=False)
     assert "Traceback" not in done.stderr, done.stderr
     return done.stdout.split()
 

@@ -1,11 +1,11 @@
 """``fogsim estimate``: what it prints, what it refuses, and with which exit code."""
 
 import csv
+import functools
 import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from early_motorway import EARLY
 from PIL import Image
 
 import fogsim
-from fogsim.cli import app
+from tests.helpers.command import Command
 
 HEIGHT, WIDTH = 240, 320
 CAMERA_YAML = """\
@@ -49,33 +49,21 @@ def folder(drawn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         Image.fromarray(image).save(tmp_path / "drive" / f"{index}.png")
     (tmp_path / "camera.yaml").write_text(CAMERA_YAML, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.setenv("NO_COLOR", "1")
     return tmp_path
 
 
 @pytest.fixture
-def estimate(folder, monkeypatch, capsys):
-    """Run the command in this process: gives exit code, stdout and stderr."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fogsim", "estimate", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out, told.err
-
-    return run
+def estimate(folder: Path, command: Command) -> Command:
+    """Run the command in this process, in the folder."""
+    return functools.partial(command, "estimate")
 
 
 def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path, command) -> None:
     arguments = ("estimate", "drive", "--camera", "camera.yaml", "--json", "--method", "joint_road")
-    own = subprocess.run(
-        [sys.executable, "-m", "fogsim", *arguments],
-        cwd=folder, capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    assert command(*arguments, cwd=folder).stdout == own.stdout
-    records = [json.loads(line) for line in own.stdout.splitlines()]
+    out = command(*arguments, cwd=folder).stdout
+    assert command(*arguments, cwd=folder).stdout == out
+    records = [json.loads(line) for line in out.splitlines()]
     assert [record["frame"] for record in records] == ["drive/0.png", "drive/1.png", "drive/2.png"]
     for record in records:
         assert set(record) == KEYS | ({"denser_fog_m", "reach_m", "optical_depths"} if record["valid"] else set())

@@ -65,10 +65,7 @@ def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, fog: Fog) -> Non
         (("--visibility", "nan", "--depth-kind", "range"), "--visibility: expected a number from"),
         (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight: expected a pixel value"),
         (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
-        (
-            ("--visibility", "80", "--depth-kind", "range", "--road-plane"),
-            "the flat road; both are given",
-        ),
+        (("--visibility", "80", "--depth-kind", "range", "--road-plane"), "the flat road; both are given"),
         (
             ("--visibility", "80", "--depth-kind", "range", "--ground-albedo", "2"),
             "--ground-albedo: expected a number from",

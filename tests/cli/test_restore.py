@@ -1,8 +1,6 @@
 """``fogsim restore``."""
 
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import cv2
 import numpy as np
@@ -12,8 +10,7 @@ from flat_road import Road, photograph, scan
 from fogsim.offline.camera_file import load_calibration
 from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
-
-Command = Callable[..., "CompletedProcess[str]"]
+from tests.helpers.command import Command
 
 CAMERA = """width: 320
 height: 240

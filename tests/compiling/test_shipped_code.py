@@ -4,9 +4,8 @@ import os
 import pickle
 import platform
 import shutil
-import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numba
@@ -15,6 +14,7 @@ import pytest
 from fogsim.core.compiling import shipped_code
 from fogsim.core.compiling.shipped_code import KINDS, compiled_for, usable_kind, why_not_taken
 from fogsim.core.files.user_cache import write_entry
+from tests.helpers.command import run_python
 
 SOURCE = """
 from fogsim.core.jit import kernel
@@ -42,37 +42,35 @@ pytestmark = pytest.mark.skipif(COMPILED_FOR is None, reason="none are shipped f
 Ask = Callable[..., list[str]]
 
 
-@pytest.fixture
-def ask(tmp_path: Path) -> Ask:
-    """What a process gets of a package whose installation came with a kernel."""
+def asked(folder: Path, environment: dict[str, str]) -> list[str]:
+    path = os.pathsep.join(path for path in sys.path if path)
+    # Bytecode would be taken for that of a source of the same size written within a second.
+    told = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": path, **environment}
+    return run_python("-c", ASK, cwd=folder, environment=told).stdout.split()
 
-    def told(**environment: str) -> list[str]:
-        inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-        done = subprocess.run(
-            [sys.executable, "-c", ASK],
-            cwd=tmp_path,
-            # Bytecode would be taken for that of a source of the same size written within a second.
-            env={
-                **inherited,
-                "PYTHONDONTWRITEBYTECODE": "1",
-                "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
-                **environment,
-            },
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout.split()
 
-    part = tmp_path / "package" / "part"
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A package whose installation came with a kernel."""
+    folder = tmp_path_factory.mktemp("shipped")
+    part = folder / "package" / "part"
     part.mkdir(parents=True)
     (part / "doubling.py").write_text(SOURCE.format(factor=2.0))
-    assert told(**(COMPILED_FOR or {})) == ["20.0", "False", "0"]
-    (tmp_path / "shipped" / "part").mkdir(parents=True)
-    for file in (part / "__pycache__").glob("*.nb[ci]"):
-        file.rename(tmp_path / "shipped" / "part" / file.name)
-    return told
+    with pytest.MonkeyPatch.context() as patch:
+        for name in [name for name in os.environ if name.startswith("NUMBA_")]:
+            patch.delenv(name)
+        assert asked(folder, COMPILED_FOR or {}) == ["20.0", "False", "0"]
+        (folder / "shipped" / "part").mkdir(parents=True)
+        for file in (part / "__pycache__").glob("*.nb[ci]"):
+            file.rename(folder / "shipped" / "part" / file.name)
+        yield folder
+
+
+@pytest.fixture
+def ask(shipped: Path, tmp_path: Path) -> Ask:
+    """What a process gets of that package."""
+    shutil.copytree(shipped, tmp_path, dirs_exist_ok=True)
+    return lambda **environment: asked(tmp_path, environment)
 
 
 def kept(folder: Path) -> list[Path]:

@@ -116,8 +116,7 @@ def test_variables_of_every_instruction_are_found_in_numbas_order() -> None:
 
 
 @pytest.mark.parametrize(
-    "kind",
-    [types.int64, types.Array(types.float64, 2, "C"), types.UniTuple(types.Array(types.int8, 1, "A"), 2)],
+    "kind", [types.int64, types.Array(types.float64, 2, "C"), types.UniTuple(types.Array(types.int8, 1, "A"), 2)]
 )
 def test_only_what_holds_an_array_counts_references(kind: types.Type) -> None:
     models = cpu_target.target_context.data_model_manager

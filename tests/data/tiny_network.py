@@ -21,11 +21,7 @@ def write_network(
     """Write a network; `change` is called with the model before."""
     from onnx import TensorProto, helper, numpy_helper
 
-    numbers = {
-        "bias": np.array([bias], np.float32),
-        "weight": np.array([weight], np.float32),
-        "rows": np.array([1, 1]),
-    }
+    numbers = {"bias": np.array([bias], np.float32), "weight": np.array([weight], np.float32), "rows": np.array([1, 1])}
     nodes = [
         helper.make_node("ReduceMean", ["frame"], ["mean"], keepdims=0),
         helper.make_node("Reshape", ["mean", "rows"], ["row"]),

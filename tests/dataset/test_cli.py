@@ -1,4 +1,4 @@
-"""``fogsim dataset`` in processes of its own."""
+"""``fogsim dataset``, interrupted in a process of its own."""
 
 import json
 import os
@@ -6,24 +6,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from early_motorway import EARLY
 
+from tests.helpers.command import Command
+
 FOGSIM = (sys.executable, "-m", "fogsim", "dataset", "motorway_fog_bank")
 SMALL = ("--set", EARLY, "--set", "camera.width=96", "--set", "camera.height=72", "--visibility", "80")
 
 
-def fogsim(*arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
-    return subprocess.run(
-        [*FOGSIM, *arguments], capture_output=True, text=True, timeout=240, env=environment, check=False
-    )
-
-
-def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: Path) -> None:
+def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: Path, command: Command) -> None:
     out = tmp_path / "out"
     endless = [*FOGSIM, "--out", str(out), "--frames", "100000", *SMALL]
     process = subprocess.Popen(
@@ -41,7 +35,7 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
     there = len(partial["images"])
     assert there >= 3
     assert not list(out.rglob("*.part"))
-    done = fogsim("--out", str(out), "--frames", str(there + 2), *SMALL)
+    done = command("dataset", "motorway_fog_bank", "--out", str(out), "--frames", str(there + 2), *SMALL)
     assert done.returncode == 0, done.stderr
     assert f"{there + 2} frames, 2 of them new" in done.stdout
     assert json.loads((out / "annotations.json").read_text(encoding="utf-8"))["info"]["complete"] is True
@@ -57,7 +51,7 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
     ],
 )
 def test_bad_input_ends_in_one_message_and_writes_nothing(
-    arguments: list[str], message: str, tmp_path: Path, command: Callable[..., "subprocess.CompletedProcess[str]"]
+    arguments: list[str], message: str, tmp_path: Path, command: Command
 ) -> None:
     done = command("dataset", "motorway_fog_bank", "--out", str(tmp_path / "out"), *arguments)
     assert done.returncode == 2

@@ -192,6 +192,7 @@ def test_foreign_files_and_impossible_numbers_are_refused(tmp_path: Path) -> Non
     assert (tmp_path / "thesis.tex").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.nightly
 def test_the_example_of_the_docs_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

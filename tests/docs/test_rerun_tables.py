@@ -84,6 +84,13 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @pytest.fixture
+def docs(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    """Import of a script of docs/."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    return import_module
+
+
+@pytest.fixture
 def root(tmp_path: Path) -> Path:
     """A small checkout with two tables."""
     texts = {
@@ -106,18 +113,43 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def rerun(root: Path) -> Run:
+def rerun(
+    root: Path, docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Run:
     """docs/rerun_tables.py in that checkout, on two cores and with its own measurements."""
+    monkeypatch.chdir(root)
+    monkeypatch.setattr(docs("table_round"), "CORES", 2)
 
-    def run(*arguments: str, measured: tuple[tuple[str, str], ...] = (WIDTH, TWICE), **fields: object) -> Any:
+    def run(*arguments: str, measured: tuple[tuple[str, str], ...] = (WIDTH, TWICE), **fields: Any) -> Any:
+        kind, code = docs("measured_tables").Measurement, None
+        made = tuple(kind(name, (command,), 1.0, ("benchmarks/roads.py",), **fields) for name, command in measured)
+        monkeypatch.setattr(sys, "argv", ["rerun_tables.py", *arguments])
+        capsys.readouterr()
+        try:
+            code = docs("rerun_tables").main(root, made)
+        except SystemExit as end:
+            code = end.code
+        told = capsys.readouterr()
+        # What is no number is a program's last words.
+        words = f"{code}\n" if isinstance(code, str) else ""
+        return subprocess.CompletedProcess(arguments, 1 if words else code, told.out, told.err + words)
+
+    return run
+
+
+@pytest.fixture
+def rerun_alone(root: Path) -> Run:
+    """The same in a process of its own, which its commands may end."""
+
+    def run(measured: tuple[tuple[str, str], ...]) -> Any:
         code = (
             f"import sys; sys.path.insert(0, {str(DOCS)!r}); from pathlib import Path\n"
             "from measured_tables import Measurement; import rerun_tables, table_round; table_round.CORES = 2\n"
-            "made = tuple(Measurement(name, (command,), 1.0, ('benchmarks/roads.py',), "
-            f"**{fields!r}) for name, command in {measured!r})\n"
+            "made = tuple(Measurement(name, (command,), 1.0, ('benchmarks/roads.py',)) "
+            f"for name, command in {measured!r})\n"
             f"sys.exit(rerun_tables.main(Path({str(root)!r}), made))"
         )
-        command = [sys.executable, "-c", code, *arguments]
+        command = [sys.executable, "-c", code]
         # The shell of a command ends its parent, which is not to be the shell of somebody else.
         return subprocess.run(command, cwd=root, capture_output=True, text=True, check=False, timeout=60)
 
@@ -227,16 +259,16 @@ def test_times_and_two_cores_need_the_whole_machine(root: Path, rerun: Run, fiel
     assert rerun("--all", measured=ALONE, cores=1).returncode == 1, "together they are in each other's way"
 
 
-def test_interrupted_commands_leave_their_tables_and_are_resumed(root: Path, rerun: Run) -> None:
+def test_interrupted_commands_leave_their_tables_and_are_resumed(root: Path, rerun_alone: Run) -> None:
     change(root / "fogsim" / "road.py", "3.5", "3.7")
-    done = rerun(measured=(BUSY, STOPS))
+    done = rerun_alone((BUSY, STOPS))
     assert done.returncode == 130, done.stderr
     assert "| any | 3.5 |" in page(root)
     assert "| any | 7.0 |" in page(root)
     assert subprocess.run(["pgrep", "-f", str(root)], check=False, capture_output=True).stdout == b""  # noqa: S607
     kept = root / "runs" / "tables" / "width.kept"
     kept.touch()
-    done = rerun(measured=(BUSY, STOPS))
+    done = rerun_alone((BUSY, STOPS))
     assert done.returncode == 0, done.stderr
     assert kept.exists(), "what a command keeps is its own"
     assert "| any | 3.7 |" in page(root)
@@ -251,13 +283,6 @@ def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> 
     assert done.returncode == 1
     assert "width is being measured by another command" in done.stderr
     assert rerun("width").returncode == 0
-
-
-@pytest.fixture
-def docs(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
-    """Import of a script of docs/."""
-    monkeypatch.syspath_prepend(str(DOCS))
-    return import_module
 
 
 def test_a_forecast_fills_both_cores(docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,8 +1,6 @@
 """The docs say what the code says, and hang together: tables, links, and the files and names that they speak of."""
 
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +11,7 @@ import pytest
 
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim_envs.corridor import FogCorridorEnv
+from tests.helpers.command import run_script
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -55,12 +54,7 @@ def cells(row: str) -> int:
 )
 def test_tables_are_up_to_date(command: tuple[str, ...]) -> None:
     script, *names = command
-    done = subprocess.run(
-        [sys.executable, str(CHECKOUT / "docs" / script), "--check", *names],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_script(CHECKOUT / "docs" / script, "--check", *names)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -156,9 +156,7 @@ def test_time_truncates_and_tells_what_has_not_been_played() -> None:
     assert steps[-1][4]["unplayed"][0].startswith("traffic.events.0 (brake of lead at_time_s=300): its time")
 
 
-def test_rendering_shows_the_frame_beside_a_panel_in_an_array_and_in_a_window(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_rendering_shows_the_frame_beside_a_panel_in_an_array_and_in_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     settings: dict[str, Any] = {**MOTORWAY, "disable_env_checker": True}
     env = gymnasium.make(ID, render_mode="rgb_array", **settings)

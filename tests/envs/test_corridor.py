@@ -22,6 +22,7 @@ from fogsim_envs.corridor.observation import CORRIDOR_FEATURES, RoadKnowledge, l
 from fogsim_envs.corridor.rewards import CorridorReward, lost_share, overdriven
 from fogsim_envs.infos import reward_terms_of
 from fogsim_envs.task import FogDistribution
+from tests.helpers.vehicles import vehicles
 
 SHORT = ("road.length_m=1200", "duration_s=90", "drivers.signs.at_m=[300, 800]")
 FOG = FogDistribution(ahead=(100.0, 400.0), reach=600.0)
@@ -36,23 +37,7 @@ def signs() -> Iterator[FogCorridorEnv]:
 
 
 def _traffic(places: list[float], speeds: list[float], lane: str = "road_0", free: float = 30.0) -> TrafficState:
-    n = len(places)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{row}" for row in range(n)),
-        types=("car",) * n,
-        position=np.array([[x, 0.0, 0.0] for x in places]).reshape(-1, 3),
-        heading=np.zeros(n),
-        speed=np.array(speeds),
-        acceleration=np.zeros(n),
-        length=np.full(n, 4.5),
-        width=np.full(n, 1.8),
-        height=np.full(n, 1.5),
-        lane=(lane,) * n,
-        lamps=np.zeros(n, np.int32),
-        paint=np.zeros((n, 3)),
-        free_speed=np.full(n, free),
-    )
+    return vehicles(places, speed=speeds, size=(4.5, 1.8, 1.5), lane=lane, free_speed=np.full(len(places), free))
 
 
 def _step(traffic: TrafficState, extinction: float = 0.0, waiting: int = 0, hits: int = 0) -> TrafficStep:

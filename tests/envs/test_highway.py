@@ -24,7 +24,7 @@ SMALL: dict[str, Any] = {"config": FEW, "image_size": (64, 48)}
 SLOW, NO_ADVICE = np.array([2, 0]), np.array([12, 0])
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def env() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(ID, **SMALL)
     yield made

@@ -31,6 +31,81 @@ WAY = Way(length=2000.0, limit=36.0, duration=200.0)
 WEIGHTS = TaskWeights()
 
 
+# What has an environment of its own comes before those that share one: next to it, it would run in another process.
+
+
+def test_a_number_is_a_pair_of_levels() -> None:
+    assert gymnasium.make(FAST, discrete=True).action_space == gymnasium.spaces.Discrete(39)
+    found: list[Any] = []
+    for options, actions in (({"discrete": True}, (16, 5)), ({}, ([5, 1], [1, 2]))):
+        with gymnasium.make(FAST, **options) as env:
+            env.reset(seed=2)
+            rewards = [env.step(action)[1] for action in actions]  # type: ignore[arg-type]  # of either kind
+            found.append((rewards, fogsim_envs.evaluate("rule", env, [4]).mean))
+    assert found[0] == found[1]
+
+
+def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:
+    env = gymnasium.make("fogsim/FogAdvisory-v1", image_size=(64, 48), render_mode="rgb_array")
+    observation, _ = env.reset(seed=1, options={"overrides": ["light.illuminance_lx=5000"]})
+    assert env.observation_space.contains(observation)
+    observation, reward, *_, info = env.step(NO_ADVICE)
+    assert env.observation_space.contains(observation)
+    assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    assert observation["camera"].shape == (48, 64, 3)
+    assert info["cost"] >= 0.0
+    picture: Any = env.render()
+    assert picture.ndim == 3
+    # So few pixels tell the estimators nothing.
+    assert [env.step(NO_ADVICE)[-1]["warning"] for _ in range(6)] == [*[""] * 4, *["cannot_see"] * 2]
+    env.close()
+    with pytest.raises(InputError, match=r"did you mean 'state'\?"):
+        gymnasium.make("fogsim/FogAdvisory-v1", observation="states")
+
+
+def test_an_episode_ends_with_a_studys_metrics() -> None:
+    with gymnasium.make(FAST, metrics=True) as env:
+        _, info = env.reset(seed=1, options={"visibility": 100.0})
+        names, over = list(info["metrics"]), False
+        while not over:
+            assert list(info["metrics"]) == names
+            assert all(math.isnan(value) for value in info["metrics"].values())
+            _, _, terminated, truncated, info = env.step(NO_ADVICE)
+            over = terminated or truncated
+        found = info["metrics"]
+        assert list(found) == names
+        assert found["duration_s"] == info["time_s"]
+        assert found["ego_collisions"] == 0.0
+        assert found["minimum_visibility_m"] == pytest.approx(100.0, rel=0.02)
+        assert math.isnan(found["mean_advised_speed_mps"])
+        rule = fogsim_envs.evaluate("rule", env, [1, 2])
+    mean, low, high = rule.metrics["mean_speed_mps"]
+    assert low <= mean <= high
+    assert mean == pytest.approx(np.mean([episode.metrics["mean_speed_mps"] for episode in rule.episodes]))
+
+
+def test_baselines_are_evaluated() -> None:
+    found = fogsim_envs.evaluate("oracle", FAST, seeds=range(2), discount=0.99)
+    assert len(found.episodes) == 2
+    assert found.low <= found.mean <= found.high
+    assert "episodes" in str(found)
+    seen = []
+
+    def spy(observation: Any, info: dict[str, Any]) -> Any:
+        seen.append(info["built_in_advice_mps"])
+        return NO_ADVICE
+
+    assert fogsim_envs.evaluate(spy, FAST, seeds=[0]).episodes[0].steps == len(seen)
+    shifted = [dataclasses.replace(one, value=one.value - 2.0) for one in found.episodes]
+    assert found.minus(dataclasses.replace(found, episodes=tuple(shifted))) == pytest.approx((2.0, 2.0, 2.0))
+    with pytest.raises(InputError, match=r"of the seeds \[0, 1\], got \[0\]"):
+        found.minus(dataclasses.replace(found, episodes=found.episodes[:1]))
+    with pytest.raises(InputError, match="did you mean 'oracle'"):
+        fogsim_envs.evaluate("oracles", FAST, seeds=[0])
+    with pytest.raises(InputError, match="at least one"):
+        fogsim_envs.evaluate("none", FAST, seeds=[])
+
+
 @pytest.fixture(scope="module")
 def fast() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(FAST, render_mode="rgb_array")
@@ -62,18 +137,6 @@ def test_gymnasiums_checker_finds_nothing(fast: gymnasium.Env[Any, Any]) -> None
     check_env(fast.unwrapped, skip_render_check=True)
 
 
-def test_a_number_is_a_pair_of_levels(fast: gymnasium.Env[Any, Any]) -> None:
-    rewards: list[list[Any]] = []
-    with gymnasium.make(FAST, discrete=True) as flat:
-        assert flat.action_space == gymnasium.spaces.Discrete(39)
-        for env, actions in ((flat, (16, 5)), (fast, ([5, 1], [1, 2]))):
-            env.reset(seed=2)
-            rewards.append([env.step(action)[1] for action in actions])
-        assert rewards[0] == rewards[1]
-        rule = fogsim_envs.evaluate("rule", flat, [4])
-    assert rule.mean == fogsim_envs.evaluate("rule", fast, [4]).mean
-
-
 def test_every_version_1_takes_the_same_keywords() -> None:
     keywords = {
         name: set(inspect.signature(_class_of(name)).parameters)
@@ -88,24 +151,6 @@ def test_every_version_1_takes_the_same_keywords() -> None:
 def _class_of(name: str) -> Any:
     module, _, own = str(gymnasium.spec(name).entry_point).partition(":")
     return getattr(importlib.import_module(module), own)
-
-
-def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:
-    env = gymnasium.make("fogsim/FogAdvisory-v1", image_size=(64, 48), render_mode="rgb_array")
-    observation, _ = env.reset(seed=1, options={"overrides": ["light.illuminance_lx=5000"]})
-    assert env.observation_space.contains(observation)
-    observation, reward, *_, info = env.step(NO_ADVICE)
-    assert env.observation_space.contains(observation)
-    assert reward == pytest.approx(sum(info["reward_terms"].values()))
-    assert observation["camera"].shape == (48, 64, 3)
-    assert info["cost"] >= 0.0
-    picture: Any = env.render()
-    assert picture.ndim == 3
-    # So few pixels tell the estimators nothing.
-    assert [env.step(NO_ADVICE)[-1]["warning"] for _ in range(6)] == [*[""] * 4, *["cannot_see"] * 2]
-    env.close()
-    with pytest.raises(InputError, match=r"did you mean 'state'\?"):
-        gymnasium.make("fogsim/FogAdvisory-v1", observation="states")
 
 
 @pytest.mark.parametrize("name", ["FogAdvisory", "FogAdvisoryFast", "FogDrive", "FogHighway"])
@@ -343,46 +388,3 @@ def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, An
     assert isinstance(picture, np.ndarray)
     assert picture.shape == (480, 1024, 3)
     assert picture.std() > 5.0
-
-
-def test_an_episode_ends_with_a_studys_metrics() -> None:
-    with gymnasium.make(FAST, metrics=True) as env:
-        _, info = env.reset(seed=1, options={"visibility": 100.0})
-        names, over = list(info["metrics"]), False
-        while not over:
-            assert list(info["metrics"]) == names
-            assert all(math.isnan(value) for value in info["metrics"].values())
-            _, _, terminated, truncated, info = env.step(NO_ADVICE)
-            over = terminated or truncated
-        found = info["metrics"]
-        assert list(found) == names
-        assert found["duration_s"] == info["time_s"]
-        assert found["ego_collisions"] == 0.0
-        assert found["minimum_visibility_m"] == pytest.approx(100.0, rel=0.02)
-        assert math.isnan(found["mean_advised_speed_mps"])
-        rule = fogsim_envs.evaluate("rule", env, [1, 2])
-    mean, low, high = rule.metrics["mean_speed_mps"]
-    assert low <= mean <= high
-    assert mean == pytest.approx(np.mean([episode.metrics["mean_speed_mps"] for episode in rule.episodes]))
-
-
-def test_baselines_are_evaluated() -> None:
-    found = fogsim_envs.evaluate("oracle", FAST, seeds=range(2), discount=0.99)
-    assert len(found.episodes) == 2
-    assert found.low <= found.mean <= found.high
-    assert "episodes" in str(found)
-    seen = []
-
-    def spy(observation: Any, info: dict[str, Any]) -> Any:
-        seen.append(info["built_in_advice_mps"])
-        return NO_ADVICE
-
-    assert fogsim_envs.evaluate(spy, FAST, seeds=[0]).episodes[0].steps == len(seen)
-    shifted = [dataclasses.replace(one, value=one.value - 2.0) for one in found.episodes]
-    assert found.minus(dataclasses.replace(found, episodes=tuple(shifted))) == pytest.approx((2.0, 2.0, 2.0))
-    with pytest.raises(InputError, match=r"of the seeds \[0, 1\], got \[0\]"):
-        found.minus(dataclasses.replace(found, episodes=found.episodes[:1]))
-    with pytest.raises(InputError, match="did you mean 'oracle'"):
-        fogsim_envs.evaluate("oracles", FAST, seeds=[0])
-    with pytest.raises(InputError, match="at least one"):
-        fogsim_envs.evaluate("none", FAST, seeds=[])

@@ -42,11 +42,7 @@ def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
         (f"{ESTIMATE} <&- >&- 2>&-", 0, ""),
         ("-m fogsim validate nowhere.yaml 2>/dev/full", 2, ""),
         ("-m fogsim --help | head -c 0", 1, ""),
-        (
-            "-m fogsim --version >/dev/full",
-            2,
-            FULL,
-        ),
+        ("-m fogsim --version >/dev/full", 2, FULL),
     ],
 )
 def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(

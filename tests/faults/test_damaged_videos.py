@@ -3,18 +3,16 @@
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.offline import find_source
 from fogsim.recorders.video import ffmpeg_program
+from tests.helpers.command import Command
 
 CAMERA = """\
 width: 80
@@ -26,7 +24,6 @@ pitch_deg: 0
 response: srgb
 """
 VARIABLE_RATE = ("-vf", "select='not(eq(mod(n,5),2))'", "-fps_mode", "vfr")
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -50,21 +47,6 @@ def videos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def fogsim(videos: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run a command in this process: gives exit code, stdout and stderr."""
-    monkeypatch.chdir(videos)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out, told.err
-
-    return run
-
-
 @pytest.mark.parametrize(("name", "frames"), [("whole.mp4", 30), ("whole.mkv", 30), ("variable.mp4", 24)])
 def test_a_whole_video_has_no_warning(videos: Path, name: str, frames: int) -> None:
     pictures = list(find_source(videos / name).pictures())
@@ -73,8 +55,10 @@ def test_a_whole_video_has_no_warning(videos: Path, name: str, frames: int) -> N
 
 
 @pytest.mark.parametrize("name", ["cut.mkv", "cut.avi", "flipped.avi"])
-def test_what_was_read_of_a_damaged_video_is_estimated(fogsim: Run, name: str) -> None:
-    code, out, err = fogsim("estimate", name, "--camera", "camera.yaml", "--method", "negru2013", "--json")
+def test_what_was_read_of_a_damaged_video_is_estimated(command: Command, videos: Path, name: str) -> None:
+    code, out, err = command(
+        *("estimate", name, "--camera", "camera.yaml", "--method", "negru2013", "--json"), cwd=videos
+    )
     records = [json.loads(line) for line in out.splitlines()]
     read = len(records) - 1
     assert code == 2
@@ -83,11 +67,13 @@ def test_what_was_read_of_a_damaged_video_is_estimated(fogsim: Run, name: str) -
     assert f"{name}: the video is cut off or damaged: {read} " in err
 
 
-@pytest.mark.parametrize("command", ["fog", "restore"])
-def test_what_was_read_of_a_damaged_video_is_written(fogsim: Run, tmp_path: Path, command: str) -> None:
+@pytest.mark.parametrize("name", ["fog", "restore"])
+def test_what_was_read_of_a_damaged_video_is_written(command: Command, videos: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "out.mp4"
-    road = ("--road-plane",) if command == "fog" else ()
-    code, _, err = fogsim(command, "cut.mkv", "--camera", "camera.yaml", "--visibility", "60", "--out", str(out), *road)
+    road = ("--road-plane",) if name == "fog" else ()
+    code, _, err = command(
+        *(name, "cut.mkv", "--camera", "camera.yaml", "--visibility", "60", "--out", str(out)), *road, cwd=videos
+    )
     assert code == 2
     assert "cut.mkv: the video is cut off or damaged: " in err
     assert f"{out} has what could be read" in err
@@ -124,14 +110,14 @@ PLACES: dict[str, tuple[str, ...]] = {
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.timeout(60)
 def test_a_pipe_is_refused_and_not_waited_for(
-    fogsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Image.fromarray(np.zeros((60, 80), np.uint8)).save("photo.png")
     Path("camera.yaml").write_text(CAMERA)
     for ending in ("png", "mp4", "yaml", "npy"):
         os.mkfifo(f"pipe.{ending}")
-    code, _, err = fogsim(*PLACES[place])
+    code, _, err = command(*PLACES[place])
     assert code == 2
     assert "regular file" in err
     assert "Traceback" not in err

@@ -11,7 +11,7 @@ from pyarrow import ipc, parquet
 from tests.faults.conftest import Nursery
 from tests.faults.steps import STEPS
 
-MOMENTS = 20
+MOMENTS = 10
 LONGEST = 0.4
 """Time within which a signal comes [s]; a command takes about as long on a quiet machine. What must hold holds at any
 moment, so that no verdict depends on it."""
@@ -122,7 +122,7 @@ def test_a_run_that_is_told_to_end_is_partial_at_any_moment(nursery: Nursery, tm
 
 
 def test_an_overwriting_run_that_is_ended_leaves_the_old_results_or_its_own(nursery: Nursery, tmp_path: Path) -> None:
-    for attempt, moment in enumerate(moments(5)[:8]):
+    for attempt, moment in enumerate(moments(5)[:5]):
         out = tmp_path / str(attempt)
         earlier_results(out)
         nursery.run(command(out, "--overwrite"), signals=[(moment, int(signal.SIGTERM))])

@@ -46,10 +46,7 @@ KINDS: dict[str, tuple[Callable[[str], bytes], str]] = {
     "truncated": (lambda root: f'<{root} version="1.9">\n'.encode(), ":2: not XML: "),
     "deep": (lambda root: f'<{root} version="1.9">'.encode() + b"<a>" * 60_000, "more than 100 elements inside one"),
     "entities": (lambda root: f'<!DOCTYPE a [<!ENTITY a "a">]><{root}/>'.encode(), ":1: a document type .*not read"),
-    "many attributes": (
-        lambda root: f"<{root} {MANY}/>".encode(),
-        ":1: an element has more than 1000 attributes",
-    ),
+    "many attributes": (lambda root: f"<{root} {MANY}/>".encode(), ":1: an element has more than 1000 attributes"),
     "unknown encoding": (lambda root: f'<?xml version="1.0" encoding="klingon"?><{root}/>'.encode(), "'klingon'"),
     "no encoding of text": (lambda root: f'<?xml version="1.0" encoding="rot13"?><{root}/>'.encode(), "'rot13'"),
     "another encoding": (lambda root: f'<?xml version="1.0" encoding="utf-16"?><{root}/>'.encode(), "encoding utf-16"),

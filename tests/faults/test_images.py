@@ -5,21 +5,19 @@ import json
 import pickle
 import struct
 import subprocess
-import sys
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.offline import find_source
 from fogsim.offline.image_files import DepthMap, read_distance, read_image
 from fogsim.recorders.video import ffmpeg_program
 from fogsim.values import Camera
+from tests.helpers.command import Command
 
 ROWS, COLS = 60, 80
 CAMERA = Camera(COLS, ROWS, 70.0, (39.5, 29.5), 1.3)
@@ -76,22 +74,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.fixture
-def fogsim(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple]:
-    """Run a command in this process: gives exit code, stdout and stderr."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out, told.err
-
-    return run
-
-
 @pytest.mark.parametrize("as_json", [True, False])
-def test_a_folder_goes_on_past_broken_images_and_lists_them_at_the_end(fogsim, folder: Path, as_json: bool) -> None:
+def test_a_folder_goes_on_past_broken_images_and_lists_them_at_the_end(
+    command: Command, folder: Path, as_json: bool
+) -> None:
     (folder / "drive").mkdir()
     for name, data in BROKEN.items():
         (folder / "drive" / name).write_bytes(data)
@@ -99,7 +85,7 @@ def test_a_folder_goes_on_past_broken_images_and_lists_them_at_the_end(fogsim, f
     for name in ("0.png", "z.png"):
         (folder / "drive" / name).write_bytes(picture("PNG"))
     options = ("--camera", "camera.yaml", "--method", "negru2013", *(["--json"] if as_json else []))
-    code, out, err = fogsim("estimate", "drive", *options)
+    code, out, err = command("estimate", "drive", *options)
     assert code == 2
     assert "Traceback" not in err
     last = err[err.index("error: 10 of the images could not be used:") :].splitlines()
@@ -118,7 +104,7 @@ def test_what_is_broken_is_told_in_one_line(tmp_path: Path) -> None:
         assert len(str(told.value).splitlines()) == 1
 
 
-def test_the_end_of_a_video_that_is_cut_off_is_told(fogsim, folder: Path) -> None:
+def test_the_end_of_a_video_that_is_cut_off_is_told(command: Command, folder: Path) -> None:
     """An index at the file's beginning announces all of its frames."""
     source = ["-f", "lavfi", "-i", "testsrc=size=80x60:rate=10:duration=6"]
     whole = folder / "whole.mp4"
@@ -129,7 +115,7 @@ def test_the_end_of_a_video_that_is_cut_off_is_told(fogsim, folder: Path) -> Non
     pictures = list(find_source(whole).pictures())
     assert len(pictures) == 60
     assert not pictures[-1].error
-    code, out, err = fogsim("estimate", "cut.mp4", "--camera", "camera.yaml", "--method", "negru2013", "--json")
+    code, out, err = command("estimate", "cut.mp4", "--camera", "camera.yaml", "--method", "negru2013", "--json")
     assert code == 2
     records = [json.loads(line) for line in out.splitlines()]
     read = len(records) - 1
@@ -181,12 +167,12 @@ def test_a_depth_map_larger_than_memory_is_told(tmp_path: Path) -> None:
         read_distance(DepthMap(path, "planar"), CAMERA)
 
 
-def test_fog_with_a_depth_map_that_is_none_writes_nothing(fogsim, folder: Path) -> None:
+def test_fog_with_a_depth_map_that_is_none_writes_nothing(command: Command, folder: Path) -> None:
     (folder / "photo.png").write_bytes(picture("PNG"))
     (folder / "depth.npy").write_bytes(DEPTHS["objects"])
     before = sorted(folder.iterdir())
     out = ("--visibility", "100", "--depth-kind", "range", "--out", "fogged.png")
-    code, _, err = fogsim("fog", "photo.png", "--depth", "depth.npy", "--camera", "camera.yaml", *out)
+    code, _, err = command("fog", "photo.png", "--depth", "depth.npy", "--camera", "camera.yaml", *out)
     assert code == 2
     assert "depth.npy: cannot be read as an array of numbers" in err
     assert "response is not given: srgb is assumed" in err
@@ -238,12 +224,14 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("kind", COMMANDS)
 @pytest.mark.parametrize("name", [*READABLE, *UNREADABLE])
-def test_an_image_of_any_kind_is_read_or_named_in_one_line(fogsim, folder: Path, name: str, command: str) -> None:
+def test_an_image_of_any_kind_is_read_or_named_in_one_line(
+    command: Command, folder: Path, name: str, kind: str
+) -> None:
     (folder / name).write_bytes({**READABLE, **UNREADABLE}[name])
     np.save(folder / "depth.npy", np.full((ROWS, COLS), 50.0))
-    code, _, err = fogsim(command.split(maxsplit=1)[0], name, "--camera", "camera.yaml", *COMMANDS[command])
+    code, _, err = command(kind.split(maxsplit=1)[0], name, "--camera", "camera.yaml", *COMMANDS[kind])
     assert "Traceback" not in err
     if name in READABLE:
         assert code == 0, err
@@ -262,24 +250,24 @@ SMALL_COMMANDS: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.parametrize("command", SMALL_COMMANDS)
+@pytest.mark.parametrize("kind", SMALL_COMMANDS)
 @pytest.mark.parametrize("size", [(1, 1), (2, 2), (3, 3), (1, 1000), (1000, 1)])
-def test_a_tiny_image_is_worked_on(fogsim, folder: Path, size: tuple[int, int], command: str) -> None:
+def test_a_tiny_image_is_worked_on(command: Command, folder: Path, size: tuple[int, int], kind: str) -> None:
     rows, cols = size
     Image.fromarray(np.random.default_rng(3).integers(0, 255, (rows, cols, 3), np.uint8)).save(folder / "tiny.png")
     np.save(folder / "depth.npy", np.full(size, 50.0))
     text = CAMERA_YAML.replace("80", str(cols)).replace("60", str(rows))
     (folder / "tiny.yaml").write_text(text.replace("[39.5, 29.5]", f"[{cols / 2}, {rows / 2}]"), encoding="utf-8")
-    code, _, err = fogsim(command.split(maxsplit=1)[0], "tiny.png", "--camera", "tiny.yaml", *SMALL_COMMANDS[command])
+    code, _, err = command(kind.split(maxsplit=1)[0], "tiny.png", "--camera", "tiny.yaml", *SMALL_COMMANDS[kind])
     assert code == 0, err
 
 
 @pytest.mark.parametrize("subject", [pytest.param("signs", marks=pytest.mark.nightly), "halos"])
-def test_a_camera_of_one_pixel_cannot_be_calibrated(fogsim, folder: Path, subject: str) -> None:
+def test_a_camera_of_one_pixel_cannot_be_calibrated(command: Command, folder: Path, subject: str) -> None:
     text = CAMERA_YAML.replace("80", "1").replace("60", "1").replace("[39.5, 29.5]", "[0, 0]")
     (folder / "tiny.yaml").write_text(text, encoding="utf-8")
     few = {"signs": ("--approaches", "4"), "halos": ("--scenes", "4")}
-    code, _, err = fogsim("calibrate", subject, "--camera", "tiny.yaml", *few[subject])
+    code, _, err = command("calibrate", subject, "--camera", "tiny.yaml", *few[subject])
     assert code == 2
     assert "Traceback" not in err
     assert len([line for line in err.splitlines() if line.startswith("error: ")]) == 1

@@ -95,10 +95,7 @@ def test_times_bounds_and_names_that_decide_nothing(tmp_path: Path) -> None:
         ),
         ("{always: time <= 2 s}", "this cannot fail: time <= 2 s is always true"),
         ("{always: ego.speed >= 0 or ego.collision}", "this cannot fail"),
-        (
-            "{metric: traffic_fog_time_share <= 150 %}",
-            "this cannot fail: traffic_fog_time_share is at least 0 %",
-        ),
+        ("{metric: traffic_fog_time_share <= 150 %}", "this cannot fail: traffic_fog_time_share is at least 0 %"),
         ("{metric: traffic_fog_time_share > 100 %}", "this cannot pass"),
         ("{metric: traffic_fog_time_share < -0.1}", "this cannot pass"),
         ("{never: ego.leader == parkd}", "there is no vehicle 'parkd' in"),

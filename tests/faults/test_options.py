@@ -1,7 +1,6 @@
 """Options with numbers that are none or out of range, and empty paths: refused by name, in every command."""
 
 import math
-import sys
 from collections.abc import Callable, Iterator
 from inspect import signature
 from pathlib import Path
@@ -12,6 +11,7 @@ import typer
 from typer.models import OptionInfo
 
 from fogsim.cli import app
+from tests.helpers.command import Command
 
 
 def options(group: typer.Typer, *before: str) -> Iterator[tuple[tuple[str, ...], str, set[Any], float | None]]:
@@ -41,18 +41,15 @@ ARGUMENTS = [((name,), "", "") for name in ("run", "estimate", "restore", "signs
 
 
 @pytest.fixture
-def refusal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
+def refusal(command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., str]:
     """Run a command that must be refused as bad input, and write nothing: gives stderr."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "300")
 
     def run(*arguments: str) -> str:
-        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        assert ended.value.code == 2
+        done = command(*arguments)
+        assert done.returncode == 2
         assert not list(tmp_path.iterdir())
-        return capsys.readouterr().err
+        return done.stderr
 
     return run
 

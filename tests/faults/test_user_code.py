@@ -2,9 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -17,8 +15,8 @@ from fogsim.simulation import chosen_methods
 from fogsim.study.execution import run_to_file
 from fogsim.testing.execution import ThisProcess
 from fogsim.values.image import for_kernels
+from tests.helpers.command import Command
 
-Command = Callable[..., "CompletedProcess[str]"]
 ROOT = Path(__file__).parents[2]
 
 MINE = """

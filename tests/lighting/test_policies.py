@@ -13,15 +13,7 @@ from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014, settled
 from fogsim.lighting.legal import LAWS, LegalRules
 from fogsim.lighting.optimiser import SightOptimiser, glare_dealt
 from fogsim.lighting.own_sight import FARTHEST, headlamp_sight_distance, own_veil
-from fogsim.values import (
-    Belief,
-    Lamp,
-    LampChoice,
-    LampWish,
-    LeadMeasurement,
-    LightMeasurement,
-    Observation,
-)
+from fogsim.values import Belief, Lamp, LampChoice, LampWish, LeadMeasurement, LightMeasurement, Observation
 from tests.lighting.test_rules import believe
 
 LOW = Lamp.POSITION | Lamp.LOW_BEAM

@@ -9,28 +9,15 @@ from numpy.typing import NDArray
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.values import Cohort, Collision, TrafficState
+from tests.helpers.vehicles import vehicles
 from tests.recorders.synthetic import make_step
 
 
-def lanes(*vehicles: tuple[str, float, float], heading: float = 0.0) -> TrafficState:
+def lanes(*cars: tuple[str, float, float], heading: float = 0.0) -> TrafficState:
     """Vehicles of 5 m by lane, place of the front bumper along the road [m], and speed [m/s]."""
-    n = len(vehicles)
-    along = np.array([v[1] for v in vehicles], dtype=np.float64)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{i}" for i in range(n)),
-        types=("car",) * n,
-        position=np.stack((along * np.cos(heading), along * np.sin(heading), np.zeros(n)), axis=-1),
-        heading=np.full(n, heading),
-        speed=np.array([v[2] for v in vehicles], dtype=np.float64),
-        acceleration=np.zeros(n),
-        length=np.full(n, 5.0),
-        width=np.full(n, 1.8),
-        height=np.full(n, 1.5),
-        lane=tuple(v[0] for v in vehicles),
-        lamps=np.zeros(n, np.int32),
-        paint=np.full((n, 3), 0.5),
-    )
+    lane, along, speed = zip(*cars, strict=True) if cars else ((), (), ())
+    places = np.outer(along, (np.cos(heading), np.sin(heading), 0.0))
+    return vehicles(places, heading=heading, speed=speed, size=(5.0, 1.8, 1.5), lane=lane)
 
 
 def watched(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -40,7 +41,7 @@ class Drive:
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     """``images/000.png`` …, ``drive.mp4`` and ``camera.yaml`` in a folder that no test may change."""
     folder = tmp_path_factory.mktemp("drive")
-    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={VISIBILITY}", "duration_s=0.7"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [EARLY, f"fog.visibility_m={VISIBILITY}", "duration_s=0.7"])
     observations = [step.observation for step in fogsim.run(scenario, seed=1)]
     seen = [one.frame for one in observations]
     frames, camera = tuple(frame.image for frame in seen), seen[0].camera

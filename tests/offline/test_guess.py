@@ -35,8 +35,7 @@ def test_the_pitch_comes_from_the_lines_of_the_road(drive) -> None:
 def test_a_guessed_camera_is_good_enough_to_estimate_with(drive, tmp_path: Path) -> None:
     source = find_source(drive.folder / "drive.mp4")
     write_camera(
-        tmp_path / "camera.yaml",
-        guess_camera(source, mount_height=HEIGHT, field_of_view=true_field_of_view(drive)),
+        tmp_path / "camera.yaml", guess_camera(source, mount_height=HEIGHT, field_of_view=true_field_of_view(drive))
     )
     camera = load_camera(tmp_path / "camera.yaml")
     estimates = [result.estimates[0] for result in estimate_images(drive.folder / "images", camera, "joint_road")]

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +20,7 @@ from fogsim.offline.camera_file import Calibration, load_calibration, load_camer
 from fogsim.render import make_renderer
 from fogsim.scene import build_scene
 from fogsim.values import Camera, CameraPose, Observation, Response, SignMap
+from tests.helpers.command import Command
 
 CAMERA = Camera(640, 480, 577.0, (322.0, 236.0), 1.38, math.radians(2.0), response=Response.LINEAR)
 BARREL = (-0.32, 0.09, 0.0011, -0.0007)
@@ -234,14 +233,12 @@ def test_a_guess_says_which_yaw_it_would_be(draw: Draw, tmp_path: Path) -> None:
     assert float(told.partition("yaw_deg: ")[2].partition("`")[0]) == pytest.approx(6.0, abs=0.3)
 
 
-def test_the_command_straightens(draw: Draw, tmp_path: Path) -> None:
+def test_the_command_straightens(draw: Draw, tmp_path: Path, command: Command) -> None:
     """A camera 20° aside: told so, the method sees the road's fog, and the overlay shows the straightened image."""
     calibration = written(tmp_path, "yaw_deg: 20\n")
     Image.fromarray(draw(CAMERA, math.radians(20.0))).save(tmp_path / "a.png")
     asked = ["a.png", "--camera", "camera.yaml", "--method", "negru2013", "--json", "--overlay", "found.png"]
-    done = subprocess.run(
-        [sys.executable, "-m", "fogsim", "estimate", *asked], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = command("estimate", *asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["visibility_m"] == pytest.approx(VISIBILITY, rel=0.05)
     with Image.open(tmp_path / "a.png") as picture:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.offline import find_source, guess_camera
@@ -13,7 +14,7 @@ from fogsim.offline.drive.road_scale import RoadMotion
 
 @pytest.fixture(scope="module")
 def steps():
-    scenario = fogsim.load_scenario("motorway_fog_bank", ["fog.visibility_m=120", "duration_s=1.5"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [EARLY, "fog.visibility_m=120", "duration_s=1.5"])
     return [(step.observation.frame, step.observation.speed) for step in fogsim.run(scenario, seed=1)]
 
 

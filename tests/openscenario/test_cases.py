@@ -14,10 +14,7 @@ from fogsim.cli.app import app
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.scenario.schema import Scenario
-from fogsim.values import Step
-
-CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+from tests.openscenario.writing import CASES, QUIET, motion, run
 
 
 def _changed(tmp_path: Path, name: str, *texts: tuple[str, str]) -> Path:
@@ -36,24 +33,15 @@ def _loaded(file: Path) -> Scenario:
         return fogsim.load_scenario(file, QUIET)
 
 
-def _run(file: Path, seconds: float) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario(file, [*QUIET, f"duration_s={seconds}"])))
-
-
-def _x_and_speed(step: Step, vehicle: str) -> tuple[float, float]:
-    row = step.traffic.ids.index(vehicle)
-    return float(step.traffic.position[row, 0]), float(step.traffic.speed[row])
-
-
 def test_a_declaration_uses_those_before_it() -> None:
-    (step,) = _run(CASES / "chain_of_parameters.xosc", 0.1)[:1]
-    (ego, speed), (lead, _) = (_x_and_speed(step, name) for name in ("Ego", "Lead"))
+    (step,) = run(CASES / "chain_of_parameters.xosc", "duration_s=0.1")[:1]
+    (ego, speed), (lead, _) = (motion(step, name)[::2] for name in ("Ego", "Lead"))
     assert (speed, lead - ego) == (pytest.approx(20.0), pytest.approx(60.0, abs=0.01))
 
 
 def test_pi_is_known_in_expressions(tmp_path: Path) -> None:
     file = _changed(tmp_path, "chain_of_parameters", ("${$SpeedKmh / 3.6}", "${10 * sqrt(pi * 4 / pi)}"))
-    assert _x_and_speed(_run(file, 0.1)[0], "Ego")[1] == pytest.approx(20.0)
+    assert motion(run(file, "duration_s=0.1")[0], "Ego")[2] == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize(
@@ -98,8 +86,7 @@ def test_a_line_in_a_message_is_no_emoji(tmp_path: Path) -> None:
 
 
 def test_an_act_with_empty_triggers_begins_at_once_and_is_not_stopped() -> None:
-    run = _run(CASES / "empty_triggers.xosc", 5.0)
-    speeds = [_x_and_speed(step, "Lead")[1] for step in run]
+    speeds = [motion(step, "Lead")[2] for step in run(CASES / "empty_triggers.xosc", "duration_s=5.0")]
     assert speeds[30] == pytest.approx(speeds[0], abs=0.5)
     assert speeds[-1] < speeds[0] - 5.0
 
@@ -119,10 +106,7 @@ def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        ("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"),
-    ],
+    ("name", "told"), [("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic")]
 )
 def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
@@ -196,7 +180,7 @@ def test_files_of_carla_have_their_own_axes(tmp_path: Path) -> None:
     )
     file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), *texts)
     with pytest.warns(LeftOutWarning, match="read as the share"):
-        step = _run(file, 0.1)[0]
+        step = run(file, "duration_s=0.1")[0]
     assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.7, -1.3], abs=0.01)
 
 
@@ -214,8 +198,8 @@ def test_an_initial_distance_is_a_place(tmp_path: Path, begins: tuple[float, flo
             _loaded(file)
         return
     # 2 s at 15 m/s between bumpers.
-    step = _run(file, 3.0)[-1]
-    assert _x_and_speed(step, "Lead") == pytest.approx((begins[1] + 15.0 * step.time, 15.0), abs=0.1)
+    step = run(file, "duration_s=3.0")[-1]
+    assert motion(step, "Lead")[::2] == pytest.approx((begins[1] + 15.0 * step.time, 15.0), abs=0.1)
 
 
 def test_two_actions_of_an_event_on_the_same_motion_are_refused(tmp_path: Path) -> None:
@@ -238,13 +222,13 @@ def test_a_relative_speed_is_kept_while_the_other_changes_its_own(tmp_path: Path
             ('<AbsoluteTargetSpeed value="$Speed"/>', relative.format(continuous)),
             ('laneId="-1" s="30"', 'laneId="1" s="700"'),
         )
-        steps = _run(file, 12.0)
-        assert _x_and_speed(steps[0], "Ego")[1] == pytest.approx(23.0)
-        assert _x_and_speed(steps[-1], "Ego")[1] == pytest.approx(after, abs=0.2)
+        steps = run(file, "duration_s=12.0")
+        assert motion(steps[0], "Ego")[2] == pytest.approx(23.0)
+        assert motion(steps[-1], "Ego")[2] == pytest.approx(after, abs=0.2)
 
 
 def test_fog_thickens_in_steps() -> None:
-    steps = _run(CASES / "fog_thickens_in_steps.xosc", 8.0)
+    steps = run(CASES / "fog_thickens_in_steps.xosc", "duration_s=8.0")
     seen = [float(step.truth.visibility) for step in steps]
     changes = [(steps[i].time, seen[i]) for i in range(1, len(steps)) if not np.isclose(seen[i], seen[i - 1])]
     assert [visibility for _, visibility in changes] == pytest.approx([1000.0, 500.0, 250.0, 100.0])
@@ -269,7 +253,7 @@ def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position:
         ),
         ('<LanePosition roadId="7" laneId="-1" s="90">\n</LanePosition>', position),
     )
-    assert _x_and_speed(_run(file, 0.1)[0], "Lead")[0] == pytest.approx(x, abs=0.1)
+    assert motion(run(file, "duration_s=0.1")[0], "Lead")[0] == pytest.approx(x, abs=0.1)
 
 
 @pytest.mark.parametrize(

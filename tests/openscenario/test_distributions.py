@@ -14,9 +14,7 @@ from fogsim.scenario import Scenario
 from fogsim.scenario.loading import load_cases, load_scenario
 from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.testing.collection import collect
-
-DATA = Path(__file__).parents[1] / "data" / "openscenario"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+from tests.openscenario.writing import DATA, QUIET
 
 
 @pytest.fixture

@@ -120,6 +120,7 @@ def test_every_attribute_that_is_honoured_changes_the_scenario(tmp_path: Path, c
                 for node.attributes[key] in _others(kept):
                     if _read(tmp_path, name, root) != plain:
                         unshown.discard((node.tag, key))
+                        break
                 node.attributes[key] = kept
         assert plain == _read(tmp_path, name, root) is not None
     assert unshown == set()

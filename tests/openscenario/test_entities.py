@@ -10,37 +10,30 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 from fogsim.values.scene import Instance
-from tests.openscenario.writing import CAR, after, box, event, lane, speed, write
+from tests.openscenario.writing import CAR, after, begun, box, event, first_step, lane, over, row_of, run, speed, write
 
-QUIET = ["renderer=none", "estimators=[]"]
 CARGO = box("MiscObject", "obstacle", 1.0, 1.5, 1.0)
 PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
 
 
 def _run(file: Path, *settings: str) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario(file, [*QUIET, *settings])))
-
-
-def _row(step: Step, name: str) -> int:
-    row = step.traffic.row(name)
-    assert row is not None
-    return row
+    return run(file, "drivers.see_through_fog=false", *settings)
 
 
 def test_a_box_is_where_the_file_has_it_and_the_driver_stops_before_it(tmp_path: Path) -> None:
     begin = {"Ego": f"{lane(30)}\n{speed(15)}", "Box": lane(250)}
     steps = _run(write(tmp_path, {"Ego": CAR, "Box": CARGO}, begin, stop=after(30)))
-    traffic, row = steps[0].traffic, _row(steps[0], "Box")
+    traffic, row = steps[0].traffic, row_of(steps[0], "Box")
     # Its middle at 250 m; positions are those of the front.
     assert traffic.position[row, :2] == pytest.approx((250.5, -1.75), abs=0.01)
     assert (traffic.length[row], traffic.width[row], traffic.height[row]) == (1.0, 1.5, 1.0)
     assert traffic.types[row] == "box"
     last = steps[-1].traffic
-    front = float(last.position[_row(steps[-1], "Ego"), 0])
+    front = float(last.position[row_of(steps[-1], "Ego"), 0])
     assert 240.0 < front < 249.5
-    assert float(last.speed[_row(steps[-1], "Ego")]) < 0.1
-    assert float(last.speed[_row(steps[-1], "Box")]) == 0.0
-    assert int(last.lamps[_row(steps[-1], "Box")]) == 0
+    assert float(last.speed[row_of(steps[-1], "Ego")]) < 0.1
+    assert float(last.speed[row_of(steps[-1], "Box")]) == 0.0
+    assert int(last.lamps[row_of(steps[-1], "Box")]) == 0
 
 
 def test_who_drives_too_fast_in_dense_fog_hits_the_box(tmp_path: Path) -> None:
@@ -55,7 +48,7 @@ def test_boxes_and_persons_are_drawn_where_they_are(tmp_path: Path, thing: str, 
     file = write(tmp_path, {"Ego": CAR, "It": thing}, {"Ego": f"{lane(30)}\n{speed(5)}", "It": lane(50)}, stop=after(1))
     settings = ["renderer=cpu", "camera.width=320", "camera.height=240"]
     step = next(iter(fogsim.run(fogsim.load_scenario(file, settings))))
-    row = _row(step, "It")
+    row = row_of(step, "It")
     number = int(Instance.FIRST_VEHICLE) + row if instance is None else instance
     seen = np.argwhere(step.view.instance == number)
     assert len(seen) > 50
@@ -70,8 +63,8 @@ def test_boxes_and_persons_are_drawn_where_they_are(tmp_path: Path, thing: str, 
 def test_persons_walk_along_their_lane(tmp_path: Path) -> None:
     begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Walker": f"{lane(100)}\n{speed(1.4)}"}
     steps = _run(write(tmp_path, {"Ego": CAR, "Walker": PERSON}, begin))
-    ways = [float(step.traffic.position[_row(step, "Walker"), 0]) for step in (steps[0], steps[-1])]
-    assert steps[0].traffic.types[_row(steps[0], "Walker")] == "pedestrian"
+    ways = [float(step.traffic.position[row_of(step, "Walker"), 0]) for step in (steps[0], steps[-1])]
+    assert steps[0].traffic.types[row_of(steps[0], "Walker")] == "pedestrian"
     assert ways[1] - ways[0] == pytest.approx(1.4 * (steps[-1].time - steps[0].time), abs=0.2)
 
 
@@ -84,7 +77,7 @@ def test_names_may_hold_blanks(tmp_path: Path) -> None:
     begin = {"my car": f"{lane(30)}\n{speed(15)}", "slow lorry": f"{lane(90)}\n{speed(10)}"}
     steps = _run(write(tmp_path, {"my car": CAR, "slow lorry": CAR}, begin, visibility=1000.0))
     assert set(steps[0].traffic.ids) == {"my%20car", "slow%20lorry"}
-    row = _row(steps[-1], "slow%20lorry")
+    row = row_of(steps[-1], "slow%20lorry")
     assert float(steps[-1].traffic.position[row, 0]) == pytest.approx(90.0 + 3.7 + 10.0 * steps[-1].time, abs=1.1)
 
 
@@ -93,15 +86,7 @@ def test_a_thing_without_a_size_is_refused(tmp_path: Path) -> None:
         tmp_path, {"Ego": CAR, "Box": '<MiscObject miscObjectCategory="none"/>'}, {"Ego": lane(30), "Box": lane(90)}
     )
     with pytest.raises(InputError, match=r"MiscObject: expected BoundingBox inside, got"):
-        fogsim.load_scenario(file, QUIET)
-
-
-def _over(name: str) -> str:
-    return (
-        '<ConditionGroup><Condition name="s" delay="0" conditionEdge="none"><ByValueCondition>'
-        '<StoryboardElementStateCondition storyboardElementType="event" '
-        f'storyboardElementRef="{name}" state="completeState"/></ByValueCondition></Condition></ConditionGroup>'
-    )
+        fogsim.load_scenario(file)
 
 
 def _like(other: str) -> str:
@@ -128,18 +113,18 @@ def test_who_is_no_entity_is_named(tmp_path: Path, begin: dict[str, str], actor:
 
 def test_a_story_waits_for_a_vehicle_with_a_blank_in_its_name(tmp_path: Path) -> None:
     slower = speed(2).replace("step", "linear").replace('"time"', '"rate"').replace('value="0"', 'value="4"', 1)
-    events = event("slow", slower, after(1)) + event("then", speed(5), _over("slow"))
+    events = event("slow", slower, after(1)) + event("then", speed(5), over("slow"))
     begin = {"Ego": lane(30), "slow lorry": f"{lane(90)}\n{speed(10)}"}
     steps = _run(write(tmp_path, {"Ego": CAR, "slow lorry": CAR}, begin, {"slow lorry": events}))
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    assert begun["then"] - begun["slow"] == pytest.approx(2.0, abs=0.21)
+    times = begun(steps)
+    assert times["then"] - times["slow"] == pytest.approx(2.0, abs=0.21)
 
 
 @pytest.mark.parametrize(("ahead", "is_free"), [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)])
 def test_no_vehicle_begins_where_another_one_is(tmp_path: Path, ahead: float, is_free: bool) -> None:
     file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, {"Ego": lane(90), "Lead": lane(90 + ahead)})
     if is_free:
-        first = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
+        first = first_step(file)
         assert set(first.traffic.ids) == {"Ego", "Lead"}
     else:
         with pytest.raises(InputError, match="Lead cannot begin where it is to: Ego is there"):

@@ -7,15 +7,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import fogsim
 from fogsim.cli.app import app
 from fogsim.core.files.readers import MAPS
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net
-from tests.openscenario.writing import CAR, ROAD, lane, speed, write
-
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+from tests.openscenario.writing import CAR, ROAD, first_step, lane, motion, speed, write
 
 
 @pytest.fixture
@@ -27,16 +24,10 @@ def maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def _begins(file: Path) -> tuple[float, float]:
-    step = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
-    x, y, _ = map(float, step.traffic.position[step.ego])
-    return x, y
-
-
 @pytest.mark.parametrize("written", ["Town01", "Town01.xodr", "other/folder/Town01.xodr", "C:\\maps\\Town01.xodr"])
 def test_a_map_is_found_by_its_name(tmp_path: Path, maps: Path, written: str) -> None:
     file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(5)}"}, road=Path(written))
-    assert _begins(file) == pytest.approx((33.7, -1.75), abs=0.1)
+    assert motion(first_step(file), "Ego")[:2] == pytest.approx((33.7, -1.75), abs=0.1)
 
 
 def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Path) -> None:
@@ -44,7 +35,8 @@ def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Pa
     moved = re.sub(r",(-?1\.750)", lambda y: f",{float(y[1]) - 20.0:.3f}", net)
     (maps / "Village.net.xml").write_text(moved, encoding="utf-8")
     here = '<Position><WorldPosition x="30" y="-1.75" h="0"/></Position>'
-    assert _begins(write(tmp_path, {"Ego": CAR}, {"Ego": here}, road=Path("Village"))) == pytest.approx((33.7, -21.75))
+    first = first_step(write(tmp_path, {"Ego": CAR}, {"Ego": here}, road=Path("Village")))
+    assert motion(first, "Ego")[:2] == pytest.approx((33.7, -21.75))
     with pytest.raises(InputError, match="a map that is a SUMO network has no roads; write a WorldPosition"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Village")))
 

@@ -6,34 +6,36 @@ from pathlib import Path
 
 import pytest
 
-import fogsim
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
-from tests.openscenario.test_story import _changes_lane
-from tests.openscenario.writing import CAR, after, box, event, lane, speed, write
+from tests.openscenario.writing import (
+    CAR,
+    CASES,
+    DATA,
+    TWO_LANES,
+    after,
+    begun,
+    box,
+    changes_lane,
+    event,
+    lane,
+    motion_at,
+    over,
+    row_of,
+    run,
+    speed,
+    write,
+)  # fmt: skip
 
-CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
 PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
 TIMES = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
 EGO = f"{lane(30)}\n{speed(5)}"
 
 
-def _run(file: Path) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario(file, QUIET)))
-
-
-def _at(steps: Sequence[Step], time: float, name: str) -> tuple[float, float, float]:
-    """x and y of the front bumper [m] and speed [m/s] at a time [s]."""
-    step = min(steps, key=lambda one: abs(one.time - time))
-    row = step.traffic.ids.index(name)
-    return (*map(float, step.traffic.position[row, :2]), float(step.traffic.speed[row]))
-
-
 def _heading(steps: Sequence[Step], time: float, name: str) -> float:
     step = min(steps, key=lambda one: abs(one.time - time))
-    return float(step.traffic.heading[step.traffic.ids.index(name)])
+    return float(step.traffic.heading[row_of(step, name)])
 
 
 def _world(x: float, y: float, h: str = "") -> str:
@@ -63,59 +65,49 @@ def _absolute(value: float) -> str:
     return f'<AbsoluteTargetLaneOffset value="{value}"/>'
 
 
-def _over(name: str) -> str:
-    """Group of one condition: an event is over."""
-    return (
-        '<ConditionGroup><Condition name="s" delay="0" conditionEdge="none"><ByValueCondition>'
-        f'<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{name}" '
-        'state="completeState"/></ByValueCondition></Condition></ConditionGroup>'
-    )
-
-
 def test_a_car_turned_round_comes_along_its_lane() -> None:
-    steps = _run(CASES / "turned_round.xosc")
-    x, y, speed_then = _at(steps, 2.0, "Oncoming")
+    steps = run(CASES / "turned_round.xosc")
+    x, y, speed_then = motion_at(steps, 2.0, "Oncoming")
     # From s = 500 m; its front bumper is 3.7 m ahead of the middle of its rear axle. It appears in the first period.
     assert (x, y) == pytest.approx((500.0 - 3.7 - 2.0 * speed_then, -1.75), abs=0.11 * speed_then)
     assert math.cos(_heading(steps, 2.0, "Oncoming")) == pytest.approx(-1.0)
-    assert _at(steps, 3.0, "Oncoming")[0] == pytest.approx(x - speed_then, abs=0.01)
+    assert motion_at(steps, 3.0, "Oncoming")[0] == pytest.approx(x - speed_then, abs=0.01)
 
 
 def test_a_person_waits_next_to_the_road_and_crosses_it_by_times(tmp_path: Path) -> None:
     walks = event("walk", _follows(("0", _world(150, -6)), ("4", _world(150, 2)), ("6", _world(154, 2))), after(2.0))
     begin = {"Ego": EGO, "Ann": _world(150, -6, "1.5708")}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": walks}))
-    begun = next(step.time for step in steps for one in step.begun if one.name == "walk" and not one.is_over)
-    assert _at(steps, begun - 0.1, "Ann") == pytest.approx((150.0, -6.0 + 0.25, 0.0), abs=1e-3)
-    row = steps[5].traffic.ids.index("Ann")
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": walks}))
+    start = next(step.time for step in steps if "walk" in begun([step]))
+    assert motion_at(steps, start - 0.1, "Ann") == pytest.approx((150.0, -6.0 + 0.25, 0.0), abs=1e-3)
+    row = row_of(steps[5], "Ann")
     assert steps[5].traffic.off_lanes[row]
     # The figure's front is 0.25 m ahead of its middle, which follows the line at 2 m/s; begun after that step.
     for passed, place in ((2.0, (150.0, -2.0 + 0.25)), (3.5, (150.0, 1.0 + 0.25)), (5.0, (152.0 + 0.25, 2.0))):
-        assert _at(steps, begun - 0.1 + passed, "Ann") == pytest.approx((*place, 2.0), abs=0.01)
-    assert _at(steps, 9.9, "Ann") == pytest.approx((154.25, 2.0, 0.0), abs=0.01)
+        assert motion_at(steps, start - 0.1 + passed, "Ann") == pytest.approx((*place, 2.0), abs=0.01)
+    assert motion_at(steps, 9.9, "Ann") == pytest.approx((154.25, 2.0, 0.0), abs=0.01)
     assert _heading(steps, 9.9, "Ann") == pytest.approx(0.0, abs=1e-6)
 
 
 def test_who_stands_next_to_the_road_walks_straight_on_at_the_speed_that_is_ordered(tmp_path: Path) -> None:
     begin = {"Ego": EGO, "Ann": _world(150, -6, "1.5708")}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("walk", speed(1.5), after(2.0))}))
-    begun = next(step.time for step in steps for one in step.begun if one.name == "walk" and not one.is_over)
-    assert _at(steps, begun + 3.9, "Ann") == pytest.approx((150.0, -6.0 + 0.25 + 4.0 * 1.5, 1.5), abs=0.16)
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("walk", speed(1.5), after(2.0))}))
+    start = next(step.time for step in steps if "walk" in begun([step]))
+    assert motion_at(steps, start + 3.9, "Ann") == pytest.approx((150.0, -6.0 + 0.25 + 4.0 * 1.5, 1.5), abs=0.16)
 
 
 def test_a_trajectory_without_times_is_followed_at_the_vehicles_speed_and_a_car_drives_on(tmp_path: Path) -> None:
     line = _follows(("", _world(100, -1.75)), ("", _world(130, 1.75)), ("", _world(160, -1.75)), reference="<None/>")
     begin = {"Ego": EGO, "Lead": f"{lane(100)}\n{speed(10)}"}
-    events = event("line", line, after(0)) + event("next", speed(10), _over("line"))
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}))
+    events = event("line", line, after(0)) + event("next", speed(10), over("line"))
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}))
     # 2 sides of 30.2 m; the front bumper is 3.7 m ahead of the middle of the rear axle.
     side = math.hypot(30.0, 3.5)
     along = 30.0 / side
-    x, y, _ = _at(steps, 3.0, "Lead")
+    x, y, _ = motion_at(steps, 3.0, "Lead")
     assert (x, y) == pytest.approx((100.0 + 30.0 * along + 3.7 * 30.0 / side, -1.75 + 3.5 * along + 0.43), abs=0.15)
-    begun = next(one.time for step in steps for one in step.begun if one.name == "next")
-    assert begun == pytest.approx(2.0 * side / 10.0, abs=0.21)
-    x, y, now = _at(steps, 9.0, "Lead")
+    assert begun(steps)["next"] == pytest.approx(2.0 * side / 10.0, abs=0.21)
+    x, y, now = motion_at(steps, 9.0, "Lead")
     # Beyond the end it drives on in its lane, 90 m from the beginning.
     assert (x, y, now) == pytest.approx((160.0 + 3.7 + 90.0 - 2.0 * side, -1.75, 10.0), abs=0.3)
 
@@ -125,9 +117,9 @@ def test_a_trajectory_may_begin_where_the_vehicle_is(tmp_path: Path, kind: str, 
     own = [f'<Position><{kind} entityRef="Other" dx="{dx}" dy="{dy}"/></Position>' for dx, dy in ((0, 0), (20, 1))]
     begin = {"Ego": EGO, "Other": f"{lane(400, 1)}\n{speed(10)}"}
     moves = event("move", _follows(("0", own[0]), ("2", own[1])), after(1.0))
-    steps = _run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": moves}, stop=after(3.0)))
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": moves}, stop=after(3.0)))
     # It drives against x; its front bumper is 3.7 m ahead of the point that moves 20 m ahead or along x, and 1 m aside.
-    x, y, _ = _at(steps, 2.9, "Other")
+    x, y, _ = motion_at(steps, 2.9, "Other")
     share, length = 0.95, math.hypot(20.0, 1.0)
     wanted = (390.0 + sense * (20.0 * share + 3.7 * 20.0 / length), 1.75 + sense * (share + 3.7 / length))
     assert (x, y) == pytest.approx(wanted, abs=0.05)
@@ -139,19 +131,20 @@ def test_a_trajectory_may_begin_where_the_vehicle_is(tmp_path: Path, kind: str, 
 def test_a_lane_offset_takes_the_time_that_its_acceleration_allows(
     tmp_path: Path, most: float, shape: str, lasts: float
 ) -> None:
-    moves = event("move", _offset(_absolute(0.5), most, shape), after(1.0)) + event("back", speed(9), _over("move"))
+    moves = event("move", _offset(_absolute(0.5), most, shape), after(1.0)) + event("back", speed(9), over("move"))
     place = '<Position><LanePosition roadId="7" laneId="-1" s="90" offset="-0.3"/></Position>'
     begin = {"Ego": EGO, "Lead": f"{place}\n{speed(10)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": moves}))
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    assert _at(steps, 0.0, "Lead")[:2] == pytest.approx((93.7, -2.05), abs=1e-3)
-    assert begun["back"] - begun["move"] == pytest.approx(lasts, abs=0.21)
-    assert _at(steps, begun["move"] + 0.5 * lasts, "Lead")[1] == pytest.approx(-1.65 if lasts else -2.05, abs=0.06)
-    assert _at(steps, begun["move"] + lasts + 0.1, "Lead")[1] == pytest.approx(-1.25, abs=1e-3)
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": moves}))
+    times = begun(steps)
+    assert motion_at(steps, 0.0, "Lead")[:2] == pytest.approx((93.7, -2.05), abs=1e-3)
+    assert times["back"] - times["move"] == pytest.approx(lasts, abs=0.21)
+    assert motion_at(steps, times["move"] + 0.5 * lasts, "Lead")[1] == pytest.approx(
+        -1.65 if lasts else -2.05, abs=0.06
+    )
+    assert motion_at(steps, times["move"] + lasts + 0.1, "Lead")[1] == pytest.approx(-1.25, abs=1e-3)
 
 
 def test_offsets_may_go_by_another_vehicle_and_end_a_change_of_lane(tmp_path: Path) -> None:
-    two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
     place = '<Position><LanePosition roadId="7" laneId="-2" s="90" offset="0.4"/></Position>'
     changes = (
         '<PrivateAction><LateralAction><LaneChangeAction targetLaneOffset="-0.6"><LaneChangeActionDynamics '
@@ -161,12 +154,12 @@ def test_offsets_may_go_by_another_vehicle_and_end_a_change_of_lane(tmp_path: Pa
     like = _offset('<RelativeTargetLaneOffset entityRef="Lead" value="0.1"/>')
     story = {"Lead": event("leave", changes, after(3.0)), "Ego": event("like", like, after(1.0))}
     begin = {"Ego": f"{lane(30, -2)}\n{speed(5)}", "Lead": f"{place}\n{speed(10)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, story, road=two))
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, story, road=TWO_LANES))
     right, left = -25.25, -21.75
-    assert _at(steps, 0.0, "Lead")[1] == pytest.approx(right + 0.4, abs=0.01)
-    assert _at(steps, 9.0, "Lead")[1] == pytest.approx(left - 0.6, abs=0.01)
+    assert motion_at(steps, 0.0, "Lead")[1] == pytest.approx(right + 0.4, abs=0.01)
+    assert motion_at(steps, 9.0, "Lead")[1] == pytest.approx(left - 0.6, abs=0.01)
     # The order of the file: Lead's offset is that of its change of lane.
-    assert _at(steps, 9.0, "Ego")[1] == pytest.approx(left - 0.5, abs=0.01) or _at(steps, 9.0, "Ego")[
+    assert motion_at(steps, 9.0, "Ego")[1] == pytest.approx(left - 0.5, abs=0.01) or motion_at(steps, 9.0, "Ego")[
         1
     ] == pytest.approx(right - 0.5, abs=0.01)
 
@@ -180,8 +173,8 @@ def test_a_distance_is_kept(tmp_path: Path, free: str, gap: float) -> None:
     )
     begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
     file = write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": event("keep", keeps, after(1.0))}, stop=after(25))
-    steps = _run(file)
-    ego, other = _at(steps, 24.0, "Ego"), _at(steps, 24.0, "Next")
+    steps = run(file)
+    ego, other = motion_at(steps, 24.0, "Ego"), motion_at(steps, 24.0, "Next")
     assert ego[0] - 4.6 - other[0] == pytest.approx(gap, abs=0.3)
 
 
@@ -193,22 +186,22 @@ def test_a_profile_of_speeds_is_driven_to_the_step(tmp_path: Path) -> None:
         '<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="position"><DynamicConstraints '
         f'maxAcceleration="3" maxDeceleration="4"/>{entries}</SpeedProfileAction></LongitudinalAction></PrivateAction>'
     )
-    events = event("profile", profile, after(1.0)) + event("next", speed(5), _over("profile"))
+    events = event("profile", profile, after(1.0)) + event("next", speed(5), over("profile"))
     begin = {"Ego": EGO, "Lead": f"{lane(90)}\n{speed(10)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}))
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    start = begun["profile"]
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}))
+    times = begun(steps)
+    start = times["profile"]
     # 16 m/s after 2 s, and then 12 m/s less at 4 m/s².
     for passed, wanted in ((1.0, 13.0), (2.0, 16.0), (3.5, 10.0), (5.0, 4.0)):
-        assert _at(steps, start + passed, "Lead")[2] == pytest.approx(wanted, abs=0.05), passed
-    assert begun["next"] - begun["profile"] == pytest.approx(5.0, abs=0.21)
+        assert motion_at(steps, start + passed, "Lead")[2] == pytest.approx(wanted, abs=0.05), passed
+    assert times["next"] - times["profile"] == pytest.approx(5.0, abs=0.21)
 
 
 def test_conditions_on_values_hold_once_an_event_has_set_them(tmp_path: Path) -> None:
-    file = Path(__file__).parents[1] / "data" / "openscenario" / "off_the_lanes.xosc"
-    begun = {one.name: one.time for step in _run(file) for one in step.begun if not one.is_over}
-    assert begun["like_lead"] == pytest.approx(begun["storm"], abs=0.21)
-    assert begun["brake"] == pytest.approx(begun["more"], abs=0.21)
+    file = DATA / "off_the_lanes.xosc"
+    times = begun(run(file))
+    assert times["like_lead"] == pytest.approx(times["storm"], abs=0.21)
+    assert times["brake"] == pytest.approx(times["more"], abs=0.21)
     text = file.read_text(encoding="utf-8").replace('rule="equalTo" value="storm"', 'rule="notEqualTo" value="storm"')
     text = text.replace('rule="greaterThan" value="2"', 'rule="greaterThan" value="3"').replace(
         '"two_', f'"{file.parent}/two_'
@@ -216,9 +209,9 @@ def test_conditions_on_values_hold_once_an_event_has_set_them(tmp_path: Path) ->
     (changed := tmp_path / "changed.xosc").write_text(
         text.replace('"catalogs"', f'"{file.parent}/catalogs"'), encoding="utf-8"
     )
-    begun = {one.name: one.time for step in _run(changed) for one in step.begun if not one.is_over}
-    assert begun["like_lead"] < begun["storm"]
-    assert "brake" not in begun
+    times = begun(run(changed))
+    assert times["like_lead"] < times["storm"]
+    assert "brake" not in times
 
 
 def _entity(name: str, inside: str) -> str:
@@ -236,13 +229,13 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     gone = _entity("Never", "<DeleteEntityAction/>")
     (file := tmp_path / "changed.xosc").write_text(text.replace("<Actions>", f"<Actions>{gone}", 1), encoding="utf-8")
-    steps = _run(file)
+    steps = run(file)
     there = {name: [step.time for step in steps if name in step.traffic.ids] for name in ("Lead", "Late", "Never")}
     assert (there["Lead"][0], there["Lead"][-1]) == pytest.approx((0.0, 3.0), abs=0.11)
     assert (there["Late"][0], there["Late"][-1]) == pytest.approx((2.1, steps[-1].time), abs=0.11)
     assert there["Never"] == []
-    assert _at(steps, 3.9, "Late") == pytest.approx((303.7, -1.75, 0.0), abs=0.05)
-    assert _at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
+    assert motion_at(steps, 3.9, "Late") == pytest.approx((303.7, -1.75, 0.0), abs=0.05)
+    assert motion_at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
 
 
 @pytest.mark.parametrize(
@@ -274,16 +267,16 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
         '<LanePosition roadId="7" laneId="-1" s="110"/></TargetPositionMaster><TargetPosition>'
         f'<LanePosition roadId="7" laneId="1" s="330"/></TargetPosition>{final}</SynchronizeAction></PrivateAction>'
     )
-    events = event("meet", meets, after(1.0)) + event("next", speed(3), _over("meet"))
+    events = event("meet", meets, after(1.0)) + event("next", speed(3), over("meet"))
     begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(420, 1)}\n{speed(9)}"}
     file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": events}, stop=after(9.0))
-    steps = _run(file)
+    steps = run(file)
     # The ego drives 80 m in 8 s, the other one 90 m against the road, 8.9 m of it before it begins to synchronise.
-    x, _, speed_then = _at(steps, 8.0, "Other")
-    assert (x, _at(steps, 8.0, "Ego")[0]) == pytest.approx((330.0 - 3.7, 110.0 + 3.7), abs=1.0)
+    x, _, speed_then = motion_at(steps, 8.0, "Other")
+    assert (x, motion_at(steps, 8.0, "Ego")[0]) == pytest.approx((330.0 - 3.7, 110.0 + 3.7), abs=1.0)
     assert speed_there is None or speed_then == pytest.approx(speed_there, abs=0.6)
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    assert begun["next"] == pytest.approx(7.9, abs=0.21)
+    times = begun(steps)
+    assert times["next"] == pytest.approx(7.9, abs=0.21)
 
 
 def test_what_cannot_be_followed_is_refused(tmp_path: Path) -> None:
@@ -315,14 +308,14 @@ def test_what_waits_for_a_trajectory_without_times_is_refused_and_for_what_does_
 ) -> None:
     here = '<Position><RelativeObjectPosition entityRef="Ego" dx="{}" dy="0"/></Position>'
     line = _follows(("", here.format(0)), ("", here.format(30)), reference="<None/>")
-    events = event("line", line, after(1.0)) + event("next", speed(5), _over("line"))
+    events = event("line", line, after(1.0)) + event("next", speed(5), over("line"))
     with pytest.raises(InputError, match="when a trajectory without times or places is over is not known"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, {"Ego": events}))
     events = event("line", _offset(_absolute(0.5), continuous="true"), after(1.0)) + event(
-        "next", speed(9), _over("line")
+        "next", speed(9), over("line")
     )
-    steps = _run(write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, {"Ego": events}))
-    assert "next" not in {one.name for step in steps for one in step.begun}
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, {"Ego": events}))
+    assert "next" not in begun(steps)
 
 
 def test_who_is_off_the_lanes_changes_no_lane(tmp_path: Path) -> None:
@@ -336,12 +329,12 @@ def test_who_only_follows_a_trajectory_begins_at_its_first_vertex(tmp_path: Path
     across = _follows(("", _world(80, -6)), ("", _world(80, 6)), reference="<None/>")
     along = _follows(("", _world(60, -1.75)), ("", _world(160, 1.75)), reference="<None/>")
     begin = {"Ego": f"{along}\n{speed(10)}", "Ann": f"{across}\n{speed(1)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(5.0)))
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(5.0)))
     length = math.hypot(100.0, 3.5)
     wanted = (60.0 + (40.0 + 3.7) * 100.0 / length, -1.75 + (40.0 + 3.7) * 3.5 / length)
-    assert _at(steps, 0.0, "Ego")[:2] == pytest.approx((63.7, -1.75), abs=0.01)
-    assert _at(steps, 4.0, "Ego")[:2] == pytest.approx(wanted, abs=0.02)
-    assert _at(steps, 4.0, "Ann")[:2] == pytest.approx((80.0, -6.0 + 0.25 + 4.0), abs=0.11)
+    assert motion_at(steps, 0.0, "Ego")[:2] == pytest.approx((63.7, -1.75), abs=0.01)
+    assert motion_at(steps, 4.0, "Ego")[:2] == pytest.approx(wanted, abs=0.02)
+    assert motion_at(steps, 4.0, "Ann")[:2] == pytest.approx((80.0, -6.0 + 0.25 + 4.0), abs=0.11)
 
 
 def test_the_ego_needs_a_lane(tmp_path: Path) -> None:
@@ -364,14 +357,14 @@ def test_the_ego_needs_a_lane(tmp_path: Path) -> None:
         ),
         (
             '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>',
-            _changes_lane(-1, "time", 2.0).replace(
+            changes_lane(-1, "time", 2.0).replace(
                 '<AbsoluteTargetLane value="-1"/>', '<RelativeTargetLane entityRef="Ego" value="0"/>'
             ),
             2.0,
         ),
         (
             '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>',
-            _changes_lane(-1, "rate", 2.0),
+            changes_lane(-1, "rate", 2.0),
             1.5 * 3.5 / 2.0,
         ),
     ],
@@ -379,30 +372,30 @@ def test_the_ego_needs_a_lane(tmp_path: Path) -> None:
 def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
     tmp_path: Path, place: str, action: str, lasts: float
 ) -> None:
-    events = event("in", action, after(4.0)) + event("slow", speed(12), _over("in"))
+    events = event("in", action, after(4.0)) + event("slow", speed(12), over("in"))
     begin = {"Ego": f"{lane(40)}\n{speed(8)}", "Fast": f"<Position>{place}</Position>\n{speed(16)}"}
     file = write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}, stop=after(10.0))
-    steps = _run(file)
+    steps = run(file)
     # It comes at the end of the first period, with its reference point where the file has it.
-    assert _at(steps, 3.0, "Fast") == pytest.approx((20.0 + 3.7 + 16.0 * 3.0, 1.75, 16.0), abs=0.02)
-    assert _at(steps, 4.0 + 0.5 * lasts, "Fast")[1] == pytest.approx(0.0, abs=1.0)
-    assert _at(steps, 4.1 + lasts, "Fast")[1] == pytest.approx(-1.75, abs=0.02)
-    assert _at(steps, 4.0, "Ego")[0] == pytest.approx(40.0 + 3.7 + 8.0 * 4.0, abs=0.1)
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    assert begun["slow"] - begun["in"] == pytest.approx(lasts, abs=0.21)
-    assert _at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)
+    assert motion_at(steps, 3.0, "Fast") == pytest.approx((20.0 + 3.7 + 16.0 * 3.0, 1.75, 16.0), abs=0.02)
+    assert motion_at(steps, 4.0 + 0.5 * lasts, "Fast")[1] == pytest.approx(0.0, abs=1.0)
+    assert motion_at(steps, 4.1 + lasts, "Fast")[1] == pytest.approx(-1.75, abs=0.02)
+    assert motion_at(steps, 4.0, "Ego")[0] == pytest.approx(40.0 + 3.7 + 8.0 * 4.0, abs=0.1)
+    times = begun(steps)
+    assert times["slow"] - times["in"] == pytest.approx(lasts, abs=0.21)
+    assert motion_at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)
 
 
 def test_who_drives_against_a_lane_goes_over_to_a_lane_that_is_there(tmp_path: Path) -> None:
     place = '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>'
     begin = {"Ego": lane(40), "Fast": f"<Position>{place}</Position>\n{speed(16)}"}
-    events = event("in", _changes_lane(-3, "time", 2.0), after(4.0))
+    events = event("in", changes_lane(-3, "time", 2.0), after(4.0))
     with pytest.raises(InputError, match="LaneChangeAction: road '7' has no lane '-3' to drive on; it has -1, 1"):
         read_openscenario(write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}))
 
 
 def test_a_person_may_stand_far_from_the_road(tmp_path: Path) -> None:
     begin = {"Ego": EGO, "Ann": _world(60, -150)}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(2.0)))
-    row = steps[-1].traffic.ids.index("Ann")
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(2.0)))
+    row = row_of(steps[-1], "Ann")
     assert steps[-1].traffic.position[row].tolist() == pytest.approx([60.25, -150.0, 0.0])

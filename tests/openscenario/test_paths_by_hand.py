@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-import fogsim
 from tests.openscenario.test_off_lanes import _absolute, _follows, _offset, _world
-from tests.openscenario.test_story import _changes_lane, _group, _slows
-from tests.openscenario.writing import CAR, after, event, lane, speed, write
+from tests.openscenario.test_story import _slows
+from tests.openscenario.writing import CAR, after, changes_lane, event, group, lane, motion, run, speed, write
 
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
 FRONT, RIGHT, LEFT = 3.7, -1.75, 1.75  # From the reference point to the front bumper, and middles of the lanes [m]
 BEGIN = 2.0  # Time at which what the story orders begins [s]
 
@@ -66,7 +64,7 @@ PROFILE = (
     '"10"/><SpeedProfileEntry time="2" speed="14"/><SpeedProfileEntry time="2" speed="6"/></SpeedProfileAction>'
     "</LongitudinalAction></PrivateAction>"
 )
-CLOSE = _group(
+CLOSE = group(
     '<Condition name="c" delay="0" conditionEdge="rising"><ByEntityCondition><TriggeringEntities '
     'triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
     '<TimeToCollisionCondition value="3" freespace="true" rule="lessThan" relativeDistanceType="longitudinal">'
@@ -99,12 +97,12 @@ CASES = {
         lambda t: (50.0 + FRONT + 10.0 * min(t, 0.54) + (_ramp(10.0, 0.0, 2.5)(t - 0.54) if t > 0.54 else 0.0), RIGHT),
     ),
     "changes lane in a time": (
-        _changes_lane(1, "time", 3.0),
+        changes_lane(1, "time", 3.0),
         after(BEGIN),
         _across(lambda t: RIGHT + 3.5 * _smooth(t / 3.0)),
     ),
     "changes lane over a distance": (
-        _changes_lane(1, "distance", 40.0),
+        changes_lane(1, "distance", 40.0),
         after(BEGIN),
         _across(lambda t: RIGHT + 3.5 * _smooth(t / 4.0)),
     ),
@@ -128,8 +126,7 @@ def test_the_egos_path_follows_from_the_file(tmp_path: Path) -> None:
         others = {"Slow": CAR} if start is CLOSE else {}
         begin = {vehicle: begin[vehicle] for vehicle in ("Ego", *others)}
         file = write(tmp_path, {"Ego": CAR, **others}, begin, {"Ego": event("e", action, start)}, stop=after(6.0))
-        steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+        steps = run(file)
         assert steps[-1].time == pytest.approx(6.0, abs=0.11)
         for step in steps:
-            x, y, _ = step.traffic.position[step.traffic.ids.index("Ego")]
-            assert math.dist((x, y), place(step.time)) < 1.0, step.time
+            assert math.dist(motion(step, "Ego")[:2], place(step.time)) < 1.0, step.time

@@ -12,9 +12,7 @@ from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import load_scenario
-
-DATA = Path(__file__).parents[1] / "data" / "openscenario"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+from tests.openscenario.writing import DATA, QUIET, entry
 
 
 @pytest.fixture(scope="module")
@@ -39,16 +37,11 @@ def changed(tmp_path: Path) -> Callable[..., Path]:
     return change
 
 
-def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
-    found: dict[str, Any] = next(entry for entry in data["timeline"] if entry["name"] == name)
-    return found
-
-
 def test_fog_light_and_parameters(cut_in: dict[str, Any]) -> None:
     assert cut_in["fog"] == {"visibility_m": 140.0}
     assert 5_000.0 < cut_in["light"]["illuminance_lx"] < 12_000.0
-    assert _entry(cut_in, "Init")["do"]["Overtaker"]["speed"]["to_kmh"] == pytest.approx(72 * 1.25)
-    assert _entry(cut_in, "thicker_fog") == {
+    assert entry(cut_in, "Init")["do"]["Overtaker"]["speed"]["to_kmh"] == pytest.approx(72 * 1.25)
+    assert entry(cut_in, "thicker_fog") == {
         "name": "thicker_fog",
         "when": "time >= 4 s",
         "do": {"fog": {"visibility_m": 60.0}},
@@ -57,14 +50,14 @@ def test_fog_light_and_parameters(cut_in: dict[str, Any]) -> None:
 
 def test_triggers_are_conditions_of_the_language(cut_in: dict[str, Any]) -> None:
     # Reference points are 4.8 m farther apart than bumpers: 1.4 + 2.4 before the one, 1 behind the other.
-    assert _entry(cut_in, "cut_in")["when"] == "headway(ego, Overtaker, 4.8 m) rises above 0.5 s"
-    assert _entry(cut_in, "brake")["do"]["Overtaker"]["speed"] == {
+    assert entry(cut_in, "cut_in")["when"] == "headway(ego, Overtaker, 4.8 m) rises above 0.5 s"
+    assert entry(cut_in, "brake")["do"]["Overtaker"]["speed"] == {
         "to_kmh": pytest.approx(28.8),
         "shape": "linear",
         "rate_mps2": 2.0,
     }
     assert cut_in["end_when"] == "happened(stop)"
-    assert _entry(cut_in, "stop")["delay_s"] == 2.0
+    assert entry(cut_in, "stop")["delay_s"] == 2.0
 
 
 def test_a_box_of_fog_is_a_bank_along_the_route() -> None:

@@ -5,13 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fogsim
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
-from tests.openscenario.writing import CAR, after, event, speed, write
+from tests.openscenario.writing import CAR, DATA, after, event, first_step, motion, run, speed, write
 
-FORK = Path(__file__).parents[1] / "data" / "openscenario" / "fork.xodr"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+FORK = DATA / "fork.xodr"
 
 
 def _on(road: int, s: float) -> str:
@@ -57,7 +55,7 @@ def test_vehicles_drive_their_routes(tmp_path: Path, routing: str, ends_north: b
     (tmp_path / "ways.xosc").write_text(CATALOG, encoding="utf-8")
     begin = "\n".join(filter(None, [_on(1, 30), routing, speed(10)]))
     file = write(tmp_path, {"Ego": CAR}, {"Ego": begin}, stop=after(15), visibility=5000.0, road=FORK)
-    steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+    steps = run(file)
     places = np.array([step.traffic.position[step.ego, :2] for step in steps])
     # At 10 m/s for 15 s from 33.7 m on: to 183.7 m, of which the left arc takes 21.75 m · π/2 = 34.2 m.
     expected = (121.75, 20.0 + 183.7 - 100.0 - 34.2) if ends_north else (183.7, -1.75)
@@ -70,9 +68,7 @@ def test_routes_change_while_vehicles_drive(tmp_path: Path, routing: str) -> Non
     begin = {"Ego": f"{_on(2, 40)}\n{speed(1)}", "Other": f"{_on(1, 30)}\n{speed(10)}"}
     story = {"Other": event("turn", routing, after(2.0))}
     file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, story, stop=after(15), visibility=5000.0, road=FORK)
-    steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
-    place = steps[-1].traffic.position[steps[-1].traffic.ids.index("Other"), :2]
-    assert place == pytest.approx((121.75, 20.0 + 183.7 - 100.0 - 34.2), abs=2.0)
+    assert motion(run(file)[-1], "Other")[:2] == pytest.approx((121.75, 20.0 + 183.7 - 100.0 - 34.2), abs=2.0)
 
 
 def test_the_egos_route_is_known_from_the_beginning(tmp_path: Path) -> None:
@@ -86,10 +82,7 @@ def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) 
     # From the first waypoint 80 m to the road's end, 35.1 across the junction, and 40 m up the road to the north.
     begin = {"Ego": f"{_on(1, 30)}\n{_routing(NORTH)}\n{speed(10)}", "Other": _on_route(NORTH, 155.1)}
     file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, visibility=5000.0, road=FORK)
-    step = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
-    row = step.traffic.row("Other")
-    assert row is not None
-    assert step.traffic.position[row, :2] == pytest.approx((121.75, 20.0 + 40.0 + 3.7), abs=0.3)
+    assert motion(first_step(file), "Other")[:2] == pytest.approx((121.75, 20.0 + 40.0 + 3.7), abs=0.3)
 
 
 def test_what_cannot_be_driven_is_refused(tmp_path: Path) -> None:

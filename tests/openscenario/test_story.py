@@ -1,47 +1,31 @@
 """Stories: changes of lane by distance and onto the oncoming lane, delays, repeated events, and the end of the road."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import fogsim
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
-from fogsim.values import Ending, Step
-from tests.openscenario.writing import CAR, after, event, lane, speed, write
-
-CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
-QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
-
-
-def _run(file: Path) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario(file, QUIET)))
-
-
-def _at(steps: Sequence[Step], time: float, name: str) -> tuple[float, float, float]:
-    """x and y of the front bumper [m] and speed [m/s] at a time [s]."""
-    step = min(steps, key=lambda one: abs(one.time - time))
-    row = step.traffic.ids.index(name)
-    return (*map(float, step.traffic.position[row, :2]), float(step.traffic.speed[row]))
-
-
-def _changes_lane(target: int, dimension: str, value: float) -> str:
-    return (
-        "<PrivateAction><LateralAction><LaneChangeAction><LaneChangeActionDynamics "
-        f'dynamicsShape="cubic" dynamicsDimension="{dimension}" value="{value}"/><LaneChangeTarget>'
-        f'<AbsoluteTargetLane value="{target}"/></LaneChangeTarget></LaneChangeAction></LateralAction></PrivateAction>'
-    )
-
-
-def _state(kind: str, name: str, state: str, delay: float = 0.0) -> str:
-    """A condition on the state of an element."""
-    return (
-        f'<Condition name="s" delay="{delay}" conditionEdge="none"><ByValueCondition><StoryboardElementStateCondition '
-        f'storyboardElementType="{kind}" storyboardElementRef="{name}" state="{state}"/></ByValueCondition></Condition>'
-    )
+from fogsim.values import Ending
+from tests.openscenario.writing import (
+    CAR,
+    CASES,
+    TWO_LANES,
+    after,
+    begun,
+    changes_lane,
+    event,
+    group,
+    lane,
+    motion_at,
+    over,
+    run,
+    speed,
+    state,
+    write,
+)  # fmt: skip
 
 
 def _faster_than(value: float, delay: float = 0.0) -> str:
@@ -52,38 +36,33 @@ def _faster_than(value: float, delay: float = 0.0) -> str:
     )
 
 
-def _group(*conditions: str) -> str:
-    return f"<ConditionGroup>{''.join(conditions)}</ConditionGroup>"
-
-
 def test_forty_metres_at_fifteen_metres_a_second_take_2_7_seconds() -> None:
     # Lead changes from lane -1 at y = -1.75 m to lane 1, that of oncoming traffic, at y = 1.75 m.
-    steps = _run(CASES / "lane_change_by_distance.xosc")
+    steps = run(CASES / "lane_change_by_distance.xosc")
     begins = next(step.time for step in steps if any(one.name == "leave" and not one.is_over for one in step.begun))
     ends = next(step.time for step in steps if any(one.name == "leave" and one.is_over for one in step.begun))
     assert ends - begins == pytest.approx(40.0 / 15.0, abs=0.11)
-    assert _at(steps, begins - 0.1, "Lead")[1] == pytest.approx(-1.75, abs=0.01)
-    assert _at(steps, begins + 40.0 / 30.0 + 0.1, "Lead")[1] == pytest.approx(0.0, abs=0.35)
-    assert _at(steps, ends + 0.3, "Lead")[1] == pytest.approx(1.75, abs=0.05)
+    assert motion_at(steps, begins - 0.1, "Lead")[1] == pytest.approx(-1.75, abs=0.01)
+    assert motion_at(steps, begins + 40.0 / 30.0 + 0.1, "Lead")[1] == pytest.approx(0.0, abs=0.35)
+    assert motion_at(steps, ends + 0.3, "Lead")[1] == pytest.approx(1.75, abs=0.05)
     # It keeps its speed and its direction, and stays there.
-    assert _at(steps, 9.9, "Lead") == pytest.approx((90.0 + 3.7 + 15.0 * 9.9, 1.75, 15.0), abs=0.5)
+    assert motion_at(steps, 9.9, "Lead") == pytest.approx((90.0 + 3.7 + 15.0 * 9.9, 1.75, 15.0), abs=0.5)
 
 
 def test_what_follows_a_change_by_distance_waits_until_it_is_over(tmp_path: Path) -> None:
-    leave = event("leave", _changes_lane(1, "distance", 30.0), after(1.0))
-    back = event("back", _changes_lane(-1, "time", 2.0), _group(_state("event", "leave", "completeState")))
+    leave = event("leave", changes_lane(1, "distance", 30.0), after(1.0))
+    back = event("back", changes_lane(-1, "time", 2.0), over("leave"))
     begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leave + back}, visibility=5000.0))
-    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
-    assert begun["back"] - begun["leave"] == pytest.approx(3.0, abs=0.25)
-    assert _at(steps, begun["back"] - 0.1, "Lead")[1] == pytest.approx(1.75, abs=0.1)
-    assert _at(steps, begun["back"] + 2.3, "Lead")[1] == pytest.approx(-1.75, abs=0.1)
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leave + back}, visibility=5000.0))
+    times = begun(steps)
+    assert times["back"] - times["leave"] == pytest.approx(3.0, abs=0.25)
+    assert motion_at(steps, times["back"] - 0.1, "Lead")[1] == pytest.approx(1.75, abs=0.1)
+    assert motion_at(steps, times["back"] + 2.3, "Lead")[1] == pytest.approx(-1.75, abs=0.1)
 
 
 def test_lanes_beyond_the_nearest_oncoming_one_and_a_rate_of_0_are_refused(tmp_path: Path) -> None:
-    two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
-    action = event("leave", _changes_lane(2, "rate", 0.0), after(1.0))
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": action}, road=two)
+    action = event("leave", changes_lane(2, "rate", 0.0), after(1.0))
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": action}, road=TWO_LANES)
     with pytest.raises(InputError) as refused:
         read_openscenario(file)
     assert "AbsoluteTargetLane: of the oncoming lanes, vehicles drive on the nearest" in str(refused.value)
@@ -99,7 +78,7 @@ def test_a_rate_is_the_greatest_speed_across_and_the_lane_to_the_left_the_oncomi
     ]:
         for shape, lasts in [("linear", 3.5), ("sinusoidal", 0.5 * math.pi * 3.5), ("cubic", 5.25)]:
             action = (
-                _changes_lane(1, "rate", 1.0).replace("cubic", shape).replace('<AbsoluteTargetLane value="1"/>', target)
+                changes_lane(1, "rate", 1.0).replace("cubic", shape).replace('<AbsoluteTargetLane value="1"/>', target)
             )
             begin = {"Ego": lane(30), "Lead": lane(90)}
             file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Ego": event("leave", action, after(1.0))})
@@ -109,10 +88,11 @@ def test_a_rate_is_the_greatest_speed_across_and_the_lane_to_the_left_the_oncomi
 
 @pytest.mark.parametrize(("number", "lanes"), [(1, 1), (2, 2), (-1, 1)])
 def test_a_rate_is_across_as_many_lanes_as_there_are(tmp_path: Path, number: int, lanes: int) -> None:
-    two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
     target = f'<RelativeTargetLane entityRef="Ego" value="{number}"/>'
-    action = _changes_lane(-1, "rate", 2.0).replace('<AbsoluteTargetLane value="-1"/>', target)
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30, -2)}, {"Ego": event("leave", action, after(1.0))}, road=two)
+    action = changes_lane(-1, "rate", 2.0).replace('<AbsoluteTargetLane value="-1"/>', target)
+    file = write(
+        tmp_path, {"Ego": CAR}, {"Ego": lane(30, -2)}, {"Ego": event("leave", action, after(1.0))}, road=TWO_LANES
+    )
     done = read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["change_lane"]
     assert (done["lanes"], done["duration_s"]) == (number, pytest.approx(lanes * 1.5 * 3.5 / 2.0))
 
@@ -141,8 +121,8 @@ def test_what_takes_time_needs_dimension_and_value(tmp_path: Path, missing: str)
 def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
     never = event("never", _slows('dynamicsShape="linear" value="0" dynamicsDimension="rate"'), after(1.0))
     begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": never}, stop=after(3.0)))
-    assert _at(steps, 2.9, "Lead") == pytest.approx((90.0 + 3.7 + 29.0, -1.75, 10.0), abs=0.1)
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": never}, stop=after(3.0)))
+    assert motion_at(steps, 2.9, "Lead") == pytest.approx((90.0 + 3.7 + 29.0, -1.75, 10.0), abs=0.1)
 
 
 @pytest.mark.parametrize(("priority", "speed_after"), [("override", 16.0), ("parallel", 10.0)])
@@ -150,48 +130,47 @@ def test_an_event_that_overrides_ends_a_change_of_speed_of_its_maneuver(
     tmp_path: Path, priority: str, speed_after: float
 ) -> None:
     brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(1.0))
-    leaves = event("leave", _changes_lane(1, "time", 2.0), after(3.0)).replace("override", priority)
+    leaves = event("leave", changes_lane(1, "time", 2.0), after(3.0)).replace("override", priority)
     begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
     file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(6.1))
-    steps = _run(file)
-    assert _at(steps, 2.9, "Lead")[2] == pytest.approx(16.2, abs=0.25)
-    assert _at(steps, 6.0, "Lead")[1:] == pytest.approx((1.75, speed_after), abs=0.25)
+    steps = run(file)
+    assert motion_at(steps, 2.9, "Lead")[2] == pytest.approx(16.2, abs=0.25)
+    assert motion_at(steps, 6.0, "Lead")[1:] == pytest.approx((1.75, speed_after), abs=0.25)
 
 
 def test_an_event_that_overrides_leaves_alone_what_begins_later(tmp_path: Path) -> None:
     brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(2.0))
-    leaves = event("leave", _changes_lane(1, "time", 1.0), after(1.0))
+    leaves = event("leave", changes_lane(1, "time", 1.0), after(1.0))
     begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
     file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(5.1))
-    assert _at(_run(file), 5.0, "Lead")[2] == pytest.approx(14.0, abs=0.25)
+    assert motion_at(run(file), 5.0, "Lead")[2] == pytest.approx(14.0, abs=0.25)
 
 
-def test_the_first_of_two_delayed_groups_ends_the_run() -> None:
-    steps = _run(CASES / "stop_with_two_delays.xosc")
+def test_the_first_of_two_delayed_groups_ends_therun() -> None:
+    steps = run(CASES / "stop_with_two_delays.xosc")
     assert steps[-1].time == pytest.approx(7.0, abs=0.11)
 
 
 def test_groups_have_delays_of_their_own(tmp_path: Path) -> None:
-    starts = _group(_faster_than(99)) + _group(_faster_than(10, delay=1.5))
+    starts = group(_faster_than(99)) + group(_faster_than(10, delay=1.5))
     begin = {"Ego": f"{lane(30)}\n{speed(15)}"}
     file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("brake", speed(5), starts)}, visibility=5000.0)
-    (begun,) = (one.time for step in _run(file) for one in step.begun if one.name == "brake" and not one.is_over)
     # The speed holds in the first step; a mark and what waits for it are looked at once a camera period.
-    assert begun == pytest.approx(1.5, abs=0.31)
+    assert begun(run(file))["brake"] == pytest.approx(1.5, abs=0.31)
 
 
 def test_each_condition_of_a_group_has_its_delay(tmp_path: Path) -> None:
     begin = {"Ego": f"{lane(30)}\n{speed(15)}"}
     first = event("first", speed(12), after(1.0))
-    second = event("second", speed(5), _group(_state("event", "first", "startTransition", 2.0), _faster_than(10)))
+    second = event("second", speed(5), group(state("event", "first", "startTransition", 2.0), _faster_than(10)))
     file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + second}, visibility=5000.0)
-    begun = {one.name: one.time for step in _run(file) for one in step.begun if not one.is_over}
-    assert begun["second"] - begun["first"] == pytest.approx(2.0, abs=0.31)
-    second = event("second", speed(5), _group(_state("event", "first", "startTransition"), _faster_than(10, delay=2.5)))
+    times = begun(run(file))
+    assert times["second"] - times["first"] == pytest.approx(2.0, abs=0.31)
+    second = event("second", speed(5), group(state("event", "first", "startTransition"), _faster_than(10, delay=2.5)))
     file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + second}, visibility=5000.0)
-    begun = {one.name: one.time for step in _run(file) for one in step.begun if not one.is_over}
+    times = begun(run(file))
     # It was so fast from the beginning, which was 2.5 s ago.
-    assert begun["second"] == pytest.approx(2.5, abs=0.11)
+    assert times["second"] == pytest.approx(2.5, abs=0.11)
 
 
 def test_events_are_played_as_often_as_they_may(tmp_path: Path) -> None:
@@ -201,14 +180,14 @@ def test_events_are_played_as_often_as_they_may(tmp_path: Path) -> None:
         'speedTargetValueType="delta" continuous="false"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
         "</PrivateAction>"
     )
-    events = event("slower", slower, _group(_faster_than(8)), count=5)
+    events = event("slower", slower, group(_faster_than(8)), count=5)
     file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(13)}"}, {"Ego": events}, visibility=5000.0)
-    steps = _run(file)
-    begun = [one.time for step in steps for one in step.begun if one.name.startswith("slower") and not one.is_over]
+    steps = run(file)
+    times = [one.time for step in steps for one in step.begun if one.name.startswith("slower") and not one.is_over]
     # 13, 11, 9 and then 7 m/s, which is not above 8 any more: three of five times.
-    assert len(begun) == 3
-    assert np.diff(begun) == pytest.approx([1.0, 1.0], abs=0.21)
-    assert _at(steps, 9.9, "Ego")[2] == pytest.approx(7.0, abs=0.05)
+    assert len(times) == 3
+    assert np.diff(times) == pytest.approx([1.0, 1.0], abs=0.21)
+    assert motion_at(steps, 9.9, "Ego")[2] == pytest.approx(7.0, abs=0.05)
     assert read_openscenario(file).data["expect"] == {"slower": {"happened": "slower"}}
 
 
@@ -243,7 +222,7 @@ def test_what_waits_for_a_value_that_nothing_sets_is_left_out(
     file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": idle})
     text = file.read_text(encoding="utf-8").replace("<CatalogLocations>", f"{DECLARED}<CatalogLocations>")
     act = f"<StartTrigger>{after(0)}</StartTrigger></Act>"
-    waits = event("waits", speed(5), _group(_state("event", "idle", "completeState"))).replace("waits action", "w")
+    waits = event("waits", speed(5), over("idle")).replace("waits action", "w")
     group = '<ManeuverGroup name="other" maximumExecutionCount="1"><Actors selectTriggeringEntities="false"><EntityRef '
     group += f'entityRef="Lead"/></Actors><Maneuver name="n">{waits}</Maneuver></ManeuverGroup>'
     second = f'<Act name="second">{group}{act}'
@@ -267,12 +246,12 @@ def test_counts_out_of_range_are_refused(tmp_path: Path, count: str) -> None:
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": events}))
 
 
-def test_the_end_of_the_road_ends_the_run(tmp_path: Path) -> None:
+def test_the_end_of_the_road_ends_therun(tmp_path: Path) -> None:
     end = _faster_than(0).replace(
         '<SpeedCondition value="0" rule="greaterThan"/>', '<EndOfRoadCondition duration="0"/>'
     )
     begin = {"Ego": f"{lane(700)}\n{speed(15)}"}
-    steps = _run(write(tmp_path, {"Ego": CAR}, begin, stop=_group(end), visibility=5000.0))
+    steps = run(write(tmp_path, {"Ego": CAR}, begin, stop=group(end), visibility=5000.0))
     assert steps[-1].ending in (Ending.END_CONDITION, Ending.ARRIVED)
     # From a front bumper at 703.7 m to 10 m before the end of the road at 800 m.
     assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)

@@ -11,8 +11,8 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.openscenario.parameters import evaluated
 from fogsim.scenario.loading import load_scenario
+from tests.openscenario.writing import DATA, entry
 
-DATA = Path(__file__).parents[1] / "data" / "openscenario"
 STAND_STILL = '<StandStillCondition duration="0.5"/>'
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
@@ -35,11 +35,6 @@ def read(tmp_path: Path) -> Callable[..., dict[str, Any]]:
         return read_openscenario(file).data
 
     return reading
-
-
-def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
-    found: dict[str, Any] = next(entry for entry in data["timeline"] if entry["name"] == name)
-    return found
 
 
 @pytest.mark.parametrize(
@@ -120,7 +115,7 @@ def test_an_edge_of_more_than_a_comparison_remembers_what_was_before(read: Calla
     old = '<Condition name="stands" delay="0" conditionEdge="none">'
     data = read((old, old.replace('"none"', '"rising"')))
     assert "happened(before_1) and (ego.speed < 0.1 m/s for 0.5 s)" in data["end_when"]
-    assert _entry(data, "before_1")["when"] == "not (ego.speed < 0.1 m/s for 0.5 s)"
+    assert entry(data, "before_1")["when"] == "not (ego.speed < 0.1 m/s for 0.5 s)"
 
 
 def test_a_stop_trigger_of_a_time_is_the_duration(read: Callable[..., dict[str, Any]]) -> None:
@@ -146,8 +141,8 @@ def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[s
         "</ByEntityCondition></Condition></ConditionGroup></StopTrigger></Act>"
     )
     data = read(("</Act>", stop))
-    assert _entry(data, "brake")["when"].endswith("and not happened(stop_1)")
-    assert _entry(data, "stop_1") == {
+    assert entry(data, "brake")["when"].endswith("and not happened(stop_1)")
+    assert entry(data, "stop_1") == {
         "name": "stop_1",
         "when": "ego.speed < 1 m/s and Lead.speed < 1 m/s",
         "delay_s": 1.0,
@@ -174,7 +169,7 @@ def test_actions(read: Callable[..., dict[str, Any]], action: str, told: dict[st
     text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
     begin = text.index("<SpeedAction>", text.index('<Event name="brake"'))
     old = text[begin : text.index("</SpeedAction>", begin) + len("</SpeedAction>")]
-    assert _entry(read((old, action)), "brake")["do"] == {"Ego": told}
+    assert entry(read((old, action)), "brake")["do"] == {"Ego": told}
 
 
 def test_lanes_by_number_or_beside(read: Callable[..., dict[str, Any]]) -> None:
@@ -190,7 +185,7 @@ def test_lanes_by_number_or_beside(read: Callable[..., dict[str, Any]]) -> None:
         ('<RelativeTargetLane entityRef="Ego" value="1"/>', {"lanes": 1}),
         ('<RelativeTargetLane entityRef="Lead" value="1"/>', {"to_lane_of": "Lead", "lanes": 1}),
     ):
-        change_lane = _entry(read((old, change.format(target))), "brake")["do"]["Ego"]["change_lane"]
+        change_lane = entry(read((old, change.format(target))), "brake")["do"]["Ego"]["change_lane"]
         assert change_lane == {**told, "stay_s": 1e5, "duration_s": 2.5}
 
 
@@ -202,7 +197,7 @@ def test_night_may_fall_while_a_run_lasts(tmp_path: Path) -> None:
         '<TimeOfDay animation="false" dateTime="2026-11-20T23:00:00+01:00"/><Weather><Fog visualRange="60"/></Weather>',
     )
     file.write_text(text, encoding="utf-8")
-    light = _entry(read_openscenario(file).data, "thicker_fog")["do"]["light"]
+    light = entry(read_openscenario(file).data, "thicker_fog")["do"]["light"]
     assert 1e-5 < light["illuminance_lx"] < 1e-2
     file.write_text(text.replace('entryName="saloon"', 'entryName="coach"', 1), encoding="utf-8")
     with pytest.raises(InputError, match="unknown entry 'coach' of Vehicles; known: saloon, lorry"):

@@ -1,8 +1,16 @@
-"""Small OpenSCENARIO files on a country road of 800 m along x, with a lane of 3.5 m each way."""
+"""Small OpenSCENARIO files on a country road of 800 m along x, with a lane of 3.5 m each way, and their runs."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-ROAD = Path(__file__).parents[1] / "data" / "openscenario" / "cases" / "road.xodr"
+import fogsim
+from fogsim.values import Step
+
+DATA = Path(__file__).parents[1] / "data" / "openscenario"
+CASES = DATA / "cases"
+ROAD, TWO_LANES = CASES / "road.xodr", DATA / "two_lanes.xodr"
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
 
 CAR = (
     '<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>'
@@ -94,3 +102,63 @@ def write(
         encoding="utf-8",
     )
     return file
+
+
+def run(file: Path, *settings: str) -> list[Step]:
+    return list(fogsim.run(fogsim.load_scenario(file, [*QUIET, *settings])))
+
+
+def first_step(file: Path) -> Step:
+    return next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
+
+
+def row_of(step: Step, name: str) -> int:
+    row = step.traffic.row(name)
+    assert row is not None
+    return row
+
+
+def motion(step: Step, name: str) -> tuple[float, float, float]:
+    """x and y of the front bumper [m] and speed [m/s]."""
+    row = row_of(step, name)
+    return (*map(float, step.traffic.position[row, :2]), float(step.traffic.speed[row]))
+
+
+def motion_at(steps: Sequence[Step], time: float, name: str) -> tuple[float, float, float]:
+    return motion(min(steps, key=lambda one: abs(one.time - time)), name)
+
+
+def begun(steps: Sequence[Step]) -> dict[str, float]:
+    """Times at which events last began [s], by name."""
+    return {one.name: one.time for step in steps for one in step.begun if not one.is_over}
+
+
+def entry(data: dict[str, Any], name: str) -> dict[str, Any]:
+    """Entry of the timeline."""
+    found: dict[str, Any] = next(entry for entry in data["timeline"] if entry["name"] == name)
+    return found
+
+
+def group(*conditions: str) -> str:
+    return f"<ConditionGroup>{''.join(conditions)}</ConditionGroup>"
+
+
+def state(kind: str, name: str, state: str, delay: float = 0.0) -> str:
+    """A condition on the state of an element."""
+    return (
+        f'<Condition name="s" delay="{delay}" conditionEdge="none"><ByValueCondition><StoryboardElementStateCondition '
+        f'storyboardElementType="{kind}" storyboardElementRef="{name}" state="{state}"/></ByValueCondition></Condition>'
+    )
+
+
+def over(name: str) -> str:
+    """Group of one condition: an event is over."""
+    return group(state("event", name, "completeState"))
+
+
+def changes_lane(target: int, dimension: str, value: float) -> str:
+    return (
+        "<PrivateAction><LateralAction><LaneChangeAction><LaneChangeActionDynamics "
+        f'dynamicsShape="cubic" dynamicsDimension="{dimension}" value="{value}"/><LaneChangeTarget>'
+        f'<AbsoluteTargetLane value="{target}"/></LaneChangeTarget></LaneChangeAction></LateralAction></PrivateAction>'
+    )

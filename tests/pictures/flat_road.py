@@ -80,10 +80,7 @@ def seen(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> tuple[np.
     camera = road.camera
     x = (cols - camera.principal_point[0]) / camera.focal_length
     y = (rows - camera.principal_point[1]) / camera.focal_length
-    x, y = (
-        x * np.cos(camera.roll) + y * np.sin(camera.roll),
-        -x * np.sin(camera.roll) + y * np.cos(camera.roll),
-    )
+    x, y = (x * np.cos(camera.roll) + y * np.sin(camera.roll), -x * np.sin(camera.roll) + y * np.cos(camera.roll))
     forward = np.cos(camera.pitch) - y * np.sin(camera.pitch)
     down = np.sin(camera.pitch) + y * np.cos(camera.pitch)
     ahead = road_distance(road, down / forward)

@@ -27,6 +27,7 @@ from fogsim.values import (
     Truth,
     View,
 )
+from tests.helpers.vehicles import vehicles
 
 METHODS = ("joint_road", "negru2013")
 LOG_EXTINCTION = np.linspace(math.log(1e-4), math.log(0.3), 240)
@@ -36,20 +37,14 @@ def traffic(
     time: float, speed: float, acceleration: float = 0.0, *, x: float = 0.0, lamps: Lamp = Lamp.NONE
 ) -> TrafficState:
     """The ego "ego" in row 1, another car in row 0."""
-    return TrafficState(
+    return vehicles(
+        [x + 60.0, x],
         time=time,
         ids=("other", "ego"),
-        types=("car", "car"),
-        position=np.array([[x + 60.0, 0.0, 0.0], [x, 0.0, 0.0]]),
-        heading=np.zeros(2),
-        speed=np.array([20.0, speed]),
-        acceleration=np.array([0.0, acceleration]),
-        length=np.full(2, 4.6),
-        width=np.full(2, 1.8),
-        height=np.full(2, 1.5),
-        lane=("motorway_1", "motorway_1"),
-        lamps=np.array([Lamp.NONE, lamps], dtype=np.int32),
-        paint=np.full((2, 3), 0.3),
+        speed=[20.0, speed],
+        acceleration=[0.0, acceleration],
+        lane="motorway_1",
+        lamps=[0, int(lamps)],
     )
 
 

@@ -17,20 +17,16 @@ from fogsim.values import (
     Fault,
     SignalColour,
     SignalState,
-    TrafficState,
     TrafficStep,
     Truth,
 )
 from fogsim.values.fault import Blackout
 from fogsim.values.script import Begun
+from tests.helpers.vehicles import vehicles
 
 
 def step(index: int, **further: object) -> TrafficStep:
-    one, two = np.zeros(1), np.ones(1)
-    state = TrafficState(
-        0.1 * index, ("slow",), ("car",), np.array([[5.0, 6.0, 7.0]]), one, one, one, two, two, two, ("e_0",),
-        np.zeros(1, np.int32), np.zeros((1, 3)),
-    )  # fmt: skip
+    state = vehicles([[5.0, 6.0, 7.0]], time=0.1 * index, ids=["slow"], lane="e_0")
     truth = Truth(0.0, 0.0, faults=(Fault(Blackout()),) if index == 1 else ())
     plain = TrafficStep(
         index=index, time=0.1 * index, traffic=state, collisions=(), truth=truth, command=Command(), ending=None

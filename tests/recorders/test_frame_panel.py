@@ -113,7 +113,7 @@ def test_many_methods_clear_air_and_no_advice_can_be_drawn() -> None:
 
 
 def test_a_long_run_scrolls() -> None:
-    frame = draw(*drive(400))
+    frame = draw(*drive(140, 0.5))
     assert (frame[300:392, 656:1008] == TRUTH).all(axis=-1).any()
 
 

@@ -10,6 +10,7 @@ import pytest
 from fogsim.scene import build_scene
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Camera, CameraPose, Lamp, RoadNetwork, Scene, Sign, SignMap, TrafficState
+from tests.helpers.vehicles import vehicles
 
 NET = Path(__file__).parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 SIZES = {
@@ -74,19 +75,13 @@ def traffic(places: list[tuple[np.ndarray, float]]) -> TrafficState:
     heading = np.array([direction for _, direction in places])
     ahead = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
     lamps = int(Lamp.POSITION | Lamp.LOW_BEAM)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{i}" for i in range(len(places))),
-        types=kinds,
-        position=np.array([point for point, _ in places]).reshape(-1, 3) + ahead * size[:, :1],
+    return vehicles(
+        np.array([point for point, _ in places]).reshape(-1, 3) + ahead * size[:, :1],
+        kinds=kinds,
         heading=heading,
-        speed=np.full(len(places), 25.0),
-        acceleration=np.zeros(len(places)),
-        length=size[:, 0],
-        width=size[:, 1],
-        height=size[:, 2],
-        lane=("",) * len(places),
-        lamps=np.array([lamps | (int(Lamp.STOP) if i % 3 == 0 else 0) for i in range(len(places))], np.int32),
+        speed=25.0,
+        size=size,
+        lamps=[lamps | (int(Lamp.STOP) if i % 3 == 0 else 0) for i in range(len(places))],
         paint=np.array([PAINTS[i % len(PAINTS)] for i in range(len(places))]).reshape(-1, 3),
     )
 

@@ -1,7 +1,5 @@
 import math
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -10,18 +8,9 @@ import pytest
 from fogsim.errors import InputError, MissingDependencyError, UnknownNameError
 from fogsim.render import Renderer, RenderError, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.values import (
-    Camera,
-    CameraPose,
-    Lamp,
-    Lane,
-    LaneMarking,
-    RoadNetwork,
-    Scene,
-    SignMap,
-    TrafficState,
-    View,
-)
+from fogsim.values import Camera, CameraPose, Lamp, Lane, LaneMarking, RoadNetwork, Scene, SignMap, TrafficState, View
+from tests.helpers.command import run_python
+from tests.helpers.vehicles import vehicles
 
 CAMERA = Camera(640, 480, 577.0, (320.0, 240.0), 1.38, pitch=math.radians(2.0))
 SMALL = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
@@ -69,22 +58,7 @@ def one_vehicle(
     kind: str, gap: float, lamps: int = 0, size: tuple[float, float, float] = (16.5, 2.5, 4.0)
 ) -> TrafficState:
     """A vehicle on y = 0 whose rear is `gap` metres ahead of the origin."""
-    length, width, height = size
-    return TrafficState(
-        time=0.0,
-        ids=("lead",),
-        types=(kind,),
-        position=np.array([[gap + length, 0.0, 0.0]]),
-        heading=np.zeros(1),
-        speed=np.zeros(1),
-        acceleration=np.zeros(1),
-        length=np.array([length]),
-        width=np.array([width]),
-        height=np.array([height]),
-        lane=("",),
-        lamps=np.array([lamps], np.int32),
-        paint=np.full((1, 3), 0.3),
-    )
+    return vehicles([gap + size[0]], ids=["lead"], kinds=kind, size=size, lamps=lamps)
 
 
 def rays(camera: Camera, pose: CameraPose) -> np.ndarray:
@@ -288,7 +262,7 @@ def test_renderers_give_back_what_they_hold(scene: Scene, renderer: Renderer) ->
 
     before = held()
     assert min(before[:5]) > 0
-    for _ in range(30):
+    for _ in range(5):
         one = make_renderer("auto", scene, ILLUMINANCE)
         one.render((), SMALL, AHEAD)
         one.render((), CAMERA, AHEAD)
@@ -314,16 +288,6 @@ def test_the_report_names_the_version(renderer: Renderer) -> None:
     assert re.match(r"OpenGL \((EGL|OSMesa)\) [34]\.\d", gl_report())
 
 
-def run(code: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    return done.stdout + done.stderr
-
-
-def test_importing_the_stage_loads_no_opengl() -> None:
-    code = "import sys, fogsim.render, fogsim.scene; print([m for m in sys.modules if m in ('OpenGL', 'pyrender')])"
-    assert run(code).strip() == "[]"
-
-
 def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer) -> None:
     code = (
         "import os\nfrom fogsim.render import gl_report\ngl_report()\n"
@@ -333,18 +297,8 @@ def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer
         "    os._exit(0)\n"
         "os.wait()\nprint('parent', gl_report())\n"
     )
-    said = run(code)
+    done = run_python("-c", code)
+    said = done.stdout + done.stderr
     assert "RenderError" in said
     assert "does not survive a fork" in said
     assert "parent" in said
-
-
-def test_a_missing_egl_names_the_packages() -> None:
-    code = (
-        "import ctypes.util, sys\nsys.modules['pyrender.platforms'] = None\n"
-        "from fogsim.render import gl_report\n"
-        "try:\n    gl_report()\nexcept Exception as error:\n    print(type(error).__name__, error)\n"
-    )
-    said = run(code)
-    assert said.startswith("MissingDependencyError")
-    assert "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri" in said

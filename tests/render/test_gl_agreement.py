@@ -12,7 +12,8 @@ from fogsim.errors import MissingDependencyError
 from fogsim.render import Renderer, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Sign, SignMap, TrafficState, View
+from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Sign, SignMap, View
+from tests.helpers.vehicles import vehicles
 
 ROOT = Path(__file__).resolve().parents[2]
 ILLUMINANCE = 18e3
@@ -75,21 +76,13 @@ def vehicles_at(route: np.ndarray, ahead: dict[float, tuple[str, float]]) -> tup
     sizes = {"car": (4.5, 1.8, 1.5), "truck": (16.5, 2.5, 4.0), "van": (5.9, 2.0, 2.6), "bus": (12.0, 2.55, 3.2)}
     places = [along(route, station, left) for station, (_, left) in ahead.items()]
     kinds = tuple(kind for kind, _ in ahead.values())
-    size, n = np.array([sizes[kind] for kind in kinds]), len(kinds)
-    state = TrafficState(
-        time=0.0,
-        ids=tuple(map(str, range(n))),
-        types=kinds,
-        position=np.array([place for place, _ in places]),
-        heading=np.array([heading for _, heading in places]),
-        speed=np.zeros(n),
-        acceleration=np.zeros(n),
-        length=size[:, 0],
-        width=size[:, 1],
-        height=size[:, 2],
-        lane=("",) * n,
-        lamps=np.full(n, int(Lamp.POSITION | Lamp.STOP), np.int32),
-        paint=np.full((n, 3), 0.3),
+    state = vehicles(
+        [place for place, _ in places],
+        ids=map(str, range(len(kinds))),
+        kinds=kinds,
+        heading=[heading for _, heading in places],
+        size=[sizes[kind] for kind in kinds],
+        lamps=int(Lamp.POSITION | Lamp.STOP),
     )
     return vehicle_batches(state, None)
 
@@ -151,8 +144,7 @@ def walls(*distances: float) -> Scene:
 
 @pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 @pytest.mark.parametrize(
-    ("distance", "tolerance"),
-    [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)],
+    ("distance", "tolerance"), [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)]
 )
 def test_a_wall_is_as_far_as_it_is_and_hides_what_is_hardly_farther(
     renderer: str, distance: float, tolerance: float

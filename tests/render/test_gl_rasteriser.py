@@ -1,7 +1,5 @@
+import functools
 import math
-import os
-import subprocess
-import sys
 from ctypes.util import find_library
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from fogsim.render.opengl.meshes import COMMAND, COPY, corners, packed
 from fogsim.render.opengl.rasteriser import GLRasteriser
 from fogsim.values import Camera, CameraPose, Mesh
 from fogsim.values.pinhole import camera_axes
+from tests.helpers.command import run_python
 
 CAMERA = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
 POSE = CameraPose((3.0, -2.0, 1.38), heading=0.7)
@@ -185,18 +184,11 @@ print(len(np.unique(triangle_ids)), hashlib.sha256(triangle_ids.tobytes()).hexdi
 """
 
 
+@functools.cache
 def drawn(**environment: str) -> tuple[str, str]:
     """OpenGL's version and a digest of a picture, drawn by another process."""
     code = DRAW.format(folder=str(Path(__file__).parent))
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-        env={**os.environ, **environment},
-    )
-    version, digest = done.stdout.splitlines()
+    version, digest = run_python("-c", code, environment=environment).stdout.splitlines()
     return version, digest
 
 

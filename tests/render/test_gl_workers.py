@@ -1,14 +1,12 @@
 """Renderers in other processes, without OpenGL, and many of them one after another."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from fogsim.errors import MissingDependencyError
 from fogsim.render import gl_report
+from tests.helpers.command import run_python
 
 WORKERS = Path(__file__).with_name("workers.py")
 PACKAGES = "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
@@ -24,22 +22,19 @@ def _opengl() -> None:
 
 def run(*arguments: str, **environment: str) -> str:
     """What a fresh Python says."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-        env={**os.environ, **environment},
-    )
+    done = run_python(*arguments, environment=environment, check=False)
     return done.stdout + done.stderr
 
 
 @pytest.mark.usefixtures("_opengl")
-# The other two, fork with cpu and spawn with opengl, draw below, where the parent drew first.
+# Fork with cpu and spawn with opengl draw below, where the parent drew first.
 @pytest.mark.parametrize(
     ("method", "renderer"),
-    [("fork", "opengl"), ("spawn", "cpu"), pytest.param("forkserver", "opengl", marks=pytest.mark.nightly)],
+    [
+        ("fork", "opengl"),
+        pytest.param("spawn", "cpu", marks=pytest.mark.nightly),
+        pytest.param("forkserver", "opengl", marks=pytest.mark.nightly),
+    ],
 )
 def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)

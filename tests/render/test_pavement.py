@@ -8,13 +8,7 @@ import pytest
 
 import make_road_reflectance as model
 from fogsim.render import make_renderer
-from fogsim.render.shading.pavement import (
-    PERIOD,
-    asphalt,
-    mean_of_stretches,
-    reflectance_at,
-    reflectance_by_sine,
-)
+from fogsim.render.shading.pavement import PERIOD, asphalt, mean_of_stretches, reflectance_at, reflectance_by_sine
 from fogsim.scenario import build, load_scenario
 from fogsim.values import CameraPose, Pavement, RoadSurface, Scene, View
 from tests.render.conftest import Place, camera

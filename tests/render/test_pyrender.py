@@ -15,18 +15,7 @@ from fogsim.render import Renderer, RenderError, make_renderer, to_pyrender
 from fogsim.render.photometry import lamp_radiance
 from fogsim.scenario import load_scenario
 from fogsim.scene import vehicle_batches
-from fogsim.values import (
-    Beam,
-    CameraPose,
-    HeadLamp,
-    Lights,
-    LightSources,
-    Mesh,
-    Scene,
-    StreetLighting,
-    Surface,
-    View,
-)
+from fogsim.values import Beam, CameraPose, HeadLamp, Lights, LightSources, Mesh, Scene, StreetLighting, Surface, View
 from fogsim.values.scene import LEVELS_OF_DETAIL
 from tests.render.conftest import Place, camera
 

@@ -27,12 +27,7 @@ from fogsim.reproduce.drivers.published import Bound, Look, Sign, Size, Verdict
 from fogsim.reproduce.drivers.road import drive, follow, measured_pairs
 
 PART = Plan(
-    seeds=(1,),
-    demands=(SPARSE,),
-    visibilities=(CLEAR, 100.0),
-    seconds=60.0,
-    leader_speeds=(SLOW,),
-    followers=2,
+    seeds=(1,), demands=(SPARSE,), visibilities=(CLEAR, 100.0), seconds=60.0, leader_speeds=(SLOW,), followers=2
 )
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 from fogsim.calibration.staged_road import foggy_image, views
-from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.negru2013 import CAMERA, EXTINCTIONS, SCENES, reproduce
 from fogsim.reproduce.road_sweeps import SETTINGS
+from tests.helpers.command import Command
 
 
 @pytest.fixture(scope="module")
@@ -85,23 +85,14 @@ def test_the_airlight_fills_the_pixels_and_nothing_stands_on_the_empty_road() ->
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, done):
-    """Run the command in this process, the evaluation itself being done: exit code, stdout and stderr."""
+def reproduced(command: Command, monkeypatch, done) -> Command:
+    """Run the command in this process, the evaluation itself being done."""
     monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": lambda **_: done})
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out, told.err
-
-    return run
+    return partial(command, "reproduce")
 
 
-def test_the_command_prints_a_table_and_writes_a_picture(command, tmp_path: Path) -> None:
-    code, out, _ = command("all", "--out", str(tmp_path / "new"))
+def test_the_command_prints_a_table_and_writes_a_picture(reproduced, tmp_path: Path) -> None:
+    code, out, _ = reproduced("all", "--out", str(tmp_path / "new"))
     assert code == 0
     assert "empty road" in out
     assert "2 published figures" in out
@@ -109,21 +100,21 @@ def test_the_command_prints_a_table_and_writes_a_picture(command, tmp_path: Path
         assert picture.size == (3 * 688, 515)
 
 
-def test_the_command_prints_records(command, done) -> None:
-    code, out, _ = command("negru2013", "--json")
+def test_the_command_prints_records(reproduced, done) -> None:
+    code, out, _ = reproduced("negru2013", "--json")
     assert code == 0
     lines = [json.loads(line) for line in out.splitlines()]
     assert [line["figure"] for line in lines if line.get("table") == "cells"] == [21.0, 12.0]
     assert lines[len(done.cells) :] == [dict(record) for record in (*done.records, *done.sweeps)]
 
 
-def test_unknown_papers_answer_with_the_nearest(command) -> None:
-    code, _, err = command("negru2031")
+def test_unknown_papers_answer_with_the_nearest(reproduced) -> None:
+    code, _, err = reproduced("negru2031")
     assert code == 2
     assert "did you mean 'negru2013'" in err
 
 
-def test_a_table_is_one_papers(command) -> None:
-    code, _, err = command("all", "--table", "2")
+def test_a_table_is_one_papers(reproduced) -> None:
+    code, _, err = reproduced("all", "--table", "2")
     assert code == 2
     assert "--table 2 needs one paper, not all" in err

@@ -23,7 +23,7 @@ NEGRU2013: Quotes = {
         " of 21 ms.",
         "The resolution of the real time images is of 512 x 383 pixels and the average processing time of our fog"
         " detection algorithm is of 12 ms.",
-    ),
+    )
 }
 
 ZHU2015: Quotes = {
@@ -47,7 +47,7 @@ BELAROUSSI2015: Quotes = {
         r"with an error of up to 28 m: $\delta d_{vis} < 28m$. The proposed algorithm overestimate the density of fog"
         r" with an estimation at $d_{vis}^e = 72m$ for $d_{vis}^* = 100m$, and slightly underestimate it with"
         r" $d_{vis}^e = 172m$ for $d_{vis}^* = 150m$.",
-    ),
+    )
 }
 
 HUANG2015: Quotes = {

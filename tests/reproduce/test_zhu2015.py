@@ -1,14 +1,12 @@
 """zhu2015's evaluation on our frames: a few of its drives, and the drives themselves."""
 
 import json
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogsim.calibration.staged_road import road_renderer
-from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.estimators.zhu2015_road import Zhu2015Repair
@@ -161,16 +159,11 @@ def test_wear_changes_the_road_where_it_lies_and_is_averaged_where_a_row_holds_m
     assert np.array_equal(elsewhere.radiance, view.radiance)
 
 
-def test_the_command_prints_table_and_records(monkeypatch, capsys, done) -> None:
+def test_the_command_prints_table_and_records(monkeypatch, command, done) -> None:
     monkeypatch.setattr(REPRODUCTIONS, "_entries", {"zhu2015": lambda **_: done})
-    monkeypatch.setenv("COLUMNS", "200")
-    for arguments in (["zhu2015"], ["zhu2015", "--json"]):
-        monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        assert not ended.value.code
-    out = capsys.readouterr().out
+    (code, out, _), (of_json, records, _) = (command("reproduce", "zhu2015", *more) for more in ((), ("--json",)))
+    assert code == of_json == 0
     assert "thick fog" in out
     assert all(title in out for title in TITLES.values())
-    lines = [json.loads(line) for line in out.splitlines() if line.startswith("{")]
+    lines = [json.loads(line) for line in records.splitlines()]
     assert lines[len(done.cells) :] == [dict(r) for r in (*done.records, *done.sweeps)]

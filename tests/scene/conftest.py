@@ -1,9 +1,9 @@
-"""A small motorway to build scenes of."""
+"""A small motorway to build scenes of, and what lies at a place of a scene."""
 
 import numpy as np
 import pytest
 
-from fogsim.values import Lane, LaneMarking, RoadNetwork
+from fogsim.values import Lane, LaneMarking, Mesh, RoadNetwork, Surface
 
 
 def carriageway(edge: str, start: tuple[float, float], heading: float, length: float, speed: float) -> list[Lane]:
@@ -30,3 +30,16 @@ def carriageway(edge: str, start: tuple[float, float], heading: float, length: f
 def motorway() -> RoadNetwork:
     lanes = carriageway("out", (0, 0), 0.0, 600.0, 36.0) + carriageway("back", (600, 20), np.pi, 600.0, 36.0)
     return RoadNetwork(tuple(lanes), lanes[0].centreline)
+
+
+def road_under(mesh: Mesh, x: float, y: float, surfaces: tuple[Surface, ...] = (Surface.ROAD,)) -> list[float]:
+    """Heights of all triangles of some surfaces above or below a place."""
+    chosen = np.isin(mesh.surface[mesh.faces[:, 0]], [int(s) for s in surfaces])
+    corners = mesh.positions[mesh.faces[chosen]].astype(float)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    double = np.where(np.abs(double) > 1e-9, double, np.inf)
+    u = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (y - a[:, 1]) * (c[:, 0] - a[:, 0])) / double
+    v = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])) / double
+    inside = np.isfinite(double) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+    return list((a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2]))[inside])

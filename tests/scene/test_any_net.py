@@ -11,7 +11,6 @@ from fogsim.values import (
     Lane,
     LaneKind,
     LaneMarking,
-    Mesh,
     PavedArea,
     RoadNetwork,
     Scene,
@@ -20,22 +19,11 @@ from fogsim.values import (
     StructureKind,
     Surface,
 )
+from tests.scene.conftest import road_under
 
 
 def build(network: RoadNetwork) -> Scene:
     return build_scene(network, SignMap(), np.random.default_rng(5))
-
-
-def road_under(mesh: Mesh, x: float, y: float, surface: Surface = Surface.MATT) -> list[float]:
-    """Heights of all triangles of a surface above or below a place."""
-    corners = mesh.positions[mesh.faces[mesh.surface[mesh.faces[:, 0]] == int(surface)]].astype(float)
-    origin, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    double = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    double = np.where(np.abs(double) > 1e-9, double, np.inf)
-    dx, dy = x - origin[:, 0], y - origin[:, 1]
-    a, b = (dx * v[:, 1] - dy * v[:, 0]) / double, (u[:, 0] * dy - u[:, 1] * dx) / double
-    inside = np.isfinite(double) & (a >= -1e-9) & (b >= -1e-9) & (a + b <= 1 + 1e-9)
-    return list((origin[:, 2] + a * u[:, 2] + b * v[:, 2])[inside])
 
 
 def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
@@ -50,7 +38,7 @@ def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
     assert LaneIndex([there, back]).clearance(ground.positions[raised].astype(float)).min() > -0.15
     # Both directions share the ground between them.
     for y in (1.9, 2.5):
-        assert max(road_under(ground, 10.0, y, Surface.MATT)) == pytest.approx(KERB)
+        assert max(road_under(ground, 10.0, y, (Surface.MATT,))) == pytest.approx(KERB)
 
 
 def test_what_lies_beside_a_road_reaches_up_to_the_road_that_it_ends_at() -> None:
@@ -59,7 +47,7 @@ def test_what_lies_beside_a_road_reaches_up_to_the_road_that_it_ends_at() -> Non
     across = np.array([[1.6, 80.0, 0], [1.6, -80, 0]])
     other = Lane("b", "b", across, 3.2, 13.9, solid, solid, outermost=True)
     ground = build(RoadNetwork((into, other), line)).ground
-    assert max(road_under(ground, -0.5, -2.5, Surface.MATT)) == pytest.approx(KERB)
+    assert max(road_under(ground, -0.5, -2.5, (Surface.MATT,))) == pytest.approx(KERB)
 
 
 def test_a_walking_area_that_vehicles_drive_over_is_no_kerb_in_their_way() -> None:
@@ -128,8 +116,8 @@ def test_a_footway_ends_where_a_road_lies_across_it() -> None:
     none = LaneMarking.NONE
     way = Lane("w", "w", line[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
     ground = build(RoadNetwork((road, way), line)).ground
-    assert max(road_under(ground, 0.0, 10.0)) == pytest.approx(KERB)
-    assert max(road_under(ground, 0.0, 0.0), default=-1.0) < 0.0
+    assert max(road_under(ground, 0.0, 10.0, (Surface.MATT,))) == pytest.approx(KERB)
+    assert max(road_under(ground, 0.0, 0.0, (Surface.MATT,)), default=-1.0) < 0.0
 
 
 def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:

@@ -8,6 +8,7 @@ from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSI
 from fogsim.scene.vehicles import body_shapes
 from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
 from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
+from tests.helpers.vehicles import vehicles
 
 SHAPES = body_shapes()
 FLAT = Beam(np.radians([-90.0, 90.0]), np.radians([-90.0, 90.0]), np.full((2, 2), 500.0))
@@ -18,23 +19,8 @@ SIZES = {"car": (4.5, 1.8, 1.5), "truck": (16.5, 2.55, 4.0), "bus": (12.0, 2.5, 
 
 def one(lamps: Lamp, *, kind: str = "car", gap: float = 30.0, heading: float = 0.0, y: float = 0.0) -> TrafficState:
     """A vehicle whose nearer end is `gap` metres ahead of the origin: its rear, or its front if it comes towards it."""
-    length, width, height = SIZES[kind]
-    x = gap + length * (np.cos(heading) > 0)
-    return TrafficState(
-        time=0.0,
-        ids=("v",),
-        types=(kind,),
-        position=np.array([[x, y, 0.5]]),
-        heading=np.array([heading]),
-        speed=np.zeros(1),
-        acceleration=np.zeros(1),
-        length=np.array([length]),
-        width=np.array([width]),
-        height=np.array([height]),
-        lane=("",),
-        lamps=np.array([int(lamps)], np.int32),
-        paint=np.full((1, 3), 0.3),
-    )
+    x = gap + SIZES[kind][0] * (np.cos(heading) > 0)
+    return vehicles([[x, y, 0.5]], ids="v", kinds=kind, heading=heading, size=SIZES[kind], lamps=int(lamps))
 
 
 def surfaces(state: TrafficState, surface: Surface) -> np.ndarray:
@@ -137,10 +123,7 @@ def test_street_lamps_within_400_m_shine_by_their_angle(motorway: RoadNetwork) -
 
 
 def test_an_empty_dark_road_has_no_sources() -> None:
-    empty = TrafficState(
-        0.0, (), (), *[np.zeros((0, 3))], *[np.zeros(0)] * 6, (), np.zeros(0, np.int32), np.zeros((0, 3))
-    )
-    found = light_sources(empty, None, EYE, BEAMS)
+    found = light_sources(vehicles([]), None, EYE, BEAMS)
     assert isinstance(found, LightSources)
     assert (found.position.shape, found.colour.shape) == ((0, 3), (0, 3))
 

@@ -8,29 +8,16 @@ from fogsim.lighting.beams import LampMount
 from fogsim.scene import road_beams
 from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import Side, dark_on
+from tests.helpers.vehicles import vehicles
 
 BEAMS = LampMount().beams
 LOW = int(Lamp.POSITION | Lamp.LOW_BEAM)
 
 
-def traffic(*vehicles: tuple[float, int]) -> TrafficState:
+def traffic(*cars: tuple[float, int]) -> TrafficState:
     """Cars on a line, by their places along it and their lamps; the first has the camera."""
-    count = len(vehicles)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{i}" for i in range(count)),
-        types=("passenger",) * count,
-        position=np.array([[place, 0.0, 2.0] for place, _ in vehicles]),
-        heading=np.full(count, math.pi),
-        speed=np.zeros(count),
-        acceleration=np.zeros(count),
-        length=np.full(count, 4.6),
-        width=np.full(count, 1.8),
-        height=np.full(count, 1.5),
-        lane=("a",) * count,
-        lamps=np.array([lamps for _, lamps in vehicles], np.int32),
-        paint=np.zeros(count, np.int64),
-    )
+    places = [[place, 0.0, 2.0] for place, _ in cars]
+    return vehicles(places, kinds="passenger", heading=math.pi, lamps=[lamps for _, lamps in cars])
 
 
 def test_who_shines_lights_the_road_and_the_camera_itself_does_not() -> None:

@@ -10,18 +10,8 @@ from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.road import KERB, transverse_markings
 from fogsim.scene.terrain import Terrain
-from fogsim.values import (
-    Lane,
-    LaneEnd,
-    LaneKind,
-    LaneMarking,
-    Mesh,
-    PavedArea,
-    RoadNetwork,
-    Scene,
-    SignMap,
-    Surface,
-)
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
+from tests.scene.conftest import road_under
 
 L_SHAPE = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [4, 4, 0], [4, 10, 0], [0, 10, 0]])
 
@@ -75,19 +65,6 @@ def hill(slope: float = 0.06) -> Lane:
 def areas_of(part: Mesh) -> np.ndarray:
     a, b, c = (part.positions[part.faces[:, i]].astype(float) for i in range(3))
     return 0.5 * np.cross(b - a, c - a)[:, 2]
-
-
-def road_under(mesh: Mesh, x: float, y: float, surfaces: tuple[Surface, ...] = (Surface.ROAD,)) -> list[float]:
-    """Heights of all triangles of some surfaces above or below a place."""
-    chosen = np.isin(mesh.surface[mesh.faces[:, 0]], [int(s) for s in surfaces])
-    corners = mesh.positions[mesh.faces[chosen]].astype(float)
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    double = np.where(np.abs(double) > 1e-9, double, np.inf)
-    u = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (y - a[:, 1]) * (c[:, 0] - a[:, 0])) / double
-    v = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])) / double
-    inside = np.isfinite(double) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-    return list((a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2]))[inside])
 
 
 @pytest.mark.parametrize("outline", [L_SHAPE, L_SHAPE[::-1]], ids=["counterclockwise", "clockwise"])

@@ -4,6 +4,7 @@ import pytest
 from fogsim.scene import vehicle_batches
 from fogsim.scene.vehicles import body_of, body_shapes
 from fogsim.values import Lamp, TrafficState
+from tests.helpers.vehicles import vehicles
 
 KINDS = ("car", "van", "truck", "bus", "motorcycle", "hovercraft")
 SHAPES = body_shapes()
@@ -13,19 +14,12 @@ SHAPES = body_shapes()
 def state() -> TrafficState:
     count = len(KINDS)
     rng = np.random.default_rng(2)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{i}" for i in range(count)),
-        types=KINDS,
-        position=rng.uniform(-50, 50, (count, 3)),
+    return vehicles(
+        rng.uniform(-50, 50, (count, 3)),
+        kinds=KINDS,
         heading=rng.uniform(-np.pi, np.pi, count),
-        speed=np.zeros(count),
-        acceleration=np.zeros(count),
-        length=rng.uniform(2, 16, count),
-        width=rng.uniform(0.8, 2.6, count),
-        height=rng.uniform(1.3, 4, count),
-        lane=("",) * count,
-        lamps=np.arange(count, dtype=np.int32),
+        size=rng.uniform((2, 0.8, 1.3), (16, 2.6, 4), (count, 3)),
+        lamps=np.arange(count),
         paint=rng.uniform(0, 1, (count, 3)),
     )
 
@@ -84,8 +78,5 @@ def test_paint_and_lamps_follow_their_rows(state: TrafficState) -> None:
 
 
 def test_an_empty_road_has_no_batches(state: TrafficState) -> None:
-    empty = TrafficState(
-        0.0, (), (), *[np.zeros((0, 3))], *[np.zeros(0)] * 6, (), np.zeros(0, np.int32), np.zeros((0, 3))
-    )
-    assert vehicle_batches(empty, None) == ()
+    assert vehicle_batches(vehicles([]), None) == ()
     assert Lamp.NONE == 0

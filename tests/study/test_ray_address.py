@@ -11,7 +11,7 @@ from fogsim.scenario import load_scenario
 from fogsim.scenario.starting import begin_scenario
 from fogsim.study import RayCluster, StudyRun, run_study
 from fogsim.study.ray_cluster import _running_versions, _unfitness, deciding_files
-from tests.conftest import Command
+from tests.helpers.command import Command
 
 SCENARIO = load_scenario("motorway_fog_bank")
 RUN = StudyRun(0, {}, 0, SCENARIO, "key")

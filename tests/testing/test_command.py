@@ -2,20 +2,18 @@
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 from early_motorway import ROUTES
 
 from fogsim.testing import check_one_case
 from fogsim.testing.execution import ThisProcess
+from tests.helpers.command import Command
 
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
-Command = Callable[..., "CompletedProcess[str]"]
 
 SCENARIO = f"""
 name: short

@@ -19,10 +19,7 @@ def test_all_cases_are_run_and_judged(tmp_path: Path) -> None:
     assert [one.is_passed for one in outcomes] == [False, True, False]
     assert outcomes[2].broken[0].message == BROKEN["message"]
     assert seen == [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2)]
-    assert last_failed(tmp_path / "out") == {
-        tmp_path / "a0.fog.yaml": ["run=1"],
-        tmp_path / "c0.fog.yaml": [""],
-    }
+    assert last_failed(tmp_path / "out") == {tmp_path / "a0.fog.yaml": ["run=1"], tmp_path / "c0.fog.yaml": [""]}
     again = only_cases(tests, last_failed(tmp_path / "out"))
     assert [run.key for test in again for run in test.runs] == ["a1", "c0"]
 

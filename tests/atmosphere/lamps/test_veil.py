@@ -97,8 +97,7 @@ def test_veil_is_that_of_photons(tables):
 
 
 @pytest.mark.parametrize(
-    ("droplets", "kind"),
-    [("moderate_radiation", FogKind.RADIATION), ("heavy_advection", FogKind.ADVECTION)],
+    ("droplets", "kind"), [("moderate_radiation", FogKind.RADIATION), ("heavy_advection", FogKind.ADVECTION)]
 )
 def test_level_is_that_of_gallen_at_100_m(tables, droplets, kind):
     air = air_on(one_ray(0.0, -2.02), tables["high"], droplets)

@@ -1,0 +1,31 @@
+"""A town in SUMO, as a user starts it, to attach FogSim to."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import traci
+
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+
+GRID = Path(__file__).resolve().parents[1] / "data" / "grid"
+ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
+
+
+@contextlib.contextmanager
+def libsumo_in_town() -> Iterator[Any]:
+    library = load_libsumo()
+    library.start(["sumo", *ARGUMENTS])
+    try:
+        yield library
+    finally:
+        library.close()
+
+
+@contextlib.contextmanager
+def traci_in_town(sumo_process: Callable) -> Iterator[Any]:
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connection
+        connection.close()

@@ -1,0 +1,70 @@
+"""Programs in this process, since one of their own would spend its time on imports, and in processes of their own."""
+
+import contextlib
+import io
+import os
+import runpy
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from fogsim.cli import app
+
+
+class Ran(NamedTuple):
+    """What a program left."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Command = Callable[..., Ran]
+"""The fixture `command`: takes arguments, and `cwd`."""
+
+
+def run_command(*arguments: str) -> int:
+    """Run fogsim's command line, which may be in a fixture of any scope; gives its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["fogsim", *arguments])
+        patch.setenv("COLUMNS", "300")
+        with pytest.raises(SystemExit) as ended:
+            app.main()
+    return int(ended.value.code or 0)
+
+
+def run_script(script: Path, *arguments: str | Path) -> Ran:
+    """Run a script of benchmarks/ or docs/."""
+    out, err, code = io.StringIO(), io.StringIO(), None
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        for folder in ("docs", "benchmarks"):
+            patch.syspath_prepend(Path(__file__).parents[2] / folder)
+        patch.setattr(sys, "argv", [str(script), *map(str, arguments)])
+        try:
+            runpy.run_path(str(script), run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+    # What is no number is a program's last words.
+    words = f"{code}\n" if isinstance(code, str) else ""
+    return Ran(1 if words else int(code or 0), out.getvalue(), err.getvalue() + words)
+
+
+def run_python(
+    *arguments: str | Path, environment: dict[str, str] | None = None, cwd: Path | None = None, check: bool = True
+) -> Ran:
+    """Run Python in a process of its own, with changes to the environment."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=cwd,
+        env={**os.environ, **(environment or {})},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert not (check and done.returncode), done.stderr
+    return Ran(done.returncode, done.stdout, done.stderr)

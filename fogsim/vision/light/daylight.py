@@ -82,13 +82,18 @@ _SHOWN = (
 @kernel
 def _lit(luminance: NDArray[np.float32], strips: NDArray[np.int64], first: int, last: int) -> int:
     """Which of `_SHOWN` the luminance of a view's rows (n, cols) shows, with columns of what is overhead, if any."""
-    sky, lane = _pixels_apart(luminance[:-_ROAD_ROWS]), _row_medians(luminance, strips[0])
+    lane, cols = _row_medians(luminance, strips[0]), luminance.shape[1]
+    sky = _ascending(luminance[:-_ROAD_ROWS], 0, cols, _SKY_STEP)
     above = _sorted_quantile(sky, _BRIGHT_SHARE)
     if last > first:
-        overhead = np.sort(luminance[:-_ROAD_ROWS, first:last].copy().ravel())
+        overhead = _ascending(luminance[:-_ROAD_ROWS], first, min(last, cols), 1)
         above = min(above, _sorted_quantile(overhead, _BRIGHT_SHARE))
-    seen = np.sort(lane[~np.isnan(lane)])
-    if seen.size > lane.size // 2 and seen[lane.size // 2] > above:
+    # The median of the rows: those that are not seen count as the brightest.
+    seen, dark = 0, 0
+    for value in lane:
+        seen += not np.isnan(value)
+        dark += value <= above
+    if dark <= lane.size // 2 < seen:
         return 1
     shining = 0
     while shining < sky.size and sky[sky.size - 1 - shining] >= _LAMP:
@@ -99,16 +104,15 @@ def _lit(luminance: NDArray[np.float32], strips: NDArray[np.int64], first: int, 
 
 
 @kernel
-def _pixels_apart(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+def _ascending(rows: NDArray[np.float32], first: int, end: int, step: int) -> NDArray[np.float32]:
     """Pixels in every which column from both sides inward, in ascending order: of a mirrored image the same."""
-    cols = rows.shape[1]
     out, count = np.empty(rows.size, np.float32), 0
     for row in range(rows.shape[0]):
-        for col in range(0, (cols + 1) // 2, _SKY_STEP):
-            out[count] = rows[row, col]
+        for col in range(0, (end - first + 1) // 2, step):
+            out[count] = rows[row, first + col]
             count += 1
-        for col in range(0, cols // 2, _SKY_STEP):
-            out[count] = rows[row, cols - 1 - col]
+        for col in range(0, (end - first) // 2, step):
+            out[count] = rows[row, end - 1 - col]
             count += 1
     return np.sort(out[:count])
 

@@ -340,30 +340,31 @@ def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin
     """`sky_above` of rows (n,), given principal point, horizon and focal length [px]; NaN where it is hidden."""
     side, noise = image.pixels.shape[1] // 6, pixel_noise(image, rows)
     bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3))
-    height = (axis[2] - rows.astype(np.float64)) / axis[3]
-    level, _, scatter, lowest = level_at_horizon(bright, height, max(_DARKER, 2.0 * noise / max(bright.max(), 1e-9)))
+    height, most = np.empty(rows.size), 1e-9
+    for i in range(rows.size):
+        height[i], most = (axis[2] - rows[i]) / axis[3], max(most, bright[i])
+    level, _, scatter, lowest = level_at_horizon(bright, height, max(_DARKER, 2.0 * noise / most))
     if lowest > _MOST_HIDDEN:
         level = np.nan
     saturated, clipped = saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
-    seen, last = 0, rows.size - 1
+    seen, last, free, light = 0, rows.size - 1, np.empty(rows.size, np.int64), np.empty(rows.size)
     while last >= 0 and height[last] < lowest:
         last -= 1
-    free = np.empty(rows.size, np.int64)
-    for row in range(last, -1, -2):
+    for i in range(last, -1, -2):
         if clipped <= SATURATED_SHARE:
-            free[seen] = row
+            free[seen], light[seen] = rows[i], bright[i]
             seen += 1
-    shading = _shading(image, rows[free[:seen]], axis, bright[free[:seen]], noise, level, scatter)
+    shading = _shading(image, free[:seen], axis, light[:seen], noise, level, scatter)
     unseen = _UNSEEN * max(lowest - margin / axis[3] - _CLOSE, 0.0) * shading.level
     deviation = math.hypot(shading.deviation, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = np.median(share) < _PATCHY and shading.deviation > _SCATTERED * shading.level
     upward = _BRIGHTER * shading.level if covered else deviation
-    heights = (height[free[0]], height[free[seen - 1]]) if seen else (0.0, 0.0)
-    light = (shading.level, deviation, upward, noise, saturated, clipped)
+    heights = ((axis[2] - free[0]) / axis[3], (axis[2] - free[seen - 1]) / axis[3]) if seen else (0.0, 0.0)
+    level_and_noise = (shading.level, deviation, upward, noise, saturated, clipped)
     lens = (shading.vignetting, shading.vignetting_deviation, shading.unevenness)
-    return Sky(*light, *lens, shading.slope, shading.slope_deviation, heights)
+    return Sky(*level_and_noise, *lens, shading.slope, shading.slope_deviation, heights)
 
 
 class _Shading(NamedTuple):

@@ -53,8 +53,6 @@ test affected nightly: export MALLOC_TRIM_THRESHOLD_ := 2000000000
 # There is a process of pytest for each processor: threads of OpenBLAS in each would take turns waiting in a loop. A
 # product of matrices of 240×240 takes 0.6 ms of processor time with one thread, and up to 13 ms with two on a busy machine.
 test affected nightly: export OPENBLAS_NUM_THREADS := 1
-test affected nightly: export OMP_NUM_THREADS := 1
-test affected nightly: export LP_NUM_THREADS := 1
 PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal
 
 test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the test suite, except what has its own command and what is nightly

@@ -320,7 +320,8 @@ def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check 
     kind: Any = origin if isinstance(origin, type) else annotation
     if kind in _ANYTHING or not isinstance(kind, type):
         return None
-    named = _WORDS.get(kind, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}")
+    plain = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
+    named = _WORDS.get(kind) or getattr(kind, "EXPECTED", plain)
     check = _instance_check((os.PathLike if kind is Path else kind,), named)
     if kind is np.ndarray and parts:
         check = _array_check(get_args(parts[1])[0])

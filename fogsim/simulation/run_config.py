@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from fogsim.atmosphere import FogConfig
 from fogsim.camera import DEFAULT_CAMERA, CameraConfig
@@ -270,6 +270,7 @@ class ScenarioLike(ABC):
     """What can be run: a `RunConfig`, or a scenario, which makes one."""
 
     __slots__ = ()
+    EXPECTED: ClassVar[str] = "a scenario, as fogsim.load_scenario returns it, or a RunConfig"
 
     @abstractmethod
     def run_config(self) -> "RunConfig":

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,19 @@ _WAY = np.arange(-200.0, 1001.0, 25.0)
 """Distances ahead along the route at which the true fog is reported [m]."""
 
 
-class KnownWay(NamedTuple):
+@dataclass(frozen=True)
+class KnownWay:
     """What of the road does not change in a run."""
 
     route: NDArray[np.float64] | None = None  # (n, 3): Polyline along the ego's route [m]
     # Lanes for vehicles of each edge, from `carriageways`
-    carriageways: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @cached_property
+    def stations(self) -> NDArray[np.float64]:
+        """Distance of each point of the route from its start [m]."""
+        steps = np.diff(np.zeros((1, 3)) if self.route is None else self.route, axis=0)
+        return np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
 
 
 def fog_truth(
@@ -68,7 +75,7 @@ def _way_profile(fog: FogField, way: KnownWay, place: float) -> FogProfile | Non
     """The fog along a route about a place on it [m]; None where no route is known."""
     if way.route is None:
         return None
-    stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way.route, axis=0), axis=1))))
+    stations = way.stations
     ahead = _WAY[(place + _WAY >= 0.0) & (place + _WAY <= stations[-1])]
     at = np.stack([np.interp(place + ahead, stations, axis) for axis in way.route.T], axis=1)
     known = np.log(np.maximum(extinction(fog, at + _EYES), THINNEST))

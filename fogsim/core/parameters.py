@@ -321,7 +321,7 @@ def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check 
     if kind in _ANYTHING or not isinstance(kind, type):
         return None
     plain = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
-    named = _WORDS.get(kind) or getattr(kind, "EXPECTED", plain)
+    named: str = getattr(kind, "EXPECTED", _WORDS.get(kind, plain))
     check = _instance_check((os.PathLike if kind is Path else kind,), named)
     if kind is np.ndarray and parts:
         check = _array_check(get_args(parts[1])[0])

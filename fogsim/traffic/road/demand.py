@@ -138,12 +138,14 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
     return read_demand(configured.files, wanted, reroutes=configured.reroutes)
 
 
-def read_demand(files: Iterable[Path], wanted: Iterable[str], *, reroutes: bool = False) -> Demand:
+def read_demand(
+    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = _MOST_BYTES, *, reroutes: bool = False
+) -> Demand:
     """Search for vehicles in additional and route files, in SUMO's order.
 
-    After `_MOST_BYTES` unpacked bytes the demand counts as open.
+    After `most_bytes` unpacked bytes the demand counts as open.
     """
-    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), _MOST_BYTES
+    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
     for file in files:
         reader.file = file
         try:

@@ -34,7 +34,7 @@ from fogsim.openscenario.xml_tree import HARMLESS, REFUSED
 from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method, key_descriptions
 from fogsim.scenario.sensors.faults import FaultSection
 from fogsim.scenario.timeline import TimelineEntry

@@ -13,7 +13,7 @@ import fogsim
 from fogsim.cli.app import app
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario import Scenario
 from tests.openscenario.writing import CASES, QUIET, motion, run
 
 

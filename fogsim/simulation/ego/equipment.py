@@ -411,7 +411,8 @@ class EgoEquipment:
         if old:
             return tuple(Estimate.invalid(estimator.method, old) for estimator in self._estimators)
         # A late frame belongs with what the radar measured when it was taken.
-        observation = replace(observation, lead=self._leads.at(frame.time))
+        lead = self._leads.at(frame.time)
+        observation = observation if lead is observation.lead else replace(observation, lead=lead)
         return tuple(
             checked_estimate(chosen.name, estimator.update(observation))
             for chosen, estimator in zip(self._config.estimators, self._estimators, strict=True)

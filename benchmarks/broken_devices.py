@@ -11,7 +11,6 @@ import math
 import multiprocessing
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,8 +19,12 @@ from unittest.mock import patch
 
 from harness import ROOT, Row, lines_of, parse_options, publish
 
+from fogsim.advice import ADVISERS
+from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
-from fogsim.scenario import build
+from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.testing import collect, find_files
 from fogsim.testing.collection import FogTest
 from fogsim.testing.execution import check_case
@@ -42,14 +45,9 @@ class Estimator:
     sound: Any
     broken: Update
 
-    @property
-    def method(self) -> str:
-        """Name of the sound one."""
-        return str(self.sound.method)
-
-    def reset(self) -> None:
+    def __getattr__(self, name: str) -> Any:
         """As the sound one."""
-        self.sound.reset()
+        return getattr(self.sound, name)
 
     def update(self, observation: Observation) -> Estimate:
         """Update in another way."""
@@ -115,6 +113,12 @@ class Adviser:
     sound: Any
     advised: Callable[..., SpeedAdvice]
 
+    def __getattr__(self, name: str) -> Any:
+        """As the sound one, which may reckon with a reaction time and a deceleration, but no other advice."""
+        if name.startswith("advise"):
+            raise AttributeError(name)
+        return getattr(self.sound, name)
+
     def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
         """Advise something else."""
         return self.advised(self.sound, belief, speed_limit, time, previous)
@@ -176,16 +180,21 @@ def clear(estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class Device:
-    """A broken device: the function of `fogsim.scenario.build` whose result is replaced, by what, and overrides."""
+    """A broken device: the registry whose methods are replaced, by what, and overrides."""
 
-    part: str = ""
+    part: object = None
     broken: Callable[[Any], Any] = lambda sound: sound
     settings: tuple[str, ...] = ()
 
-    def build(self, sound: Callable[..., Any], *arguments: Any) -> Any:
-        """Build the part, broken; of several estimators each."""
-        made = sound(*arguments)
-        return tuple(map(self.broken, made)) if isinstance(made, tuple) else self.broken(made)
+    def patched(self) -> Any:
+        """While this is entered, methods of the registry are made broken."""
+        make = MethodConfig.make
+
+        def make_broken(config: MethodConfig, registry: Any, *given: object) -> Any:
+            made = make(config, registry, *given)
+            return self.broken(made) if registry is self.part else made
+
+        return patch.object(MethodConfig, "make", make_broken)
 
 
 def camera_fault(fault: str) -> tuple[str, ...]:
@@ -196,18 +205,18 @@ def camera_fault(fault: str) -> tuple[str, ...]:
 
 DEVICES = {
     SOUND: Device(),
-    "adviser ignores the belief": Device("adviser", partial(Adviser, advised=blind_advice)),
-    "adviser 30 % too fast": Device("adviser", partial(Adviser, advised=fast_advice)),
-    "adviser holds its first advice": Device("adviser", partial(Adviser, advised=first_advice)),
-    "advice 5 s late": Device("adviser", lambda sound: Adviser(sound, LateAdvice())),
-    "estimator 30 % too far": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 1.3)))),
-    "estimator 30 % too near": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 0.7)))),
-    "estimator always says clear": Device("estimators", partial(Estimator, broken=changed(clear))),
-    "estimator repeats its last value": Device("estimators", lambda sound: Estimator(sound, LastValue())),
-    "estimator trusts the sign map": Device("estimators", partial(Estimator, broken=trusts_the_map)),
-    "estimator has no sign map": Device("estimators", partial(Estimator, broken=without_signs)),
-    "fusion never widens": Device("fusion", NeverWidens),
-    "no fog lamps": Device("lighting_policy", NoFogLamps),
+    "adviser ignores the belief": Device(ADVISERS, partial(Adviser, advised=blind_advice)),
+    "adviser 30 % too fast": Device(ADVISERS, partial(Adviser, advised=fast_advice)),
+    "adviser holds its first advice": Device(ADVISERS, partial(Adviser, advised=first_advice)),
+    "advice 5 s late": Device(ADVISERS, lambda sound: Adviser(sound, LateAdvice())),
+    "estimator 30 % too far": Device(ESTIMATORS, partial(Estimator, broken=changed(partial(scaled, 1.3)))),
+    "estimator 30 % too near": Device(ESTIMATORS, partial(Estimator, broken=changed(partial(scaled, 0.7)))),
+    "estimator always says clear": Device(ESTIMATORS, partial(Estimator, broken=changed(clear))),
+    "estimator repeats its last value": Device(ESTIMATORS, lambda sound: Estimator(sound, LastValue())),
+    "estimator trusts the sign map": Device(ESTIMATORS, partial(Estimator, broken=trusts_the_map)),
+    "estimator has no sign map": Device(ESTIMATORS, partial(Estimator, broken=without_signs)),
+    "fusion never widens": Device(FUSIONS, NeverWidens),
+    "no fog lamps": Device(LIGHTING_POLICIES, NoFogLamps),
     "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),
     "camera black for 5 s, time and again": Device(settings=camera_fault("fault: blackout")),
     "radar dead": Device(settings=("sensors.faults=[{fault: dropout}]",)),
@@ -235,10 +244,7 @@ def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> Row:
     # First cases first, and short ones; further seeds seldom show what those do not.
     cases.sort(key=lambda one: (one[1].number, one[1].scenario.duration_s))
     count = 0
-    with ExitStack() as patched:
-        if device.part:
-            broken = partial(device.build, getattr(build, device.part))
-            patched.enter_context(patch.object(build, device.part, broken))
+    with device.patched():
         for test, run in cases:
             count += 1
             found = check_case(run.scenario, run.seed)["findings"]

@@ -5,7 +5,8 @@ the estimators every camera period (0.1 s) and a decision every 0.5 s. Shares co
 With --peer, highway-env's highway-fast-v0 (which draws no camera) is measured alternately in the same process.
 With --against, another version (a commit, whose files are extracted to build/against, or a directory) and this one
 take each step in turn, in two processes of one thread. Their ratio of processor time holds on a busy machine too.
-Ratios below 1 mean that this version is faster; against itself it shows the noise.
+Ratios below 1 mean that this version is faster; against itself it shows the noise. Stages are timed by a profiler, which
+slows Python down but not kernels: compare a stage with itself in the other version, not stages with each other.
 
     python benchmarks/loop.py [--json] [--peer | --against COMMIT] [--size 160x120 --size 640x480]
                               [--method shipped --method negru2013] [--steps 60] [--repeat 3]
@@ -197,14 +198,13 @@ def compare(size: str, method: str, steps: int, repeat: int, against: str) -> li
         process.communicate()
     ratio = np.quantile(times[..., 0] / times[..., 1], (0.5, 0.25, 0.75)).round(3).tolist()
     typical = [statistics.median(column) for column in times.reshape(-1, 2).T]
-    scale = [part / one["all"] for part, one in zip(typical, profiles, strict=True)]
     base = {"camera": size, "method": method}
     rows: list[Row] = [base | {"stage": "all", "ratio": ratio[0], "ratio_25": ratio[1], "ratio_75": ratio[2]}]
     rows[0] |= {"ms_a_step": round(1e3 * typical[0], 2), "against_ms": round(1e3 * typical[1], 2)}
     rows[0] |= {"p99_over_median": round(float(np.quantile(times[..., 0], 0.99)) / typical[0], 2)}
     rows.append(base | {"stage": "calls", "ratio": round(profiles[0]["calls"] / profiles[1]["calls"], 3)})
     for stage in (*STAGES, "other"):
-        here, there = (1e3 * one[stage] * part for one, part in zip(profiles, scale, strict=True))
+        here, there = (1e3 * one[stage] / steps for one in profiles)
         ratios = {"ratio": round(here / there, 3)} if there > 0.0 else {}
         rows.append(base | {"stage": stage} | ratios | {"ms_a_step": round(here, 2), "against_ms": round(there, 2)})
     return rows

@@ -5,8 +5,8 @@ the estimators every camera period (0.1 s) and a decision every 0.5 s. Shares co
 With --peer, highway-env's highway-fast-v0 (which draws no camera) is measured alternately in the same process.
 With --against, another version (a commit, whose files are extracted to build/against, or a directory) and this one
 take each step in turn, in two processes of one thread. Their ratio of processor time holds on a busy machine too.
-Ratios below 1 mean that this version is faster; against itself it shows the noise. Stages are timed by a profiler, which
-slows Python down but not kernels: compare a stage with itself in the other version, not stages with each other.
+Ratios below 1 mean that this version is faster; against itself it shows the noise. Stages are timed by a profiler,
+which slows Python down but not kernels: compare a stage with itself in the other version, not stages with each other.
 
     python benchmarks/loop.py [--json] [--peer | --against COMMIT] [--size 160x120 --size 640x480]
                               [--method shipped --method negru2013] [--steps 60] [--repeat 3]

@@ -46,7 +46,7 @@ class Estimator:
     broken: Update
 
     def __getattr__(self, name: str) -> Any:
-        """As the sound one."""
+        """Attributes of the sound one."""
         return getattr(self.sound, name)
 
     def update(self, observation: Observation) -> Estimate:
@@ -114,7 +114,7 @@ class Adviser:
     advised: Callable[..., SpeedAdvice]
 
     def __getattr__(self, name: str) -> Any:
-        """As the sound one, which may reckon with a reaction time and a deceleration, but no other advice."""
+        """Attributes of the sound one, such as its reaction time, but none of its other ways to advise."""
         if name.startswith("advise"):
             raise AttributeError(name)
         return getattr(self.sound, name)

@@ -2,15 +2,14 @@
 
 import io
 import re
-import sys
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from fogsim.cli import app
 from fogsim.cli import reproduce as reproduce_module
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
+from tests.helpers.command import run_command
 from tests.test_interruption import raise_as_numba_does
 
 DONE = Reproduction("negru2013", ({"paper": "negru2013"},), (("a",), ("1",)), (), np.zeros((2, 2, 3), np.uint8))
@@ -30,10 +29,8 @@ def reproduce(monkeypatch, capsys):
         drawn = io.StringIO()
         monkeypatch.setattr(reproduce_module, "stderr", Console(file=drawn, force_terminal=terminal, width=100))
         monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": evaluation})
-        monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", "negru2013", "--json"])
-        with pytest.raises(SystemExit) as ended:
-            app.main()
-        return int(ended.value.code or 0), capsys.readouterr().out, drawn.getvalue()
+        code = run_command("reproduce", "negru2013", "--json")
+        return code, capsys.readouterr().out, drawn.getvalue()
 
     return run
 

@@ -4,15 +4,17 @@ import contextlib
 import io
 import os
 import runpy
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from fogsim.cli import app
+from fogsim.core.interruption import SIGNALS
 
 
 class Ran(NamedTuple):
@@ -27,9 +29,22 @@ Command = Callable[..., Ran]
 """The fixture `command`: takes arguments, and `cwd`."""
 
 
+@contextlib.contextmanager
+def restored_handlers() -> Iterator[None]:
+    """Undo a program's handlers of signals and of lost exceptions, which it keeps until its process ends."""
+    signals = (*SIGNALS, signal.SIGALRM)
+    handlers, hook = [signal.getsignal(signum) for signum in signals], sys.unraisablehook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        for signum, handler in zip(signals, handlers, strict=True):
+            signal.signal(signum, handler)
+
+
 def run_command(*arguments: str) -> int:
     """Run fogsim's command line, which may be in a fixture of any scope; gives its exit code."""
-    with pytest.MonkeyPatch.context() as patch:
+    with restored_handlers(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["fogsim", *arguments])
         patch.setenv("COLUMNS", "300")
         with pytest.raises(SystemExit) as ended:

@@ -46,7 +46,7 @@ def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: 
         side_x, side_y = half * (step / cell) ** 2 * abs(sine), half * (step / cell) ** 2 * abs(cosine)
         first_row, last_row = y0 + min(far_y, 0.0) - side_y, y0 + max(far_y, 0.0) + side_y
         first_column, last_column = x0 + min(far_x, 0.0) - side_x, x0 + max(far_x, 0.0) + side_x
-        # What `tops` tells is where light ends, a metre above which it has faded.
+        # Light ends at `tops`, and has faded a metre above it.
         top = np.float32(beams.places[i, 2] + 1.0)
         for row in range(max(0, math.ceil(first_row)), min(rows, math.floor(last_row) + 1)):
             for column in range(max(0, math.ceil(first_column)), min(columns, math.floor(last_column) + 1)):

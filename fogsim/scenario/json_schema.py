@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.registry import Registry
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
@@ -23,6 +23,7 @@ _METHODS: Mapping[str, Registry[Any]] = {
     "estimators": ESTIMATORS,
     "fusion": FUSIONS,
     "advice": ADVISERS,
+    "controller": CONTROLLERS,
     "lighting": LIGHTING_POLICIES,
 }
 

@@ -4,6 +4,7 @@ from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import (
     Command,
+    Control,
     Display,
     DriverWarning,
     EgoControl,
@@ -67,6 +68,7 @@ __all__ = [
     "Cohort",
     "Collision",
     "Command",
+    "Control",
     "DenserFog",
     "Display",
     "DriverWarning",

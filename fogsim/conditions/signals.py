@@ -1,4 +1,4 @@
-"""All signals of conditions, by names with the arguments X, Y, METHOD and so on: of the run, vehicles, ego, lights, fog."""
+"""All signals of conditions, by names with the arguments X, Y, METHOD and so on."""
 
 import math
 from collections.abc import Callable

@@ -29,6 +29,7 @@ class Finding:
     time: float | None  # When it was decided: of a failure, when it came [s]; None where no instant decided
     position: float | None  # How far along its route the ego was then [m]; None without an ego
     reason: str  # Why it is inconclusive, or what went wrong
+    margin: float | None = None  # Least distance to the limit as a share of it, negative beyond; None without a number
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,9 @@ from fogsim.values import TrafficStep
 _TICK = 1e-6
 """Rounding of times [s]."""
 
+_SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0}
+"""Direction in which a comparison holds."""
+
 _NEVER_KNOWN = "it was never known"
 
 Sight = tuple[float, float | None, str]
@@ -51,7 +54,11 @@ class ExpectationWatch:
         for clause, watch in self._watches:
             verdict, sight, came, reason = watch.result(metrics)
             time, position = (None, None) if sight is None else sight[:2]
-            found.append(Finding(clause.name, clause.clause, verdict, clause.expected, came, time, position, reason))
+            found.append(
+                Finding(
+                    clause.name, clause.clause, verdict, clause.expected, came, time, position, reason, watch.margin
+                )
+            )
         return tuple(found)
 
 
@@ -61,6 +68,8 @@ Result = tuple[FindingVerdict, Sight | None, str, str]
 
 class _ClauseWatch(Protocol):
     """Watches one clause."""
+
+    margin: float | None
 
     def look(self, moment: Moment) -> None:
         """Take in a moment."""
@@ -128,6 +137,10 @@ class _AlwaysWatch:
         self._broken: Sight | None = None
         self._readings = ""
 
+    @property
+    def margin(self) -> float | None:
+        return self._worst.margin
+
     def look(self, moment: Moment) -> None:
         counts, holds = self._scope.look(moment), self._watch.look(moment)
         if not counts or holds is None:
@@ -159,10 +172,11 @@ class _Worst:
 
     def __init__(self, condition: Condition, is_never: bool) -> None:
         self._margin = math.inf
+        self._scale = 1.0
         self.sight: Sight | None = None
         self._comparison = condition if isinstance(condition, Comparison) else None
         relation = "" if self._comparison is None else self._comparison.relation
-        self._sign = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0}.get(relation, 0.0) * (-1.0 if is_never else 1.0)
+        self._sign = _SIGNS.get(relation, 0.0) * (-1.0 if is_never else 1.0)
 
     def look(self, watch: Watch, moment: Moment) -> None:
         """Take in a moment that counts."""
@@ -172,10 +186,18 @@ class _Worst:
         if isinstance(left, float) and isinstance(right, float) and not math.isinf(right):
             margin = self._sign * (left - right)
             if margin < self._margin:
-                self._margin, self.sight = margin, _sight(moment, watch.readings())
+                self._margin, self._scale = margin, abs(right) or 1.0
+                self.sight = _sight(moment, watch.readings())
+
+    @property
+    def margin(self) -> float | None:
+        """Least distance to the limit, as a share of it; None if no number was compared."""
+        return None if math.isinf(self._margin) else self._margin / self._scale
 
 
 class _EventuallyWatch:
+    margin = None
+
     def __init__(self, clause: Eventually) -> None:
         self._clause = clause
         self._scope, self._watch = _Scope(clause.during), Watch(clause.condition)
@@ -228,6 +250,8 @@ class _Trial:
 
 
 class _WheneverWatch:
+    margin = None
+
     def __init__(self, clause: Whenever) -> None:
         self._clause = clause
         self._trigger, self._require = Watch(clause.trigger), Watch(clause.require)
@@ -268,6 +292,8 @@ class _WheneverWatch:
 
 
 class _HappenedWatch:
+    margin = None
+
     def __init__(self, clause: Happened) -> None:
         self._clause = clause
         self._begun: Sight | None = None
@@ -287,6 +313,7 @@ class _HappenedWatch:
 class _MetricWatch:
     def __init__(self, clause: MetricCheck) -> None:
         self._clause = clause
+        self.margin: float | None = None
 
     def look(self, moment: Moment) -> None:
         """Take in nothing: metrics are there at the end."""
@@ -303,6 +330,8 @@ class _MetricWatch:
             if isinstance(left, str) == isinstance(operand, str)
             else None
         )
+        if isinstance(left, float) and isinstance(operand, float):
+            self.margin = _SIGNS.get(self._clause.relation, 0.0) * (left - operand) / (abs(operand) or 1.0) or None
         if holds is None:
             return _open(f"{came} does not compare with {operand!r}", came)
         return _passed(None, came) if holds else _failed(None, came)

@@ -50,11 +50,17 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
     return {"findings": findings, "metrics": summary.flat(), "ending": ending}
 
 
+def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+    """Check a case and return the content of its file, which also reports failures."""
+    begun = time.monotonic()
+    outcome = outcome_of(lambda: check_case(scenario, seed, sumo_outputs))
+    return {**outcome, "duration_s": round(time.monotonic() - begun, 3)}
+
+
 def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
     """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
-    begun = time.monotonic()
-    outcome = outcome_of(lambda: check_case(scenario, seed, result.with_suffix("")))
-    write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})
+    outcome = check_outcome(scenario, seed, result.with_suffix(""))
+    write_json(result, outcome)
     return outcome.get("message")
 
 

@@ -109,7 +109,7 @@ def run_tests(
     KeyboardInterrupt
         On Ctrl-C: completed cases are kept, for `resume`.
     """
-    results = _begin(out, resume)
+    results = begin_session(out, resume)
     with WriterLock(out):
         names = {run.key: (*test.lines,) for test in tests for run in test.runs}
         found = {run.key: read_result(results, run, names[run.key]) for test in tests for run in test.runs}
@@ -137,7 +137,7 @@ def run_tests(
     return outcomes
 
 
-def _begin(out: Path, resume: bool) -> Path:
+def begin_session(out: Path, resume: bool) -> Path:
     """Create the directory, and keep only results that count."""
     refuse_unwritable_folder(out)
     session = out / _SESSION

@@ -195,9 +195,9 @@ def parse_space(name: str, written: object) -> Draws | SeedLevels:
     values = parse_levels(name, written)
     if not isinstance(values, Draws):
         raise LevelsError(f"expected seeds or a distribution ({', '.join(_DISTRIBUTIONS)}), got {shown(written)}")
-    if values.limits[0] == -math.inf and values.limits[1] == math.inf or values.quantile(1.0) > values.quantile(0.0):
-        return values
-    raise LevelsError("its limits leave nothing of it")
+    if not values.quantile(0.0) < values.quantile(1.0):
+        raise LevelsError("its limits leave nothing of it")
+    return values
 
 
 def _refuse_others(written: dict[str, object], allowed: tuple[str, ...]) -> None:
@@ -268,9 +268,8 @@ def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
     first, second = numbers[:2]
     if kind == "loguniform" and first <= 0:
         raise LevelsError(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
-    wrong = (
-        second <= first if kind in ("uniform", "loguniform") else second <= 0 or (kind == "lognormal" and first <= 0)
-    )
+    has_ends = kind in ("uniform", "loguniform")
+    wrong = second <= first if has_ends else second <= 0 or (kind == "lognormal" and first <= 0)
     if wrong:
         raise LevelsError(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
     draws = Draws(name, kind, (first, second), (found.get("at_least", -math.inf), found.get("at_most", math.inf)), unit)

@@ -1,12 +1,12 @@
 """The failure rate under the declared distributions: importance sampling with a proposal found by cross-entropy.
 
-In standard normal coordinates of the quantiles. Source: Papaioannou, Geyer & Straub (2019), Improved cross entropy-based
-importance sampling with a flexible mixture model, Reliability Engineering & System Safety 191, 106564: with one normal
-distribution, and a share of the declared one, which bounds the weights (Hesterberg 1995, Technometrics 37, 185).
+In standard normal coordinates of the quantiles. Source: Papaioannou, Geyer & Straub (2019), Improved cross
+entropy-based importance sampling with a flexible mixture model, Reliability Engineering & System Safety 191, 106564:
+with one normal distribution, and a share of the declared one, which bounds the weights (Hesterberg 1995, Technometrics
+37, 185).
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,8 @@ _WIDENING = 1.2
 LEAST_EFFECTIVE = 30.0
 """Effective number of failing runs below which no rate is given [-]."""
 
-_NORMAL_90 = 1.645
+_HALF_WIDTH = 1.75
+"""Half-width of the 90 % interval in standard errors: 1.645, and some for the skewness of the weights [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,19 +97,12 @@ class FailureRate:
         return self.effective >= LEAST_EFFECTIVE
 
 
-def failure_rate(
-    proposals: Sequence[Proposal], draws: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
-) -> FailureRate:
-    """Rate from places and margins of the runs that each proposal gave; all of one proposal count together."""
-    weights = np.concatenate(
-        [
-            np.where(margins <= 0.0, np.exp(one.log_weights(places)), 0.0)
-            for one, (places, margins) in zip(proposals, draws, strict=True)
-        ]
-    )
+def failure_rate(proposal: Proposal, places: NDArray[np.float64], margins: NDArray[np.float64]) -> FailureRate:
+    """Rate from the runs that a proposal gave, by their places and margins."""
+    weights = np.where(margins <= 0.0, np.exp(proposal.log_weights(places)), 0.0)
     number, total = len(weights), float(weights.sum())
     if total == 0.0:
         return FailureRate(0.0, 0.0, 1.0, 0.0, number)
     rate, effective = total / number, total**2 / float((weights**2).sum())
-    spread = _NORMAL_90 * float(weights.std(ddof=1)) / (rate * math.sqrt(number))
+    spread = _HALF_WIDTH * float(weights.std(ddof=1)) / (rate * math.sqrt(number))
     return FailureRate(rate, rate * math.exp(-spread), min(rate * math.exp(spread), 1.0), effective, number)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from fogsim.core.files.atomic import write_text
 from fogsim.recorders.templating import data_url, render
@@ -35,7 +36,7 @@ _METRICS = {
 
 _CELLS = 121
 _MAPS = 6
-_COLOURS = LinearSegmentedColormap.from_list("outcome", ["#3b8f6a", "#f4f1ea", "#cf3a34"])
+_COLOURS = LinearSegmentedColormap.from_list("outcome", ["#b5d8c7", "#f7f4ee", "#efb3af"])
 _MARKS = {"passed": ("#1f7a4d", "o"), "failed": ("#a31f1a", "X"), "inconclusive": ("#9a6700", "s"), "error": (INK, "*")}
 
 
@@ -187,6 +188,11 @@ def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tupl
         (upwards, panel.set_yscale, panel.set_ylabel, panel.set_ylim),
     ):
         set_scale("log" if axes[name].is_logarithmic else "linear")
+        if axes[name].is_logarithmic:
+            ruler = panel.xaxis if name == across else panel.yaxis
+            ruler.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            ruler.set_major_formatter(StrMethodFormatter("{x:g}"))
+            ruler.set_minor_locator(NullLocator())
         set_label(f"{name} [{axes[name].unit}]" if axes[name].unit else name, fontsize=9, color=INK)
         set_ends(*axes[name].ends)
     dress(panel)
@@ -207,7 +213,7 @@ def _draw_boundary(
     places[:, columns[0]], places[:, columns[1]] = np.tile(steps, _CELLS), np.repeat(steps, _CELLS)
     mean, deviation = boundary.latent(places)
     failure = boundary.failure(places).reshape(_CELLS, _CELLS)
-    panel.pcolormesh(x, y, failure, cmap=_COLOURS, vmin=0.0, vmax=1.0, shading="gouraud", alpha=0.45, rasterized=True)
+    panel.contourf(x, y, failure, levels=np.linspace(0.0, 1.0, 21), cmap=_COLOURS)
     for values, width, style in (
         (mean, 1.8, "solid"),
         (mean - BAND * deviation, 0.9, "dashed"),

@@ -21,6 +21,7 @@ from fogsim.simulation.run_config import (
     SectionsConfig,
     check_ego,
 )
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Display, Stretch, StretchAdvice
 
@@ -48,6 +49,7 @@ def own_methods(scenario: ScenarioFile) -> dict[str, str]:
         **{one.method: ESTIMATORS.version(one.method, folder) for one in (*scenario.estimators, *beside_road)},
         scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
         scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
+        scenario.drivers.speed_choice.method: SPEED_CHOICES.version(scenario.drivers.speed_choice.method, folder),
         scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),
     }
     if scenario.controller is not None:

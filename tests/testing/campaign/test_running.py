@@ -116,9 +116,7 @@ def test_mistakes(tmp_path: Path) -> None:
     wrong = {
         "space is missing": (SCENARIO.partition("space:")[0].replace("$fog", "20 m").replace("$speed", "50 km/h")),
         "space.fog.loguniform: expected": SCENARIO.replace("lognormal: [100 m, 1]", "loguniform: [0 m, 1 m]"),
-        "lies between its limits": SCENARIO.replace(
-            "at_least: 20 m, at_most: 1000 m", "at_least: 90 m, at_most: 80 m"
-        ),
+        "lies between its limits": SCENARIO.replace("at_least: 20 m, at_most: 1000 m", "at_least: 90 m, at_most: 80 m"),
         "space.fog: expected seeds or a distribution": SCENARIO.replace(
             "{lognormal: [100 m, 1], at_least: 20 m, at_most: 1000 m}", "[20 m]"
         ),

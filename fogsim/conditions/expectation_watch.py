@@ -69,7 +69,9 @@ Result = tuple[FindingVerdict, Sight | None, str, str]
 class _ClauseWatch(Protocol):
     """Watches one clause."""
 
-    margin: float | None
+    @property
+    def margin(self) -> float | None:
+        """Least distance to the limit as a share of it."""
 
     def look(self, moment: Moment) -> None:
         """Take in a moment."""

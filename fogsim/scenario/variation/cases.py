@@ -137,8 +137,10 @@ def read_variation(document: Document) -> Variation:
     space, further = _parsed_space(document, keys)
     # Without a campaign the median stands for a distribution.
     for name, values in space.items():
-        is_seed = isinstance(values, SeedLevels)
-        varied[name] = values if is_seed else Levels((number_with_unit(values.quantile(0.5), values.unit),))
+        if isinstance(values, Draws):
+            varied[name] = Levels((number_with_unit(values.quantile(0.5), values.unit),))
+        else:
+            varied[name] = values
     mistakes += further + _misplaced(document, {**keys.vary, **keys.space}, varied)
     if mistakes:
         raise InputError("\n".join(mistakes))

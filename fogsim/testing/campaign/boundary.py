@@ -64,7 +64,7 @@ class Boundary:
         cross = _kernel(self.parameters, self.points, candidates[best])
         reduced = solve_triangular(self.factor, self.root[:, None] * cross, lower=True)
         covariance = _kernel(self.parameters, candidates[best], candidates[best]) - reduced.T @ reduced
-        chosen = []
+        chosen: list[int] = []
         for _ in range(number):
             doubt = -np.abs(mean) / np.sqrt(np.maximum(covariance.diagonal(), _ENOUGH))
             doubt[chosen] = -np.inf

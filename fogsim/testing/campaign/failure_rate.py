@@ -41,7 +41,8 @@ class Proposal:
         """Places in standard normal coordinates (number, d)."""
         normal = generator.standard_normal((number, len(self.mean)))
         is_declared = generator.random(number) < _DECLARED_SHARE
-        return np.where(is_declared[:, None], normal, self.mean + normal @ self.factor.T)
+        moved = self.mean + (normal[:, None, :] * self.factor).sum(axis=2)
+        return np.asarray(np.where(is_declared[:, None], normal, moved), float)
 
     def log_weights(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Logarithm of the declared density over that of the proposal (n,)."""
@@ -49,7 +50,7 @@ class Proposal:
         own = -0.5 * (centred**2).sum(axis=0) - float(np.log(self.factor.diagonal()).sum())
         declared = -0.5 * (places**2).sum(axis=1)
         mixed = np.logaddexp(math.log(1.0 - _DECLARED_SHARE) + own, math.log(_DECLARED_SHARE) + declared)
-        return declared - mixed
+        return np.asarray(declared - mixed, float)
 
 
 def first_proposal(width: int) -> Proposal:

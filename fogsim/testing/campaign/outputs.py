@@ -67,7 +67,8 @@ def write_campaign_junit(path: Path, campaign: Campaign, found: Findings, settin
     failures = len(verdicts) - errors - passed
     counts = {"tests": str(len(verdicts)), "failures": str(failures), "errors": str(errors), "skipped": "0"}
     root = ET.Element("testsuites", name="fogsim")
-    suite = ET.SubElement(root, "testsuite", name=xml_text(test.name), file=xml_text(str(test.path)), **counts)
+    named = {"name": xml_text(test.name), "file": xml_text(str(test.path))}
+    suite = ET.SubElement(root, "testsuite", named | counts)
     for one, verdict in zip(found.results, verdicts, strict=True):
         label, seconds = _label(one), f"{one.duration:.3f}"
         case = ET.SubElement(suite, "testcase", classname=xml_text(str(test.path)), name=xml_text(label), time=seconds)
@@ -199,7 +200,11 @@ def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tupl
     figure.legend(loc="outside upper right", fontsize=8, frameon=False, ncols=4)
     cut = ", ".join(f"{name} = {value:.4g} {axes[name].unit}".rstrip() for name, value in others.items())
     caption = f"{across} and {upwards}" + (f", cut at {cut}; cases off the cut are drawn smaller" if cut else "")
-    line = "; line: as likely to pass as to fail, with its 90 % band" if found.boundary is not None else ""
+    line = (
+        "; line: as likely to pass as to fail; dashed: from there on one outcome is 95 % certain"
+        if found.boundary is not None
+        else ""
+    )
     return caption + line, svg_of(figure, f"{across} {upwards}")
 
 

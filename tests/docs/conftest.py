@@ -24,6 +24,7 @@ from fogsim.scenario import catalogue
 CHECKOUT = Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((CHECKOUT / "docs" / "tutorial").glob("*.md"))
 PLUGIN = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
+CONTROLLER = (CHECKOUT / "docs" / "how_to" / "own_controller.md").read_text(encoding="utf-8")
 SCENARIOS = (CHECKOUT / "docs" / "reference" / "scenarios.md").read_text(encoding="utf-8")
 VISIBILITY, SAMPLES = 80.0, 2
 
@@ -89,11 +90,14 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
             shutil.copytree(CHECKOUT / "scenarios", made / "scenarios")
         # Of files that a page only names, the tutorials print one.
         tutorials = "".join(one.read_text(encoding="utf-8") for one in TUTORIALS)
-        for name in ("policies.yaml", "truck.fog.yaml"):
+        for name in ("policies.yaml", "truck.fog.yaml", "own_brake.fog.yaml", "brakes.fog.yaml"):
             blocks = rf"```yaml\n(# [\w/]*{re.escape(name)}\n.*?)```"
             if name in page:
                 for text in re.findall(blocks, page, re.DOTALL) or re.findall(blocks, tutorials, re.DOTALL)[:1]:
                     (made / text.split()[1]).write_text(text, encoding="utf-8")
+        if "mine:EmergencyBrake" in page:
+            (module,) = re.findall(r"```python\n(# mine.py\n.*?)```", CONTROLLER, re.DOTALL)
+            (made / "mine.py").write_text(module, encoding="utf-8")
         if "tests/data/openscenario" in page:
             shutil.copytree(CHECKOUT / "tests" / "data" / "openscenario", made / "tests" / "data" / "openscenario")
         if "network.onnx" in page:

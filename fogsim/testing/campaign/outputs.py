@@ -200,12 +200,9 @@ def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tupl
     figure.legend(loc="outside upper right", fontsize=8, frameon=False, ncols=4)
     cut = ", ".join(f"{name} = {value:.4g} {axes[name].unit}".rstrip() for name, value in others.items())
     caption = f"{across} and {upwards}" + (f", cut at {cut}; cases off the cut are drawn smaller" if cut else "")
-    line = (
-        "; line: as likely to pass as to fail; dashed: from there on one outcome is 95 % certain"
-        if found.boundary is not None
-        else ""
-    )
-    return caption + line, svg_of(figure, f"{across} {upwards}")
+    if found.boundary is not None:
+        caption += "; line: as likely to pass as to fail; dashed: from there on one outcome is 95 % certain"
+    return caption, svg_of(figure, f"{across} {upwards}")
 
 
 def _draw_boundary(

@@ -38,7 +38,7 @@ ADVISERS: Registry[Callable[..., Adviser | VehicleAdviser]] = Registry(
 CONTROLLERS: Registry[Callable[..., Controller | BeliefController]] = Registry(
     "controller",
     {"emergency_brake": EmergencyBrake, "cruise_control": AdaptiveCruiseControl, "sight_limiter": SightLimiter},
-    group="fogsim.controllers",
+    group="fogsim.advice.controllers",
     methods=("control|control_by_belief",),
 )
 

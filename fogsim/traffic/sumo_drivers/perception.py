@@ -93,21 +93,15 @@ class LeaderSight:
     def _facing(self, pairs: Sequence[_Pair]) -> NDArray[np.float64]:
         """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
         followers, leaders, gaps = zip(*pairs, strict=True)
-        both = followers + leaders
-        # Mostly who leads one follows another.
-        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
-        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
         facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
-        face_leaders(
-            self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), self._closing, facing, lines
-        )
+        face_leaders(self._read(followers + leaders), np.array(gaps, np.float64), self._closing, facing, lines)
         known = self._extinction
         facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
         facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
         facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
         return facing
 
-    def _read(self, vehicles: Collection[str]) -> NDArray[np.float64]:
+    def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         """What is known of vehicles (n, 7), where they are and how fast first."""
         read = np.empty((len(vehicles), EYE_HEIGHT + 1))
         flat = itertools.chain.from_iterable(map(self._position, vehicles))
@@ -323,15 +317,15 @@ class Perception:
     def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
         ignored, emerging = self._ignored, self._emerging
-        waits: list[float] = []
-        for (follower, leader, _), is_seen, pause in zip(pairs, seen, pauses, strict=True):
+        for (follower, leader, _), is_seen in zip(pairs, seen, strict=True):
             if not is_seen:
-                if follower in emerging or follower not in ignored or ignored[follower] != leader:
+                if follower not in ignored or ignored[follower] != leader or follower in emerging:
                     self._hide(follower, leader)
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-            waits.append(0.0 if follower in emerging else pause)
-        self._due.schedule_each([follower for follower, _, _ in pairs], waits)
+        followers = [pair[0] for pair in pairs]
+        waits = [0.0 if follower in emerging else pause for follower, pause in zip(followers, pauses, strict=True)]
+        self._due.schedule_each(followers, waits)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

@@ -260,7 +260,7 @@ class LaneChanging:
         looking = [driver for driver, certain in zip(drivers, until, strict=True) if certain <= soon]
         leaders = self._neighbours.left_leaders(looking)
         near = [self._certainly_seen < gap <= REACH for _, gap in leaders]
-        certain_until.update((driver, later) for driver, is_near in zip(looking, near, strict=True) if not is_near)
+        certain_until |= dict.fromkeys([v for v, is_near in zip(looking, near, strict=True) if not is_near], later)
         looking, leaders = list(itertools.compress(looking, near)), list(itertools.compress(leaders, near))
         speeds = zip(map(speed, looking), map(speed, [leader for leader, _ in leaders]), strict=True)
         slow = [other <= own + _MUCH_FASTER for own, other in speeds]

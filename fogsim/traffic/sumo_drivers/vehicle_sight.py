@@ -83,8 +83,8 @@ class _SeenVehicles:
         try:
             return self._traits[[rows[vehicle] for vehicle in vehicles]]
         except KeyError:
-            for vehicle in vehicles:
-                self.body(vehicle)
+            for vehicle in set(vehicles).difference(rows):
+                self._read(vehicle)
             return self._traits[[rows[vehicle] for vehicle in vehicles]]
 
     def _read(self, vehicle: str) -> _SeenBody:
@@ -270,9 +270,9 @@ class VehicleSight:
         depths = self._fog.optical_depth(eyes, ends) if known is None else known * looks[0]
         # Mostly the body is seen, whatever lamps are lit.
         seen = np.asarray(depths <= self._sight.depth_limits(looks))
-        dazzled = [uses_high_beam(own_lamps.get(observer, 0)) for observer, _ in pairs] if own_lamps else [False]
-        if any(dazzled):
-            seen &= ~np.array(dazzled)
+        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)}
+        if dazzling:
+            seen &= [observer not in dazzling for observer, _ in pairs]
         doubtful = np.flatnonzero(~seen)
         if len(doubtful):
             rows = doubtful.tolist()
@@ -280,8 +280,8 @@ class VehicleSight:
             for n, row in enumerate(rows):
                 self._add_lamps(looks[:, n], pairs[row], lines[row], own_lamps)
             limits = self._sight.depth_limits(looks)
-            for n, row in enumerate(rows) if any(dazzled) else ():
-                if dazzled[row]:
+            for n, row in enumerate(rows) if dazzling else ():
+                if pairs[row][0] in dazzling:
                     glare = high_beam_veil(float(self._fog.extinction(eyes[row])) if known is None else known)
                     limits[n] = self._sight.depth_limit(*looks[:, n].tolist(), glare)
             seen[doubtful] = depths[doubtful] <= limits

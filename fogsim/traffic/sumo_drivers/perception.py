@@ -265,45 +265,41 @@ class Perception:
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
-        ignored, emerging = self._ignored, self._emerging
-        # Most vehicles are far from any doubt, and pause for the longest time.
-        certain: list[str] = []
-        near_edge: list[_Pair] = []
-        doubtful: list[_Pair] = []
+        ignored, seen, hidden = self._ignored, self._certainly_seen, self._certainly_hidden
         ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
-        obstructed = self._obstructed(due, ahead)
-        for follower, (leader, gap) in zip(due, ahead, strict=True):
-            if follower in obstructed:
-                self._hide(follower, leader)
-                near_edge.append((follower, leader, 0.0))
-                continue
-            if not leader:
-                if follower in ignored:
-                    self._reveal(follower)
-            elif gap > self._certainly_hidden:
-                if follower not in ignored or ignored[follower] != leader or follower in emerging:
-                    self._hide(follower, leader)
-                if gap <= self._hidden_for_long:
-                    near_edge.append((follower, leader, gap - self._certainly_hidden))
-                    continue
-            elif gap > self._certainly_seen or follower in ignored:
-                doubtful.append((follower, leader, gap))
-                continue
-            elif gap > self._seen_for_long:
-                near_edge.append((follower, leader, self._certainly_seen - gap))
-                continue
-            certain.append(follower)
+        pairs = [(follower, *found) for follower, found in zip(due, ahead, strict=True) if found[0]]
+        behind = self._obstructed(pairs)
+        doubtful = [
+            pair
+            for pair in pairs
+            if pair[2] <= hidden and (pair[2] > seen or pair[0] in ignored) and pair[0] not in behind
+        ]
+        out_of_sight = [pair for pair in pairs if pair[2] > hidden or pair[0] in behind]
+        near_edge = [
+            (follower, leader, 0.0 if follower in behind else abs(gap - (hidden if gap > hidden else seen)))
+            for follower, leader, gap in pairs
+            if follower in behind
+            or hidden < gap <= self._hidden_for_long
+            or (self._seen_for_long < gap <= seen and follower not in ignored)
+        ]
+        # Most vehicles are far from any doubt, and pause for the longest time.
+        waiting = {pair[0] for pair in (*near_edge, *doubtful)}
+        self._due.schedule([follower for follower in due if follower not in waiting], MAX_PAUSE)
         self._pause_near_edge(near_edge)
-        self._due.schedule(certain, MAX_PAUSE)
+        if ignored:
+            with_leaders = {pair[0] for pair in pairs}
+            for follower in [v for v in due if v in ignored and v not in with_leaders]:
+                self._reveal(follower)
+        for follower, leader, _ in out_of_sight:
+            self._hide(follower, leader)
         return doubtful
 
-    def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
+    def _obstructed(self, pairs: Sequence[_Pair]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""
         if self._hidden_vehicles is None:
             return ()
-        pairs = [(follower, leader) for follower, (leader, _) in zip(followers, ahead, strict=True) if leader]
-        hidden = self._hidden_vehicles.are_hidden(pairs)
-        return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
+        hidden = self._hidden_vehicles.are_hidden([pair[:2] for pair in pairs])
+        return {pair[0] for pair, is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
     def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
         """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""

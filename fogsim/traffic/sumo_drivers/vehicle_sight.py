@@ -283,7 +283,8 @@ class VehicleSight:
             for n, row in enumerate(rows) if dazzling else ():
                 if pairs[row][0] in dazzling:
                     glare = high_beam_veil(float(self._fog.extinction(eyes[row])) if known is None else known)
-                    limits[n] = self._sight.depth_limit(*looks[:, n].tolist(), glare)
+                    distance, contrast, intensity, own = looks[:, n].tolist()
+                    limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
             seen[doubtful] = depths[doubtful] <= limits
         return seen
 

@@ -1,7 +1,7 @@
 """Fits drivers' speeds and headways in fog to measured passages of vehicles, from loops or trajectories.
 
-In fog a driver whom nobody holds up drives the smaller of f·c(V) and s(V)·v₀: v₀ is the speed in clear air and f the
-driver's own factor, both log-normal; c and s are `ObservedSpeed`'s limits (docs/explanation/drivers.md). The
+In fog a driver without a slower vehicle ahead drives the smaller of f·c(V) and s(V)·v₀: v₀ is the speed in clear air
+and f the driver's own factor, both log-normal; c and s are `ObservedSpeed`'s limits (docs/explanation/drivers.md). The
 likelihood of the smaller of two independent values gives c's ratio, s's lowest value and the spreads; intervals are
 from the sandwich covariance, over sessions where the data have them. Shares of the kinds of drivers are those of a
 mixture: each kind turns the headways measured in clear air into headways in fog.
@@ -201,7 +201,7 @@ def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) ->
 def _fitted_shares(passages: Passages, following: NDArray[np.bool_], clear: Floats) -> dict[str, Interval]:
     """Shares of the kinds of drivers among those who follow in fog, with intervals from resampled vehicles.
 
-    Headways cannot tell `careful` from `out_of_sight`: these keep their ratio in `OBSERVED_MIXTURE`.
+    Headways cannot distinguish `careful` from `out_of_sight`: these keep their ratio in `OBSERVED_MIXTURE`.
     """
     kinds = ("in_sight", "unaffected", "careful")
     own = np.quantile(clear, (np.arange(_CLEAR_HEADWAYS) + 0.5) / _CLEAR_HEADWAYS)

@@ -108,7 +108,7 @@ def test_what_cannot_be_fitted_is_refused(tmp_path: Path, text: str, message: st
 
 def test_a_users_own_choice(tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
     folder = tmp_path / "mine"
-    assert command("new", str(folder), "--from", "motorway_fog_bank")[0] == 0
+    assert command("new", "mine", "--from", "motorway_fog_bank", cwd=tmp_path)[0] == 0
     (folder / "commuters.py").write_text(
         "class Bold:\n"
         "    def __init__(self, seconds: float = 1.5) -> None:\n        self.seconds = seconds\n\n"

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import distance_at_depth, extinction
-from fogsim.core.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Camera, CameraPose, Fault, FogField, Lane, LaneKind, RoadSection, SignMap, TrafficState, Truth
 from fogsim.values.belief import THINNEST, FogProfile
@@ -78,31 +77,9 @@ def _way_profile(fog: FogField, way: KnownWay, place: float) -> FogProfile | Non
         return None
     stations = way.stations
     ahead = _WAY[(place + _WAY >= 0.0) & (place + _WAY <= stations[-1])]
-    eyes = np.empty((ahead.size, 3))
-    _put_eyes(way.route, stations, place + ahead, _EYES, eyes)
-    known = np.log(np.maximum(extinction(fog, eyes), THINNEST))
+    at = np.stack([np.interp(place + ahead, stations, axis) for axis in way.route.T], axis=1)
+    known = np.log(np.maximum(extinction(fog, at + _EYES), THINNEST))
     return FogProfile(ahead, known, np.zeros(ahead.size))
-
-
-@kernel
-def _put_eyes(
-    route: NDArray[np.float64],
-    stations: NDArray[np.float64],
-    places: NDArray[np.float64],
-    above: NDArray[np.float64],
-    eyes: NDArray[np.float64],
-) -> None:
-    """Points so far above a route (n, 3) at ascending places along it, between its ends (m,) [m]."""
-    before = 0
-    for i in range(places.size):
-        while before < stations.size - 2 and stations[before + 1] <= places[i]:
-            before += 1
-        after = min(before + 1, stations.size - 1)
-        way, whole = places[i] - stations[before], stations[after] - stations[before]
-        for axis in range(3):
-            low, high = route[before, axis], route[after, axis]
-            reached = high if way == whole else (high - low) / whole * way + low
-            eyes[i, axis] = reached + above[axis]
 
 
 def _extinctions(

@@ -170,7 +170,6 @@ _FASTEST_APPROACH = 70.0
 MAX_PAUSE = 0.5
 """Every driver's sight is computed at least this often [s], for leaders change."""
 
-_NO_LEADER = ("", 0.0)
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
 
@@ -266,14 +265,10 @@ class Perception:
     def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
         ignored, seen, hidden = self._ignored, self._certainly_seen, self._certainly_hidden
-        ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
-        pairs = [(follower, *found) for follower, found in zip(due, ahead, strict=True) if found[0]]
+        ahead = zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=True)
+        pairs = [(follower, *found) for follower, found in ahead if found and found[0]]
         behind = self._obstructed(pairs)
-        doubtful = [
-            pair
-            for pair in pairs
-            if pair[2] <= hidden and (pair[2] > seen or pair[0] in ignored) and pair[0] not in behind
-        ]
+        doubtful = [p for p in pairs if p[2] <= hidden and (p[2] > seen or p[0] in ignored) and p[0] not in behind]
         out_of_sight = [pair for pair in pairs if pair[2] > hidden or pair[0] in behind]
         near_edge = [
             (follower, leader, 0.0 if follower in behind else abs(gap - (hidden if gap > hidden else seen)))
@@ -286,10 +281,9 @@ class Perception:
         waiting = {pair[0] for pair in (*near_edge, *doubtful)}
         self._due.schedule([follower for follower in due if follower not in waiting], MAX_PAUSE)
         self._pause_near_edge(near_edge)
-        if ignored:
-            with_leaders = {pair[0] for pair in pairs}
-            for follower in [v for v in due if v in ignored and v not in with_leaders]:
-                self._reveal(follower)
+        with_leaders = {pair[0] for pair in pairs}
+        for follower in [v for v in due if v in ignored and v not in with_leaders]:
+            self._reveal(follower)
         for follower, leader, _ in out_of_sight:
             self._hide(follower, leader)
         return doubtful

@@ -275,10 +275,12 @@ class VehicleSight:
             seen &= [observer not in dazzling for observer, _ in pairs]
         doubtful = np.flatnonzero(~seen)
         if len(doubtful):
-            rows = doubtful.tolist()
-            looks = np.take(looks, doubtful, axis=1)
-            for n, row in enumerate(rows):
-                self._add_lamps(looks[:, n], pairs[row], lines[row], own_lamps)
+            looks, vehicles, rows = np.take(looks, doubtful, axis=1), self._vehicles, doubtful.tolist()
+            for n, (row, line) in enumerate(zip(rows, lines[doubtful].tolist(), strict=True)):
+                (observer, target), toward = pairs[row], (line[AHEAD], line[ASIDE])
+                lit = vehicles.lamps(target, own_lamps)
+                looks[2, n] = intensity_toward(lit, vehicles.body(target).length, *toward)
+                looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
             limits = self._sight.depth_limits(looks)
             for n, row in enumerate(rows) if dazzling else ():
                 if pairs[row][0] in dazzling:
@@ -287,12 +289,3 @@ class VehicleSight:
                     limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
             seen[doubtful] = depths[doubtful] <= limits
         return seen
-
-    def _add_lamps(
-        self, look: NDArray[np.float64], pair: tuple[str, str], line: NDArray[np.float64], own_lamps: OwnLamps
-    ) -> None:
-        """Write to a look (4,) how bright the target's lamps are [cd], and light of the observer's head lamps [-]."""
-        (observer, target), vehicles = pair, self._vehicles
-        bearing, ahead, aside = line[[BEARING, AHEAD, ASIDE]].tolist()
-        look[2] = intensity_toward(vehicles.lamps(target, own_lamps), vehicles.body(target).length, ahead, aside)
-        look[3] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(bearing)

@@ -120,11 +120,11 @@ class Obstructions:
         Returns the same if eyes and a single point change places (n,) bool. Takes `eyes` (n, 3) [m], `targets` (n, k,
         3) [m].
         """
-        starts = np.asarray(eyes, np.float64).reshape(-1, 3)
-        hidden = np.zeros(len(starts), np.bool_)
-        if len(self._boxes) and len(starts):
-            points = np.ascontiguousarray(targets, np.float64).reshape(len(starts), -1, 3)
-            find_hidden(np.ascontiguousarray(starts), points, self._boxes, self._bounds, hidden)
+        starts = np.ascontiguousarray(eyes, np.float64).reshape(-1, 3)
+        hidden = np.zeros(starts.shape[0], np.bool_)
+        if self._boxes.size and hidden.size:
+            points = np.ascontiguousarray(targets, np.float64).reshape(hidden.size, -1, 3)
+            find_hidden(starts, points, self._boxes, self._bounds, hidden)
         return hidden
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:

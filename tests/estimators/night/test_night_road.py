@@ -126,9 +126,9 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
 
 
-@pytest.mark.parametrize("flatness", [1.0, 2.0])
-@pytest.mark.parametrize("power", [1.3, 1.8])
-@pytest.mark.parametrize("visibility", [60.0, 150.0])
+@pytest.mark.parametrize(
+    ("flatness", "power", "visibility"), [(1.0, 1.3, 60.0), (2.0, 1.8, 60.0), (1.0, 1.8, 150.0), (2.0, 1.3, 150.0)]
+)
 def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float, flatness: float) -> None:
     picture = night_picture(visibility)
     rows, cols = np.indices(picture.shape[:2])

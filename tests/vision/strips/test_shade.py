@@ -34,8 +34,7 @@ def levels_on(image):
     return shade_levels(pixels, strip_curves(pixels, GEOMETRY, 1.0, CAMERA), GEOMETRY, PRIOR, 1.0)
 
 
-@pytest.mark.parametrize("visibility", [60.0, 150.0, 300.0])
-@pytest.mark.parametrize("edge", EDGES)
+@pytest.mark.parametrize(("edge", "visibility"), [*zip(EDGES, (60.0, 150.0, 300.0), strict=False)])
 def test_fog_before_a_road_in_sun_and_shade_is_that_before_either(edge, visibility):
     truth = np.log(20.0) / visibility
     image = picture(truth, np.where(EDGES[edge], 30.0, 110.0))

@@ -175,19 +175,3 @@ def test_closing_twice_is_allowed_and_a_closed_simulation_says_so(traffic: Traff
     traffic.close()
     with pytest.raises(SimulationError, match="not been started, or is closed"):
         traffic.observe()
-
-
-def test_lane_changes_are_no_jumps(traffic: Traffic) -> None:
-    """No vehicle moves sideways by more than it could steer in one step."""
-    before = seen(traffic).state
-    for _ in range(150):
-        traffic.advance(Command())
-        state = seen(traffic).state
-        for vehicle, row in zip(state.ids, range(len(state.ids)), strict=True):
-            earlier = before.row(vehicle)
-            if earlier is None:
-                continue
-            moved = state.position[row, :2] - before.position[earlier, :2]
-            heading = before.heading[earlier]
-            assert abs(moved[1] * np.cos(heading) - moved[0] * np.sin(heading)) < 0.5
-        before = state

@@ -1,7 +1,6 @@
 """SUMO's vehicles change lane in one step; the camera sees them glide."""
 
 import itertools
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.traffic import AttachedTraffic, TraciLink
+from fogsim.traffic import AttachedTraffic
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
@@ -82,13 +81,6 @@ def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> Non
                 assert now.heading[row] == true.heading[row]
                 arrived += indices[0] != indices[1]
     assert arrived >= 10
-
-
-def test_nobody_jumps_over_a_connection(sumo_process: Callable) -> None:
-    with sumo_process(command_line(BUSY, 1)) as (port, _):
-        distant = TraciLink("127.0.0.1", port)
-        assert_smooth(attached_run(distant.begin(()), 250))
-        distant.end()
 
 
 def test_without_changes_of_lane_states_are_untouched(link: LibsumoLink) -> None:

@@ -1,5 +1,6 @@
 """The environments as Gymnasium and its users see them."""
 
+import contextlib
 import math
 import sys
 import warnings
@@ -228,22 +229,21 @@ def test_a_loaded_scenario_serves_as_well() -> None:
 
 
 def test_vector_environments_run_in_processes_of_their_own() -> None:
-    envs = gymnasium.make_vec(
-        ID,
-        num_envs=2,
-        vectorization_mode="async",
-        vector_kwargs={"shared_memory": False},
-        wrappers=[RecordEpisodeStatistics],
-        **MOTORWAY,
-    )
-    try:
+    with contextlib.closing(
+        gymnasium.make_vec(
+            ID,
+            num_envs=2,
+            vectorization_mode="async",
+            vector_kwargs={"shared_memory": False},
+            wrappers=[RecordEpisodeStatistics],
+            **MOTORWAY,
+        )
+    ) as envs:
         observation, _ = envs.reset(seed=[3, 3])
         assert observation["camera"].shape == (2, 48, 64, 3)
         assert np.array_equal(observation["camera"][0], observation["camera"][1])
         observation, rewards, *_ = envs.step(np.array([[2, 0], [12, 0]]))
         assert rewards.shape == (2,)
-    finally:
-        envs.close()
 
 
 def test_actions() -> None:

@@ -214,13 +214,6 @@ def test_actions_outside_the_space_are_refused(continuous: bool, bad: list[float
     env.close()
 
 
-def test_bad_arguments() -> None:
-    with pytest.raises(InputError, match="did you mean 'motorway_fog_bank'"):
-        gymnasium.make(ID, scenario="motorway_fog_bnk")
-    with pytest.raises(InputError, match="unknown key"):
-        gymnasium.make(ID, overrides=["fog.visibilty_m=80"])
-
-
 def test_a_loaded_scenario_serves_as_well() -> None:
     scenario = fogsim.load_scenario("motorway_fog_bank", ["fog.visibility_m=120"])
     env = gymnasium.make(ID, scenario=scenario, **MOTORWAY)

@@ -91,6 +91,12 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},
         ),
         pytest.param(
+            "renderers.py",
+            ("--renderers", "4", "--frames", "8", "--renderer", "cpu"),
+            {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
+            marks=SLOW,
+        ),
+        pytest.param(
             "grades.py",
             ("--visibility", "100", "--duration", "1", "--drawings", "1"),
             {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},

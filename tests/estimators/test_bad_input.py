@@ -66,7 +66,7 @@ def said(found: Estimate) -> tuple[bool, float, float]:
 
 def estimates(method: str, image, camera: Camera = CAMERA, **options) -> list[Estimate]:
     estimator = make(method, camera, **options)
-    frames = [Frame(PERIOD * index, image, camera) for index in range(len(RANGES))]
+    frames = [Frame(PERIOD * index, image, camera) for index in range(4)]
     return [estimator.update(observation(image, index, frame=frame)) for index, frame in enumerate(frames)]
 
 

@@ -62,10 +62,3 @@ def test_a_road_that_its_fit_explains_needs_no_shade():
     seen = curves(0.03)
     assert is_sure(fit_own(seen, GEOMETRY, (PRIOR,)), seen)
     assert not is_sure(None, seen)
-
-
-def test_a_mirrored_picture_has_the_same_shade():
-    first = np.where(EDGES["crowns"], 30.0, 110.0)
-    image = picture(0.03, first)
-    one, other = levels_on(image), levels_on(np.ascontiguousarray(image[:, ::-1]))
-    assert one == pytest.approx(other, rel=1e-6)

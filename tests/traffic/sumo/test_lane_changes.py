@@ -14,6 +14,7 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState
+from tests.helpers.vehicles import vehicles
 from tests.traffic.common import MOTORWAY, SETUP, seen
 
 BUSY = replace(SETUP, routes=(MOTORWAY / "motorway.rou.xml",), additional=(), keep_lane=())
@@ -105,22 +106,7 @@ def step_without_changes(api: Any) -> None:
 
 
 def ego_at(time: float, x: float, y: float, lane: str, heading: float = 0.0) -> TrafficState:
-    one = np.ones(1)
-    return TrafficState(
-        time=time,
-        ids=("ego",),
-        types=("car",),
-        position=np.array([[x, y, 0.0]]),
-        heading=heading * one,
-        speed=20.0 * one,
-        acceleration=0.0 * one,
-        length=4.5 * one,
-        width=1.8 * one,
-        height=1.5 * one,
-        lane=(lane,),
-        lamps=np.zeros(1, dtype=np.int32),
-        paint=np.full((1, 3), 0.5),
-    )
+    return vehicles([[x, y, 0.0]], time=time, ids=("ego",), heading=heading, speed=20.0, lane=lane)
 
 
 def test_the_egos_pose_follows_a_smoothstep() -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fogsim.conditions import ExpectationWatch
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError, UnplayedWarning
-from fogsim.expectations import ExpectationWatch
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field, ValidationError
 
+from fogsim.conditions import FindingVerdict
 from fogsim.core.files.atomic import partial_path, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.readers import read_json
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
-from fogsim.expectations import FindingVerdict
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun

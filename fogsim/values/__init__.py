@@ -42,7 +42,20 @@ from fogsim.values.road import (
 )
 from fogsim.values.scene import Batch, Mesh, Pavement, RoadSurface, Scene, Surface
 from fogsim.values.script import Begun
-from fogsim.values.step import Cohort, Ending, EquippedVehicle, LampEffects, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.step import (
+    NOTHING_UNPLAYED,
+    Cohort,
+    Ending,
+    EquippedVehicle,
+    LampEffects,
+    Reason,
+    RoadSection,
+    Step,
+    TrafficStep,
+    Truth,
+    Unplayed,
+    UnplayedEvent,
+)
 from fogsim.values.traffic import (
     Collision,
     Leader,
@@ -54,7 +67,6 @@ from fogsim.values.traffic import (
     TrafficSnapshot,
     TrafficState,
 )
-from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
 __all__ = [
     "NOTHING_UNPLAYED",

@@ -22,6 +22,7 @@ from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.scenario import catalogue
 
 CHECKOUT = Path(__file__).resolve().parents[2]
+TUTORIALS = sorted((CHECKOUT / "docs" / "tutorial").glob("*.md"))
 PLUGIN = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
 SCENARIOS = (CHECKOUT / "docs" / "reference" / "scenarios.md").read_text(encoding="utf-8")
 VISIBILITY, SAMPLES = 80.0, 2
@@ -86,11 +87,13 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
             put_pictures(made, calibration)
         if "scenarios/studies/" in page:
             shutil.copytree(CHECKOUT / "scenarios", made / "scenarios")
-        if "# policies.yaml\n" in page:
-            (text,) = re.findall(r"```yaml\n(# policies\.yaml\n.*?)```", page, re.DOTALL)
-            (made / "policies.yaml").write_text(text, encoding="utf-8")
-        for text in re.findall(r"```yaml\n(# [\w/]*truck\.fog\.yaml\n.*?)```", page, re.DOTALL):
-            (made / text.split()[1]).write_text(text, encoding="utf-8")
+        # Of files that a page only names, the tutorials print one.
+        tutorials = "".join(one.read_text(encoding="utf-8") for one in TUTORIALS)
+        for name in ("policies.yaml", "truck.fog.yaml"):
+            blocks = rf"```yaml\n(# [\w/]*{re.escape(name)}\n.*?)```"
+            if name in page:
+                for text in re.findall(blocks, page, re.DOTALL) or re.findall(blocks, tutorials, re.DOTALL)[:1]:
+                    (made / text.split()[1]).write_text(text, encoding="utf-8")
         if "tests/data/openscenario" in page:
             shutil.copytree(CHECKOUT / "tests" / "data" / "openscenario", made / "tests" / "data" / "openscenario")
         if "network.onnx" in page:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, eye_height, lamps_from_signals, paint
 from fogsim.traffic.drivers.lamp_intensity import (
     head_lamp_light,
@@ -24,6 +23,7 @@ from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, Part
 from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
+from fogsim.values.obstruction import CLEAR_SIGHT, Obstructions
 
 OwnLamps = dict[str, int]
 """Lamps, as `TrafficState.lamps` has them, of vehicles whose lamps are not SUMO's; with the sides that have failed."""

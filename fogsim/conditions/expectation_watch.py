@@ -4,9 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
-from fogsim.conditions import Comparison, Condition, History, Moment, Watch
-from fogsim.conditions.logic import compared
-from fogsim.expectations.clauses import (
+from fogsim.conditions.clauses import (
     Always,
     Clause,
     Eventually,
@@ -16,6 +14,10 @@ from fogsim.expectations.clauses import (
     MetricCheck,
     Whenever,
 )
+from fogsim.conditions.logic import compared
+from fogsim.conditions.moment import History, Moment
+from fogsim.conditions.syntax import Comparison, Condition
+from fogsim.conditions.watching import Watch
 from fogsim.values import TrafficStep
 
 _TICK = 1e-6

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.restoration import light_kernels, planar_kernels
-from fogsim.restoration.picture import Floats, FoggyPicture
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
+from fogsim.vision.restoration import light_kernels, planar_kernels
+from fogsim.vision.restoration.picture import Floats, FoggyPicture
 
 FARTHEST = 1e6
 """Distance that stands for the sky's [m]."""

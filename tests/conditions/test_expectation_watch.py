@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from fogsim.conditions import parse_condition
-from fogsim.expectations import (
+from fogsim.conditions import (
     Always,
     Clause,
     Eventually,
@@ -19,6 +18,7 @@ from fogsim.expectations import (
     Happened,
     MetricCheck,
     Whenever,
+    parse_condition,
 )
 from fogsim.values import Begun, Collision, Leader, Step
 from tests.recorders.synthetic import estimate, make_step

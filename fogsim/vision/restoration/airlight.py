@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 
-from fogsim.restoration.picture import Floats, Light, Pixels, light_table
 from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
+from fogsim.vision.restoration.picture import Floats, Light, Pixels, light_table
 
 _NEAR_BAND, _BAND = 0.015, 0.15
 """Rows above the horizon that the airlight is sought in, as shares of the image's: foggy skies brighten upward, and

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from fogsim.conditions import Condition
+from fogsim.conditions.syntax import Condition
 
 
 class FindingVerdict(StrEnum):

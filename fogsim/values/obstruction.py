@@ -209,7 +209,7 @@ class Tunnel:
         return float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
 
     def boxes(self) -> NDArray[np.float64]:
-        """Its space as boxes (m, 10), in order along its line; see `fogsim.obstruction.obstructions`."""
+        """Its space as boxes (m, 10), in order along its line; see `fogsim.values.obstruction`."""
         rows = np.array(_box_rows(self.line, self.half_width - _SKIN, (-1.0, self.height + _SKIN)))
         # The first begins, and the last ends, behind the portal.
         rows[0, :3] += _SKIN * np.append(rows[0, 3:5], rows[0, 5])

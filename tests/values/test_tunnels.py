@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fogsim.obstruction import Obstructions, Tunnel, tunnels_of
 from fogsim.values import Structure, StructureKind
+from fogsim.values.obstruction import Obstructions, Tunnel, tunnels_of
 
 LINE = np.array([[0.0, 0.0, 2.0], [100.0, 0.0, 4.0], [180.0, 60.0, 4.0]])
 

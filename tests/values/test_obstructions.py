@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.obstruction import CLEAR_SIGHT, obstructions_of
 from fogsim.values import Structure, StructureKind
+from fogsim.values.obstruction import CLEAR_SIGHT, obstructions_of
 
 
 def structure(

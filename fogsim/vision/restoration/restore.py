@@ -7,11 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.restoration import light_kernels
-from fogsim.restoration.guided_filter import box_mean
-from fogsim.restoration.light_kernels import Smoothing
-from fogsim.restoration.methods import METHODS, Method
-from fogsim.restoration.picture import (
+from fogsim.units import LUMINANCE_WEIGHTS
+from fogsim.values.camera import Camera
+from fogsim.values.camera_response import exposure_of, respond
+from fogsim.vision.restoration import light_kernels
+from fogsim.vision.restoration.guided_filter import box_mean
+from fogsim.vision.restoration.light_kernels import Smoothing
+from fogsim.vision.restoration.methods import METHODS, Method
+from fogsim.vision.restoration.picture import (
     Floats,
     FoggyPicture,
     Light,
@@ -21,9 +24,6 @@ from fogsim.restoration.picture import (
     largest_value,
     written_values,
 )
-from fogsim.units import LUMINANCE_WEIGHTS
-from fogsim.values.camera import Camera
-from fogsim.values.camera_response import exposure_of, respond
 
 KEY = 0.18
 """Luminance that the middle of what is seen gets, relative to full scale [-] (Reinhard et al. 2002)."""
@@ -132,7 +132,7 @@ def restore_contrast(
     airlight : (channels,) sequence of float or None
         Pixel values of the airlight, one or one a channel; None to take it from the picture.
     method : str
-        A name in `fogsim.restoration.METHODS`.
+        A name in `fogsim.vision.restoration.METHODS`.
     most_gain : float
         Most by which light is amplified, 1 … 1000 [-].
     tone_map : bool

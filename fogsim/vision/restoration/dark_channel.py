@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.restoration import light_kernels
-from fogsim.restoration.guided_filter import guided_filter
-from fogsim.restoration.picture import Floats, FoggyPicture
 from fogsim.units import LUMINANCE_WEIGHTS
+from fogsim.vision.restoration import light_kernels
+from fogsim.vision.restoration.guided_filter import guided_filter
+from fogsim.vision.restoration.picture import Floats, FoggyPicture
 
 _PATCH = 15
 """Side of the patches that the darkest value is taken of [px] (section 4)."""

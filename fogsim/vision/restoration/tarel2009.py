@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 
-from fogsim.restoration import light_kernels
-from fogsim.restoration.dark_channel import least_channel
-from fogsim.restoration.picture import Floats, FoggyPicture
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.restoration import light_kernels
+from fogsim.vision.restoration.dark_channel import least_channel
+from fogsim.vision.restoration.picture import Floats, FoggyPicture
 
 _WHITE_OBJECTS = 11
 """s_v: side of the window of both medians, the largest white object [px]."""

@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.restoration import METHODS, restore_contrast
-from fogsim.restoration.planar import FARTHEST, road_distance
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Response
 from fogsim.values.camera_response import respond
+from fogsim.vision.restoration import METHODS, restore_contrast
+from fogsim.vision.restoration.planar import FARTHEST, road_distance
 
 CAMERA = Camera(160, 120, 150.0, (79.5, 59.5), 1.4, math.radians(3.0), response=Response.SRGB)
 DEEP = replace(CAMERA, bits=12, response=Response.LINEAR)

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fogsim.core.registry import Registry
-from fogsim.restoration.airlight import dark_channel_airlight, horizon_airlight
-from fogsim.restoration.dark_channel import dark_channel
-from fogsim.restoration.picture import Floats, FoggyPicture, Light, Pixels
-from fogsim.restoration.planar import planar
-from fogsim.restoration.tarel2009 import tarel2009
 from fogsim.values.camera import Camera
+from fogsim.vision.restoration.airlight import dark_channel_airlight, horizon_airlight
+from fogsim.vision.restoration.dark_channel import dark_channel
+from fogsim.vision.restoration.picture import Floats, FoggyPicture, Light, Pixels
+from fogsim.vision.restoration.planar import planar
+from fogsim.vision.restoration.tarel2009 import tarel2009
 
 
 @dataclass(frozen=True, slots=True)

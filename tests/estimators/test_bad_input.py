@@ -284,32 +284,35 @@ ODD_LEADS = [*((distance, 10.0) for distance in (math.nan, math.inf, -1.0, 0.0, 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_odd_range_is_refused_or_made_nothing_of(method, sequence):
+    frames = sequence[:5]
     for lead in ((math.nan, math.inf), (1e-9, 1e9), (1e9, -10.0)):
-        found = sound_or_told(method, sequence, *[{"lead": LeadMeasurement(*lead)}] * len(sequence))
+        found = sound_or_told(method, frames, *[{"lead": LeadMeasurement(*lead)}] * len(frames))
         assert method not in ("huang2015_lead", "lead_contrast") or not any(one.valid for one in found)
     # One bad measurement among good ones.
     for lead in ODD_LEADS:
-        odd: list[dict] = [{}] * len(sequence)
+        odd: list[dict] = [{}] * len(frames)
         odd[3] = {"lead": LeadMeasurement(*lead)}
-        assert len(sound_or_told(method, sequence, *odd)) >= len(sequence) - 1, lead
+        assert len(sound_or_told(method, frames, *odd)) >= len(frames) - 1, lead
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_odd_own_speed_is_refused_or_made_nothing_of(method, sequence, undisturbed):
+    frames = sequence[:5]
     for speed in ODD_SPEEDS:
-        odd: list[dict] = [{}] * len(sequence)
+        odd: list[dict] = [{}] * len(frames)
         odd[2] = {"speed": speed}
-        found = sound_or_told(method, sequence, *odd)
-        assert found[-1].valid == undisturbed(method)[-1][0], speed
+        found = sound_or_told(method, frames, *odd)
+        assert found[-1].valid == undisturbed(method)[4][0], speed
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_odd_sign_is_refused_or_made_nothing_of(method, sequence):
+    frames = sequence[:5]
     odd = product(("value", "distance", "lateral", "diameter"), (*ODD, -1.0, 0.0, 1e9))
     # To other methods than those of signs, all of them mean the same: nothing.
     for field, value in odd if method in FOR_SIGNS else islice(odd, 0, None, 5):
         sign = dataclasses.replace(observation(GREY).signs[0], **{field: value})
-        sound_or_told(method, sequence, *[{"signs": (sign,)}] * len(sequence))
+        sound_or_told(method, frames, *[{"signs": (sign,)}] * len(frames))
 
 
 WRONG_TIMES = (

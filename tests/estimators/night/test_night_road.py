@@ -46,8 +46,7 @@ def test_what_is_drawn_is_found_whatever_the_exposure(visibility: float) -> None
         assert holds(found, visibility)
 
 
-@pytest.mark.parametrize("head_lamps", ["usual", "unknown"])
-@pytest.mark.parametrize("light", [DARK, None])
+@pytest.mark.parametrize(("head_lamps", "light"), [("usual", DARK), ("unknown", None)])
 def test_a_clear_night_has_a_lower_bound_alone(head_lamps: str, light: LightMeasurement | None) -> None:
     found = estimate(night_picture(np.inf), head_lamps=head_lamps, light=light)
     low, high = found.visibility_interval

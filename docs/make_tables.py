@@ -186,7 +186,7 @@ def repairs(kind: type[Repair]) -> list[tuple[str, ...]]:
 def parameters() -> list[tuple[str, ...]]:
     """Parameters of every method that a scenario can name, with what they may be."""
     rows = []
-    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES):
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, SPEED_CHOICES):
         for name, method in registry.items():
             meanings = _meanings(method)
             for key, parameter in accepted_parameters(method, GIVEN_BY_THE_LOOP).items():

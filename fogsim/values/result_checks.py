@@ -93,6 +93,13 @@ def checked_advice(method: str, value: object) -> SpeedAdvice:
     return advice
 
 
+def checked_speed(choice: str, speed: float) -> float:
+    """A speed choice's result; InputError unless it is a speed of at least 0 [m/s], or `inf` for no limit."""
+    if not (_is_number(speed) and speed >= 0.0):
+        raise InputError(f"speed choice {choice!r} must return at least 0 [m/s], or inf; got {shown(speed)}")
+    return speed
+
+
 def checked_lamps(method: str, value: object) -> Lamp:
     """A lighting policy's result; InputError unless it is a valid `Lamp`."""
     who = f"lighting policy {method!r}: lamps()"

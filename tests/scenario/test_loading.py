@@ -238,7 +238,7 @@ def test_a_kind_of_driver_stands_for_all_and_a_kind_of_advice_for_keys_that_are_
 
 def test_who_sees_through_fog_drives_as_in_clear_air_unless_told_otherwise() -> None:
     def choice(*overrides: str) -> str:
-        return load_scenario("motorway_fog_bank", overrides).drivers.speed_choice
+        return load_scenario("motorway_fog_bank", overrides).drivers.speed_choice.method
 
     assert choice() == "observed"
     assert choice("drivers.see_through_fog=true") == "unaffected"

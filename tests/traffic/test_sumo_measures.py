@@ -23,6 +23,7 @@ from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.traffic import DriverSetup
+from fogsim.traffic.drivers.speed_choice import unaffected
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import SumoTraffic
@@ -139,7 +140,7 @@ def play(
     folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None], additional: tuple[Path, ...] = ()
 ) -> Run:
     """The vehicles of ``road.rou.xml`` on a network, for so many steps before each of which something may happen."""
-    drivers = DriverSetup(speed_choice="unaffected")
+    drivers = DriverSetup(unaffected)
     changes = {"routes": (folder / "road.rou.xml",), "additional": additional, "keep_lane": (), "drivers": drivers}
     setup = replace(SETUP, net=net, reading_radius=LENGTH, **changes)
     link = WithOutputs(folder)

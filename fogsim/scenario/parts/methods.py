@@ -14,6 +14,7 @@ from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import Method
 from fogsim.simulation import chosen_methods
 from fogsim.simulation.run_config import NO_RENDERER, AdviceConfig, Harmonisation, SectionsConfig, check_ego
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Display, Stretch, StretchAdvice
 
@@ -41,6 +42,7 @@ def own_methods(scenario: ScenarioFile) -> dict[str, str]:
         **{one.method: ESTIMATORS.version(one.method, folder) for one in (*scenario.estimators, *beside_road)},
         scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
         scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
+        scenario.drivers.speed_choice.method: SPEED_CHOICES.version(scenario.drivers.speed_choice.method, folder),
         scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),
     }
     return {name: version for name, version in found.items() if version is not None}

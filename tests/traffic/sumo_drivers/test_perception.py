@@ -23,7 +23,7 @@ from fogsim.traffic import (
 )
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
-from fogsim.traffic.drivers.speed_choice import within_sight
+from fogsim.traffic.drivers.speed_choice import unaffected, within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import LeaderSight
@@ -229,7 +229,7 @@ def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
         setup,
         routes=(folder / "motorway.rou.xml",),
         warm_up_limit=600.0,
-        drivers=DriverSetup("within_sight", spread=0.0, compliance=Compliance(rate=0.5)),
+        drivers=DriverSetup(within_sight, spread=0.0, compliance=Compliance(rate=0.5)),
     )
     traffic = libsumo_traffic(busy)
     traffic.enter_fog(Fog(3.0 / 60.0))
@@ -254,7 +254,7 @@ def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(c
 
 def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
     """Mean time headway that drivers want in fog of 30 m by night, when they see a leader's lamps [s]."""
-    drivers = DriverSetup("unaffected", spread=0.0, misjudgement=misjudgement)
+    drivers = DriverSetup(unaffected, spread=0.0, misjudgement=misjudgement)
     routes = (NET.parent / "motorway.rou.xml",)
     sight = DriverSight(0.1)
     with contextlib.closing(

@@ -1,5 +1,6 @@
 """What SUMO's own outputs say of a run is what FogSim's metrics of everybody say: SSM device, trips, collisions."""
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -143,9 +144,8 @@ def play(
     changes = {"routes": (folder / "road.rou.xml",), "additional": additional, "keep_lane": (), "drivers": drivers}
     setup = replace(SETUP, net=net, reading_radius=LENGTH, **changes)
     link = WithOutputs(folder)
-    traffic = SumoTraffic(setup, link)
-    states, collisions, emitted = [], [], []
-    try:
+    with contextlib.closing(SumoTraffic(setup, link)) as traffic:
+        states, collisions, emitted = [], [], []
         traffic.start(1)
         for number in range(steps):
             disturb(link.api, number)
@@ -155,8 +155,6 @@ def play(
             states.append(snapshot.state)
             collisions += snapshot.collisions
             emitted.append(emissions(link.api, snapshot.state))
-    finally:
-        traffic.close()
     return Run(states, collisions, emitted, folder)
 
 

@@ -41,11 +41,8 @@ def drive(traffic: Traffic, seed: int, steps: int = 40) -> list[TrafficSnapshot]
 
 @pytest.fixture(scope="module")
 def in_process() -> list[TrafficSnapshot]:
-    traffic = libsumo_traffic(SETUP)
-    try:
+    with contextlib.closing(libsumo_traffic(SETUP)) as traffic:
         return drive(traffic, 1)
-    finally:
-        traffic.close()
 
 
 @pytest.fixture
@@ -67,11 +64,8 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
         traffic.enter_fog(fog)
         return drive(traffic, 1, steps=120)
 
-    here = libsumo_traffic(setup)
-    try:
+    with contextlib.closing(libsumo_traffic(setup)) as here:
         expected = in_fog(here)
-    finally:
-        here.close()
     messages = 0
     send = traci.connection.Connection._sendExact
 

@@ -248,9 +248,7 @@ class SecondOpinion:
         self._fit: DayFit | None = None
         self._clear: tuple[float, float] | None = None
 
-    def on(
-        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
-    ) -> Estimate:
+    def on(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float) -> Estimate:
         """Return an estimate, what the day model has instead, or neither.
 
         Takes `level` (rows, cols), `free` [m], `time` [s].
@@ -259,8 +257,7 @@ class SecondOpinion:
         if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
             return self._kept(own)
         self._response, self._clear = 0.0, None
-        is_asked = not own.valid or is_straight
-        chosen = self._with_day_model(own, level, horizon, free, time) if is_asked else own
+        chosen = self._with_day_model(own, level, horizon, free, time)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:

@@ -81,6 +81,9 @@ def test_contrast_beyond_its_fog_ends_an_estimate(said):
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
+CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
+
+
 def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):
     found, _ = said(replace(OWN, extinction=0.001, standard_deviation=1e-4), CLEAR)
     assert found.valid

@@ -59,11 +59,11 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
     # The runs are those of all clauses: each has its share of their time.
     share = outcome.duration / (len(outcome.judgements) + bool(outcome.broken))
     case = _case(outcome, judgement.title, share)
-    told = judgement_text(judgement)
+    text = judgement_text(judgement)
     if judgement.outcome is not Outcome.PASSED:
-        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(told))
+        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(text))
         where = outcome.test.lines[judgement.name]
-        failure.text = xml_text(f"{where}\n{told}\n{command_text(outcome.test, judgement.run, settings)}\n")
+        failure.text = xml_text(f"{where}\n{text}\n{command_text(outcome.test, judgement.run, settings)}\n")
     lines = case_lines(outcome, judgement)
     if lines:
         ET.SubElement(case, "system-out").text = xml_text("\n".join(lines) + "\n")
@@ -72,9 +72,9 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
 
 def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequence[str]) -> ET.Element:
     case = _case(outcome, "run", outcome.duration / (len(outcome.judgements) + 1))
-    told = broken_text(broken)
-    error = ET.SubElement(case, "error", type="error", message=xml_text(told))
-    error.text = xml_text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
+    text = broken_text(broken)
+    error = ET.SubElement(case, "error", type="error", message=xml_text(text))
+    error.text = xml_text(f"{outcome.test.path}\n{text}\n{command_text(outcome.test, broken[0].run, settings)}\n")
     if len(outcome.results) > 1:
         listed = "".join(f"{label_of(one.run)}: {one.message}\n" for one in broken)
         ET.SubElement(case, "system-out").text = xml_text(listed)

@@ -77,12 +77,12 @@ class Boundary:
         return best[chosen]
 
 
-def fit_boundary(points: Points, failed: NDArray[np.bool_]) -> Boundary:
-    """Fit a classifier to runs; both outcomes must be among them."""
+def fit_boundary(points: Points, failed: NDArray[np.bool_], near: Boundary | None = None) -> Boundary:
+    """Fit a classifier to runs with both outcomes, beginning at the scales of a fit to fewer runs if there is one."""
     signs = np.where(failed, -1.0, 1.0)
     width = points.shape[1]
     bounds = [(np.log(_LEAST_SCALE), np.log(_GREATEST_SCALE))] + [(np.log(_SHORTEST), np.log(_LONGEST))] * width
-    starts = [np.log([scale] + [length] * width) for scale, length in _STARTS]
+    starts = [np.log([scale] + [length] * width) for scale, length in _STARTS] if near is None else [near.parameters]
     fits = [minimize(_loss, start, (points, signs), jac=True, bounds=bounds, method="L-BFGS-B") for start in starts]
     parameters = min(fits, key=lambda one: float(one.fun)).x
     _, gradient, root, factor, _ = _mode(_kernel(parameters, points, points), signs)

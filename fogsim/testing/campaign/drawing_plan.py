@@ -141,21 +141,22 @@ def _fill(space: Space, seed: int, budget: int, sequencing: Sequencing, found: F
 
 
 def _search_boundary(space: Space, seed: int, until: int, found: Findings) -> _Batches:
+    boundary = None
     while len(found.drawn) < until:
         generator = named_generator(seed, f"boundary {len(found.drawn)}")
         candidates = qmc.Sobol(len(space.axes), rng=generator).random_base2(int(np.log2(_CANDIDATES)))
         number = min(_BATCH, until - len(found.drawn))
-        boundary = _fitted(space, found.results)
+        boundary = _fitted(space, found.results, boundary)
         # While all cases have one outcome, others may be anywhere.
         chosen = candidates[:number] if boundary is None else candidates[boundary.choose(candidates, number)]
         yield from _run(Purpose.BOUNDARY, space.by_places(chosen), found)
 
 
-def _fitted(space: Space, results: Sequence[CaseResult]) -> Boundary | None:
+def _fitted(space: Space, results: Sequence[CaseResult], near: Boundary | None = None) -> Boundary | None:
     """Boundary of cases with both outcomes; cases that are inconclusive or went wrong do not count."""
     decided = [one for one in results if is_decided(one)]
     failed = np.array([one.has_failed for one in decided])
-    return fit_boundary(space.places(decided), failed) if failed.any() and not failed.all() else None
+    return fit_boundary(space.places(decided), failed, near) if failed.any() and not failed.all() else None
 
 
 def is_decided(result: CaseResult) -> bool:

@@ -13,6 +13,7 @@ from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from fogsim.study.execution import Engine
+    from fogsim.testing.odd.odd_file import OddFile
 
 
 class CampaignEngine(StrEnum):
@@ -49,6 +50,9 @@ def campaign_command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of all draws.")] = 0,
     first: Annotated[FirstDraws, typer.Option(help="How the first cases fill the space.")] = FirstDraws.SOBOL,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML, a test case for each case.")] = None,
+    odd: Annotated[
+        str | None, typer.Option(help="Collect coverage of an ODD: `fog`, or a binding file. Needs fogsim[odd].")
+    ] = None,
     case: CaseValues = "",
     settings: Settings = None,
     method_timeout: MethodTimeout = None,
@@ -57,6 +61,7 @@ def campaign_command(
     from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
     from fogsim.testing.campaign.running import load_campaign, run_campaign
+    from fogsim.testing.odd.coverage_files import write_coverage
 
     if address is not None and engine is CampaignEngine.LOCAL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
@@ -65,7 +70,7 @@ def campaign_command(
         refuse_unwritable(junit, "--junit", read=[], makes_folder=True)
     chosen = with_timeout(settings, method_timeout)
     campaign = load_campaign(
-        file, chosen, case, budget=budget, seed=seed, sequencing=first.value, may_import=CodeNotice()
+        file, chosen, case, budget=budget, seed=seed, sequencing=first.value, odd=odd, may_import=CodeNotice()
     )
     try:
         with progress_bar(stderr, stays=True) as progress:
@@ -75,7 +80,7 @@ def campaign_command(
                 failures = f", {failed} failed" if failed else ""
                 progress.update(task, completed=done, description=f"{done} of {budget} cases{failures}")
 
-            found = run_campaign(campaign, out, _engine(engine, address, processes), show)
+            found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished cases are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None
@@ -84,20 +89,25 @@ def campaign_command(
     if junit is not None:
         write_campaign_junit(junit, campaign, found, chosen)
     stdout.print(f"{escape(counts_text(found))}\n{escape(rate_text(found))}", soft_wrap=True)
-    for path in (out / "cases.csv", out / "report.html", junit):
-        if path is not None:
-            stdout.print(f"  {escape(path)}", soft_wrap=True)
+    paths = [out / "cases.csv", out / "report.html", *([] if junit is None else [junit])]
+    if campaign.odd is not None:
+        summary, files = write_coverage(out, campaign.odd, [one.run for one in found.results])
+        stdout.print(escape("\n".join(summary)), soft_wrap=True)
+        paths += files
+    for path in paths:
+        stdout.print(f"  {escape(path)}", soft_wrap=True)
     if not all(one.is_passed for one in found.results):
         raise typer.Exit(FAILED)
 
 
-def _engine(chosen: CampaignEngine, address: str | None, processes: int | None) -> "Engine":
+def _engine(chosen: CampaignEngine, address: str | None, processes: int | None, odd: "OddFile | None") -> "Engine":
     import os
 
     from fogsim.study import RayCluster
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import check_outcome, check_to_file
+    from fogsim.testing.execution import CoverageCheck, check_outcome, check_to_file
 
+    check = None if odd is None else CoverageCheck(odd)
     if chosen is CampaignEngine.RAY:
-        return RayCluster(address, processes, check_outcome)
-    return ProcessPool(processes or os.cpu_count() or 1, check_to_file)
+        return RayCluster(address, processes, check_outcome if check is None else check.outcome)
+    return ProcessPool(processes or os.cpu_count() or 1, check_to_file if check is None else check.to_file)

@@ -32,6 +32,7 @@ class CompleteCase(RunRecord):
     metrics: Metrics
     ending: Word | None
     duration_s: Finite
+    coverage: dict[str, Any] | None = None
 
 
 _FINDING = TypeAdapter(Finding)
@@ -85,3 +86,9 @@ def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> Cas
         return None
     findings = tuple(one for one in found.findings if one.name in expectations)
     return CaseResult(run, None, findings, found.metrics, found.duration_s)
+
+
+def read_coverage(folder: Path, run: StudyRun) -> dict[str, Any] | None:
+    """Coverage of an ODD by a case; None if its run failed or collected none."""
+    found = read_run(result_file(folder, run), _CASE)
+    return found.coverage if isinstance(found, CompleteCase) else None

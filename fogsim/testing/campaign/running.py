@@ -1,7 +1,7 @@
 """Running a campaign: its cases batch by batch with any engine, resumed from the results in its directory."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogsim.core.files.writer_lock import WriterLock
@@ -13,6 +13,8 @@ from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Sequencing, Space, batches
 from fogsim.testing.collection import FogTest, run_of
+from fogsim.testing.odd.odd_file import OddFile, read_odd
+from fogsim.testing.odd.openodd_library import Coverage
 from fogsim.testing.results import CaseResult, read_result
 from fogsim.testing.session import begin_session
 
@@ -36,6 +38,8 @@ class Campaign:
         Number of cases.
     sequencing : str
         How the first cases fill the space: ``"sobol"`` or ``"latin_hypercube"``.
+    odd : OddFile or None
+        The ODD whose coverage is collected, if any.
     """
 
     file: Path
@@ -43,6 +47,7 @@ class Campaign:
     seed: int
     budget: int
     sequencing: Sequencing
+    odd: OddFile | None = None
 
     @property
     def space(self) -> Space:
@@ -58,6 +63,7 @@ def load_campaign(
     budget: int = 200,
     seed: int = 0,
     sequencing: Sequencing = "sobol",
+    odd: str | None = None,
     may_import: MayImport = import_anything,
 ) -> Campaign:
     """Read a campaign.
@@ -72,13 +78,17 @@ def load_campaign(
         One case of ``vary``, as comma-separated ``name=value``.
     budget, seed, sequencing
         See `Campaign`.
+    odd : str or None
+        Name or binding file of the ODD whose coverage is collected.
     may_import : callable
         As in `load_scenario`.
 
     Raises
     ------
     InputError
-        If the file does not fit.
+        If a file does not fit.
+    MissingDependencyError
+        With an ODD, if openodd-py is missing.
     """
     path = scenario_file(file)
     reader = read_space(path, settings, case, may_import)
@@ -87,7 +97,10 @@ def load_campaign(
         raise InputError(f"{path}: expect is missing; a campaign needs something that passes or fails")
     if not Space.of(reader.variation.space).axes:
         raise InputError(f"{path}: space has no distribution, only seeds")
-    return Campaign(path, reader, seed, budget, sequencing)
+    domain = None if odd is None else read_odd(odd)
+    if domain is not None:
+        Coverage(domain)  # refuses what does not fit before the first run
+    return Campaign(path, reader, seed, budget, sequencing, domain)
 
 
 def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignWatch = lambda _, __: None) -> Findings:
@@ -139,7 +152,9 @@ def _runs(campaign: Campaign, batch: Sequence[Drawn], first: int) -> list[StudyR
     for number, drawn in enumerate(batch, first):
         # Each case has its own noise, whatever it was drawn for.
         seed = int(named_generator(campaign.seed, f"case {number}").integers(2**31))
-        runs.append(run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed)))
+        run = run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed))
+        # A result without the coverage of this ODD does not count.
+        runs.append(run if campaign.odd is None else replace(run, key=campaign.odd.keyed(run.key)))
     return runs
 
 

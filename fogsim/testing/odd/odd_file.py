@@ -61,7 +61,9 @@ class _Probe(_Criteria):
             return
         if signal.kind not in _MEASURED:
             yield ("signal",), f"{self.signal} is {signal.kind.value}; expected a number, a word, or true or false"
-        if signal.kind is Kind.NUMBER:
+        if signal.kind is Kind.NUMBER and signal.unit and not self.unit:
+            yield ("unit",), f"{self.signal} has a unit; expected one such as {signal.stated_in!r}"
+        elif signal.kind is Kind.NUMBER:
             try:
                 parse_quantity(f"1 {self.unit}", signal.unit)
             except ValueError as error:
@@ -152,7 +154,7 @@ def read_odd(name: str) -> OddFile:
     """
     path = _SHIPPED / f"{name}{_ENDING}" if name in shipped_odds() else Path(name)
     if is_name(name) and not path.exists():
-        raise InputError(f"--odd {shown(name)}: there is no such file and no such ODD; {suggest(name, shipped_odds())}")
+        raise InputError(f"ODD {shown(name)}: there is no such file and no such ODD; {suggest(name, shipped_odds())}")
     document = read_document(path)
     try:
         binding = _BindingFile.model_validate(document.data)

@@ -15,7 +15,6 @@ _WORDS = {
     "click_hint": "",
     "flaky_cells": "Cells with both outcomes",
     "state_flaky": "Both outcomes",
-    "tentative": "Fewer than 3 cases",
 }
 """The matrix's words: cases differ in what was drawn, so that both outcomes in a cell are no flakiness."""
 

@@ -1,13 +1,13 @@
 """Measures the concepts of an ODD at each step of a run."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from fogsim.conditions import SIGNALS, Finding, FindingVerdict, History, Moment
 from fogsim.errors import FogSimError
 from fogsim.testing.odd.odd_file import OddFile
-from fogsim.testing.odd.openodd_library import Coverage, Sample
+from fogsim.testing.odd.openodd_library import Coverage, Measured, Sample
 from fogsim.values import Step, TrafficStep
 
 _METRES_PER_DEGREE = math.pi / 180.0 * 6_378_137.0
@@ -39,22 +39,25 @@ class CoverageWatch:
             position = (x, y, z)
         # Roads have no geographic reference: positions count from 0° N, 0° E.
         geolocation = None if position is None else (position[1] / _METRES_PER_DEGREE, position[0] / _METRES_PER_DEGREE)
-        sample = Sample(dict(self._measured(moment)), position, geolocation)
+        sample = Sample(self._measured(moment), position, geolocation)
         if self._has_begun:
             self._coverage.add(sample, step.time)
         else:
             self._coverage.start(sample, step.time)
         self._has_begun = True
 
-    def _measured(self, moment: Moment) -> Iterator[tuple[str, float | bool | str | None]]:
+    def _measured(self, moment: Moment) -> dict[str, Measured]:
+        values: dict[str, Measured] = {}
         for name, signal, arguments, divisor in self._probes:
             try:
                 value = signal.read(moment, arguments)
             except Exception as error:
-                raise FogSimError(f"{self._odd.path}: probes.{name}.signal: {type(error).__name__}: {error}") from error
-            if isinstance(value, float):
-                value = round(value / divisor, _DIGITS) if math.isfinite(value) else value
-            yield name, value  # type: ignore[misc]  # OddFile has numbers, words and flags only
+                what = f"{type(error).__name__}: {error}"
+                raise FogSimError(f"{self._odd.path}: probes.{name}.signal: {what}") from error
+            if isinstance(value, float) and math.isfinite(value):
+                value = round(value / divisor, _DIGITS)
+            values[name] = value  # type: ignore[assignment]  # ODD files have numbers, words and flags only
+        return values
 
     def document(self, scenario: str, findings: Sequence[Finding]) -> dict[str, Any]:
         """The run's coverage, with its outcome by what came of its expectations."""

@@ -8,6 +8,9 @@ from typing import Any
 from fogsim.errors import InputError, MissingDependencyError
 from fogsim.testing.odd.odd_file import OddFile
 
+Measured = float | bool | str | None
+"""Measured value; None if it is missing."""
+
 Document = dict[str, Any]
 """Coverage of one run, in openodd-py's format of coverage files."""
 
@@ -23,7 +26,7 @@ _WORDS = {
 class Sample:
     """Measured values of a step, and where the ego is: x, y, z [m] and latitude, longitude [°]; None without one."""
 
-    values: Mapping[str, float | bool | str | None]
+    values: Mapping[str, Measured]
     position: tuple[float, float, float] | None
     geolocation: tuple[float, float] | None
 

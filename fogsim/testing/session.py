@@ -153,7 +153,7 @@ def begin_session(out: Path, resume: bool) -> Path:
 
 
 def results_folder(out: Path) -> Path:
-    """Folder of the cases' results in a directory of results."""
+    """Folder of the cases' results in the directory of a session."""
     return out / _RESULTS
 
 

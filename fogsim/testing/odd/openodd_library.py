@@ -79,15 +79,13 @@ class Coverage:
             )
         except ValueError as error:
             raise InputError(f"{odd.path}: {error}") from error
+        self._has_begun = False
         self._collector = openodd.CoverageCollector([], odd=definition, backend=backend)
 
-    def start(self, sample: Sample, time: float) -> None:
-        """Begin at a time [s]."""
-        self._collector.start(sample, time)
-
     def add(self, sample: Sample, time: float) -> None:
-        """Count the step that ends at a time [s]."""
-        self._collector.tick(sample, time)
+        """Count the step that ends at a time [s]; the first one only begins."""
+        (self._collector.tick if self._has_begun else self._collector.start)(sample, time)
+        self._has_begun = True
 
     def document(self, scenario: str, passed: bool | None, failed_at: float | None) -> Document:
         """The run's coverage, with its outcome (None for neither) and when it failed [s]."""

@@ -140,18 +140,7 @@ def shipped_odds() -> list[str]:
 
 
 def read_odd(name: str) -> OddFile:
-    """Read an ODD.
-
-    Parameters
-    ----------
-    name : str
-        A shipped one, or the path of a binding file.
-
-    Raises
-    ------
-    InputError
-        A line for each mistake.
-    """
+    """Read a shipped ODD by its name, or the ODD of a binding file; InputError has a line for each mistake."""
     path = _SHIPPED / f"{name}{_ENDING}" if name in shipped_odds() else Path(name)
     if is_name(name) and not path.exists():
         raise InputError(f"ODD {shown(name)}: there is no such file and no such ODD; {suggest(name, shipped_odds())}")

@@ -62,7 +62,7 @@ def campaign_command(
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML, a test case for each case.")] = None,
     odd: Annotated[
-        str | None, typer.Option(help="Collect coverage of an ODD: `fog`, or a binding file. Needs fogsim[odd].")
+        str | None, typer.Option(help="Collect coverage of an ODD: `fog`, or a binding file. Needs the extra odd.")
     ] = None,
     case: CaseValues = "",
     settings: Settings = None,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from fogsim.advice.agent import trained_agent
 from fogsim.advice.controllers import AdaptiveCruiseControl, BeliefController, Controller, EmergencyBrake, SightLimiter
 from fogsim.advice.osi_controller import OsiController
 from fogsim.advice.protocol import Adviser, VehicleAdviser
@@ -46,6 +47,7 @@ CONTROLLERS: Registry[Callable[..., Controller | BeliefController]] = Registry(
     },
     group="fogsim.advice.controllers",
     methods=("control|control_by_belief",),
+    files={"onnx": trained_agent},
 )
 
 __all__ = [

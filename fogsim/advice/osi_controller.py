@@ -1,5 +1,6 @@
 """A controller in a process of its own, which the user starts: ASAM OSI messages over a socket of this machine."""
 
+import contextlib
 import math
 import socket
 import time
@@ -132,9 +133,8 @@ class OsiController:
         if answer.ByteSize() != size:
             raise MethodError(f"{self._who}: expected a MotionRequest of OSI 3, got one with unknown fields")
         if answer.HasField("timestamp") and answer.timestamp != timestamp:
-            raise MethodError(
-                f"{self._who}: expected the answer with timestamp {_seconds(timestamp)}, got {_seconds(answer.timestamp)}"
-            )
+            expected, got = _seconds(timestamp), _seconds(answer.timestamp)
+            raise MethodError(f"{self._who}: expected the answer with timestamp {expected}, got {got}")
         known = {"version", "timestamp", "motion_request_type", "desired_state"}
         wrong = [field.name for field, _ in answer.ListFields() if field.name not in known]
         wrong += [
@@ -144,8 +144,8 @@ class OsiController:
         ]
         if wrong or answer.motion_request_type:
             raise MethodError(
-                f"{self._who}: expected desired_state with x of acceleration or velocity, along the vehicle, alone; got "
-                f"{', '.join(wrong) or 'motion_request_type'}"
+                f"{self._who}: expected desired_state with x of acceleration or velocity, along the vehicle, alone; "
+                f"got {', '.join(wrong) or 'motion_request_type'}"
             )
         state = answer.desired_state
         return Control(
@@ -172,10 +172,8 @@ def _add_frame(camera_view: Any, observation: Observation) -> None:
 
 def _close(connection: socket.socket) -> None:
     """End a connection, so that the process knows that the run is over even if a child inherited the socket."""
-    try:
+    with contextlib.suppress(OSError):  # the process may have ended it
         connection.shutdown(socket.SHUT_RDWR)
-    except OSError:  # the process has ended it
-        pass
     connection.close()
 
 

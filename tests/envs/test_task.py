@@ -14,13 +14,14 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation
 
 import fogsim_envs
+from fogsim.advice.agent import scaled_visibility
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.observation import STATE_FEATURES, scaled_visibility, task_observation, task_space, task_state
+from fogsim_envs.task.observation import STATE_FEATURES, task_observation, task_space, task_state
 from fogsim_envs.task.rewards import Way, fault, task_terms
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable

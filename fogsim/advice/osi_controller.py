@@ -32,7 +32,7 @@ class OsiController:
         Port of 127.0.0.1 on which the process listens.
     timeout : float
         Longest time to connect, and to the complete answer to a message [s].
-    camera : bool
+    frames : bool
         Whether messages contain the frame.
     """
 
@@ -41,11 +41,11 @@ class OsiController:
         *,
         port: Annotated[int, Range(1024, 65535)] = 4711,
         timeout: Annotated[float, Range(0.01, 3600.0, "s")] = 2.0,
-        camera: bool = False,
+        frames: bool = False,
     ) -> None:
         self._osi = osi_library("controller: osi")
         self._who = f"controller 'osi' at {_HOST}:{port} (controller.parameters.port)"
-        self._timeout, self._camera = timeout, camera
+        self._timeout, self._frames = timeout, frames
         try:
             self._socket = socket.create_connection((_HOST, port), timeout)
         except OSError as error:
@@ -95,7 +95,7 @@ class OsiController:
             lead.reference_point = lead.REFERENCE_POINT_REAR_MIDDLE
             lead.base.position.x = observation.lead.distance
             lead.base.velocity.x = observation.lead.relative_speed
-        if self._camera:
+        if self._frames:
             _add_frame(view.camera_sensor_view.add(), observation)
         return message
 

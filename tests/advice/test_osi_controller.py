@@ -60,7 +60,7 @@ def test_a_message_holds_what_was_measured_and_no_truth() -> None:
         return [framed(b"")]
 
     seen = Observation(frame, 1.0 / 3.0, LeadMeasurement(0.1, -0.7))
-    assert asked(answer, seen, camera=True) == asked(answer, Observation(frame, 20.0)) == Control()
+    assert asked(answer, seen, frames=True) == asked(answer, Observation(frame, 20.0)) == Control()
     whole, bare = got
     (view,), (lead,) = whole.sensor_view, whole.moving_object
     assert (whole.timestamp.seconds, whole.timestamp.nanos) == (1, 500_000_000)

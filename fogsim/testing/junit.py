@@ -6,7 +6,7 @@ are failures, since those servers treat skipped tests as passed.
 
 import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -60,7 +60,7 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
     # The runs are those of all clauses: each has its share of their time.
     share = outcome.duration / (len(outcome.judgements) + bool(outcome.broken))
     case = _case(outcome, judgement.title, share)
-    add_requirements(case, outcome.test.runs[0].scenario, [judgement.name])
+    add_requirements(case, judgement.run.scenario, [judgement.name])
     text = judgement_text(judgement)
     if judgement.outcome is not Outcome.PASSED:
         failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(text))
@@ -88,9 +88,10 @@ def _case(outcome: FileOutcome, name: str, seconds: float) -> ET.Element:
     return ET.Element("testcase", attributes)
 
 
-def add_requirements(case: ET.Element, scenario: Scenario, names: Iterable[str]) -> None:
+def add_requirements(case: ET.Element, scenario: Scenario, names: Container[str]) -> None:
     """Add the requirements of expectations as properties, as pytest writes its own and Jenkins and Xray read them."""
-    ids = dict.fromkeys(one for name in names for one in scenario.expect[name].requirement)
+    expected = [one for name, one in scenario.expect.items() if name in names]
+    ids = dict.fromkeys(one for expectation in expected for one in expectation.requirement)
     if ids:
         properties = ET.SubElement(case, "properties")
         for one in ids:

@@ -136,7 +136,10 @@ def write_report(
         if campaign.earlier
         else [],
         space=[(name, _distribution(axis)) for name, axis in campaign.space.axes.items()],
-        maps=[(caption, data_url(svg.encode(), "image/svg+xml")) for caption, svg in _maps(campaign, found)],
+        maps=[
+            (caption, data_url(svg_of(figure, caption).encode(), "image/svg+xml"))
+            for caption, figure in maps(campaign, found)
+        ],
         failures=list(_failures(test, found, settings)),
         purposes=[(purpose, sum(one.purpose is purpose for one in found.drawn)) for purpose in Purpose],
     )
@@ -160,8 +163,8 @@ def _failures(test: FogTest, found: Findings, settings: Sequence[str]) -> Iterat
         yield verdict_of(one), _label(one), _why(one), command_text(test, one.run, settings)
 
 
-def _maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, str]]:
-    """Caption and SVG of the map of each pair of parameters, those that matter most first."""
+def maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, Figure]]:
+    """Caption and map of each pair of parameters, at most six, those that matter most first."""
     names = list(campaign.space.axes)
     if found.boundary is not None:
         lengths = found.boundary.parameters[1:]
@@ -171,7 +174,7 @@ def _maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, str]]:
         yield _map(campaign, found, across, upwards)
 
 
-def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tuple[str, str]:
+def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tuple[str, Figure]:
     axes = campaign.space.axes
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     panel = figure.subplots()
@@ -215,7 +218,7 @@ def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tupl
     caption = f"{across} and {upwards}" + (f", cut at {cut}; cases off the cut are drawn smaller" if cut else "")
     if found.boundary is not None:
         caption += "; line: as likely to pass as to fail; dashed: from there on one outcome is 95 % certain"
-    return caption, svg_of(figure, f"{across} {upwards}")
+    return caption, figure
 
 
 def _draw_boundary(

@@ -124,6 +124,9 @@ def test_mistakes_name_what_is_wrong(tmp_path) -> None:
         "driver goes with controller": SCENARIO.replace("controller: CONTROLLER, ", ""),
         "must have a method control\\(\\) or control_by_belief": SCENARIO.replace("CONTROLLER", "'mine:Idle'"),
         "did you mean 'emergency_brake'": SCENARIO.replace("CONTROLLER", "emergency_brak"),
+        "a whole multiple of clocks.camera_period_s, got 0.25 s and 0.1 s": SCENARIO.replace(
+            "CONTROLLER", "{method: emergency_brake, period: 0.25 s}"
+        ),
         "braking_mps2": SCENARIO.replace("CONTROLLER", "{method: emergency_brake, braking: -3 m/s²}"),
     }
     for message, text in wrong.items():

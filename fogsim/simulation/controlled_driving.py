@@ -36,12 +36,13 @@ def own_policy(config: RunConfig) -> Policy:
 
 
 class ControlledDriving:
-    """Asks a controller once a camera period [s]; it gets what the vehicle knows, never the truth."""
+    """Asks a controller by its own clock and acts each camera period [s]; it gets what the vehicle knows, no truth."""
 
     def __init__(self, advised: AdvisedDriving, config: ControllerConfig, period: float) -> None:
         self._advised, self._config, self._period = advised, config, period
         self._ask = _questions_to(controller(config.method))
         self._advice: Command | None = None
+        self._request = Control()
         self._delayed: deque[float | None] = deque([None] * round(config.delay / period))
         self._acceleration = 0.0
         self._has_intervened = False
@@ -49,7 +50,9 @@ class ControlledDriving:
     def decide(self, step: Step) -> Command:
         """Command for the next camera period."""
         self._advice = self._advised.decide(step, self._advice)
-        request = checked_control(self._config.method.name, self._ask(step))
+        if step.index % self._config.frames == 0:
+            self._request = checked_control(self._config.method.name, self._ask(step))
+        request = self._request
         acceleration = self._actuated(_wanted_acceleration(request, step.observation.speed))
         return dataclasses.replace(
             self._advice,

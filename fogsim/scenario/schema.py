@@ -48,7 +48,7 @@ class ControllerSection(Method):
     """A controller in the ego, and what its actuators can do."""
 
     delay_s: Time = 0.2
-    """From a request to the first change of the acceleration, in whole camera periods."""
+    """From a request to the first change of the acceleration."""
 
     lag_s: Time = 0.1
     """Time constant of that change."""

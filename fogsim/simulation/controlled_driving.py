@@ -43,7 +43,8 @@ class ControlledDriving:
         self._ask = _questions_to(controller(config.method))
         self._advice: Command | None = None
         self._request = Control()
-        self._delayed: deque[float | None] = deque([None] * round(config.delay / period))
+        whole, self._late_share = divmod(round(config.delay / period, 9), 1.0)
+        self._delayed: deque[float | None] = deque([None] * (int(whole) + 1))
         self._acceleration = 0.0
         self._has_intervened = False
 
@@ -67,7 +68,10 @@ class ControlledDriving:
         """Acceleration of the next period [m/s²]; None while a human drives."""
         config = self._config
         self._delayed.append(wanted)
-        now = self._delayed.popleft()
+        earlier, now = self._delayed.popleft(), self._delayed[0]
+        if self._late_share and (earlier, now) != (None, None):
+            # Within the period the later request takes the place of the earlier one: their mean over time.
+            now = self._late_share * (earlier or 0.0) + (1.0 - self._late_share) * (now or 0.0)
         self._has_intervened |= now is not None
         if now is None and (config.driver == "human" or (config.driver != "none" and not self._has_intervened)):
             self._acceleration = 0.0

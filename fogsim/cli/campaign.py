@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fogsim.study.execution import Engine
     from fogsim.testing.campaign.drawing_plan import Findings
     from fogsim.testing.campaign.running import Campaign
+    from fogsim.testing.odd.odd_file import OddFile
     from fogsim.testing.shrinking import SmallestCase
 
 
@@ -60,6 +61,9 @@ def campaign_command(
         typer.Option(help="Directory of an earlier campaign: run its cases again, and show which ones changed."),
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML, a test case for each case.")] = None,
+    odd: Annotated[
+        str | None, typer.Option(help="Collect coverage of an ODD: `fog`, or a binding file. Needs the extra odd.")
+    ] = None,
     case: CaseValues = "",
     settings: Settings = None,
     method_timeout: MethodTimeout = None,
@@ -79,6 +83,7 @@ def campaign_command(
         seed=seed or 0,
         sequencing="sobol" if first is None else first.value,
         against=against,
+        odd=odd,
         may_import=CodeNotice(),
     )
     try:
@@ -89,7 +94,7 @@ def campaign_command(
                 failures = f", {failed} failed" if failed else ""
                 progress.update(task, completed=done, description=f"{done} of {campaign.budget} cases{failures}")
 
-            found = run_campaign(campaign, out, _engine(engine, address, processes), show)
+            found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
             smallest = smallest_failing(campaign, found, out, _engine(engine, address, 1))
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished cases are kept, and the same command goes on.")
@@ -124,6 +129,7 @@ def _report(
     from fogsim.testing.campaign.comparison import CASES, changes_text
     from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
     from fogsim.testing.campaign.running import as_test
+    from fogsim.testing.odd.coverage_files import write_coverage
     from fogsim.testing.shrinking import smallest_text
 
     write_cases(out / CASES, campaign, found)
@@ -135,19 +141,25 @@ def _report(
         lines.append(changes_text(campaign.earlier, found))
     if smallest is not None:
         lines.append(smallest_text(as_test(campaign, found), smallest, settings))
+    paths = [out / CASES, out / "report.html", *([] if junit is None else [junit])]
+    if campaign.odd is not None:
+        summary, files = write_coverage(out, campaign.odd, [one.run for one in found.results])
+        lines, paths = [*lines, *summary], [*paths, *files]
     stdout.print(escape("\n".join(lines)), soft_wrap=True)
-    for path in (out / CASES, out / "report.html", junit):
-        if path is not None:
-            stdout.print(f"  {escape(path)}", soft_wrap=True)
+    for path in paths:
+        stdout.print(f"  {escape(path)}", soft_wrap=True)
 
 
-def _engine(chosen: CampaignEngine, address: str | None, processes: int | None) -> "Engine":
+def _engine(
+    chosen: CampaignEngine, address: str | None, processes: int | None, odd: "OddFile | None" = None
+) -> "Engine":
     import os
 
     from fogsim.study import RayCluster
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import check_outcome, check_to_file
+    from fogsim.testing.execution import CoverageCheck, check_outcome, check_to_file
 
+    check = None if odd is None else CoverageCheck(odd)
     if chosen is CampaignEngine.RAY:
-        return RayCluster(address, processes, check_outcome)
-    return ProcessPool(processes or os.cpu_count() or 1, check_to_file)
+        return RayCluster(address, processes, check_outcome if check is None else check.outcome)
+    return ProcessPool(processes or os.cpu_count() or 1, check_to_file if check is None else check.to_file)

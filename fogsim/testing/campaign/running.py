@@ -1,7 +1,7 @@
 """Running a campaign: its cases batch by batch with any engine, resumed from the results in its directory."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,8 @@ from fogsim.study.plan import StudyRun
 from fogsim.testing.campaign.comparison import EarlierCase, again, read_earlier
 from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Sequencing, Space, batches, number_of
 from fogsim.testing.collection import FogTest, run_of
+from fogsim.testing.odd.odd_file import OddFile, read_odd
+from fogsim.testing.odd.openodd_library import Coverage
 from fogsim.testing.results import CaseResult, read_result
 from fogsim.testing.session import begin_session, results_folder
 from fogsim.testing.shrinking import SmallestCase, Values, case_key, smallest_case
@@ -43,6 +45,8 @@ class Campaign:
         How the first cases fill the space: ``"sobol"`` or ``"latin_hypercube"``.
     earlier : tuple of EarlierCase
         Cases of an earlier campaign that are run again instead of draws.
+    odd : OddFile or None
+        The ODD whose coverage is collected, if any.
     """
 
     file: Path
@@ -51,6 +55,7 @@ class Campaign:
     budget: int
     sequencing: Sequencing
     earlier: tuple[EarlierCase, ...] = ()
+    odd: OddFile | None = None
 
     @property
     def space(self) -> Space:
@@ -67,6 +72,7 @@ def load_campaign(
     seed: int = 0,
     sequencing: Sequencing = "sobol",
     against: Path | None = None,
+    odd: str | None = None,
     may_import: MayImport = import_anything,
 ) -> Campaign:
     """Read a campaign.
@@ -83,13 +89,17 @@ def load_campaign(
         See `Campaign`.
     against : Path or None
         Directory of an earlier campaign, whose cases are run again instead of draws.
+    odd : str or None
+        Name or binding file of the ODD whose coverage is collected.
     may_import : callable
         As in `load_scenario`.
 
     Raises
     ------
     InputError
-        If the file does not fit.
+        If a file does not fit.
+    MissingDependencyError
+        With an ODD, if openodd-py is missing.
     """
     path = scenario_file(file)
     reader = read_space(path, settings, case, may_import)
@@ -100,7 +110,10 @@ def load_campaign(
     if not space.axes:
         raise InputError(f"{path}: space has no distribution, only seeds")
     earlier = () if against is None else read_earlier(against, space)
-    return Campaign(path, reader, seed, len(earlier) or budget, sequencing, earlier)
+    domain = None if odd is None else read_odd(odd)
+    if domain is not None:
+        Coverage(domain)  # refuses what does not fit before the first run
+    return Campaign(path, reader, seed, len(earlier) or budget, sequencing, earlier, domain)
 
 
 def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignWatch = lambda _, __: None) -> Findings:
@@ -160,7 +173,9 @@ def _runs(campaign: Campaign, batch: Sequence[Drawn], first: int) -> list[StudyR
             if campaign.earlier
             else int(named_generator(campaign.seed, f"case {number}").integers(2**31))
         )
-        runs.append(run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed)))
+        run = run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed))
+        # A result without the coverage of this ODD does not count.
+        runs.append(run if campaign.odd is None else replace(run, key=campaign.odd.keyed(run.key)))
     return runs
 
 

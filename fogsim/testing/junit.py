@@ -50,7 +50,7 @@ def _suite(outcome: FileOutcome, settings: Sequence[str], now: str) -> ET.Elemen
         hostname=platform.node(),
         file=xml_text(str(outcome.test.path)),
     )
-    suite.extend(_clause(outcome, one, settings) for one in outcome.judgements)
+    suite.extend([_clause(outcome, one, settings) for one in outcome.judgements])
     if outcome.broken:
         suite.append(_broken(outcome, outcome.broken, settings))
     return suite

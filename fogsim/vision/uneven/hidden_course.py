@@ -1,5 +1,6 @@
 """Even fog over a road that may sag or crest where its lines do not show it: there it fades as in uneven fog."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -86,6 +87,9 @@ class HiddenCourse:
             seen = _along(curves, road, prior, first, np.array(tries, np.float64).reshape(-1, 3)).tolist()
             return [EvenFog(cost, k, variance, int(left)) for cost, k, variance, left in seen]
 
+        def at_curvature(piece: int, curvature: float) -> EvenFog:
+            return along((piece, curvature, albedo))[0]
+
         costs = _costs(course.ahead, road.before, _TRIED)
         places = np.argwhere(costs[1:] < gain + _RIVAL).tolist()
         tries = [(1 + piece, float(_TRIED[place]), albedo) for piece, place in places]
@@ -94,7 +98,7 @@ class HiddenCourse:
             tried = {curvature: one for (on, curvature, _), one in looks if on == piece}
             if len(tried) < 3:
                 continue
-            curvature, one, width = _likeliest(lambda at, piece=piece: along((piece, at, albedo))[0], tried)
+            curvature, one, width = _likeliest(functools.partial(at_curvature, piece), tried)
             found.append(EvenFog(one.cost + width, *one[1:]))
             begun.append((found[-1].cost, piece, curvature, width))
         least = min((one.cost for one in found), default=math.inf)

@@ -244,7 +244,7 @@ class SecondOpinion:
 
     def reset(self) -> None:
         """Forget all earlier frames."""
-        self._agreed, self._response = -math.inf, 0.0
+        self._agreed, self._looked, self._response = -math.inf, -math.inf, 0.0
         self._fit: DayFit | None = None
         self._clear: tuple[float, float] | None = None
 
@@ -264,7 +264,7 @@ class SecondOpinion:
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:
-            self._agreed, self._fit = -math.inf, None
+            self._agreed = -math.inf
             return chosen
         self._agreed = time
         return self._kept(own)
@@ -278,10 +278,9 @@ class SecondOpinion:
     def _with_day_model(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
     ) -> Estimate:
-        if not self._agreed < time < self._agreed + 2.0 * PERIOD:
-            self._fit = None
-        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
-        self._fit = self._fit or fit
+        earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
+        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
+        self._fit, self._looked = fit, time
         verdict = verdict_of(fit, self._scale)
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.

@@ -90,9 +90,8 @@ class DayFit:
 
     @property
     def response_deviation(self) -> float:
-        """Standard deviation of ln k among responses [-]."""
-        apart = self.log_means - float((self.responses * self.log_means).sum())
-        return math.sqrt(float((self.responses * apart * apart).sum()))
+        """Deviation of ln k under other responses from that under the stated one [-]."""
+        return math.sqrt(float((self.responses * self.log_means**2).sum()))
 
     def quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a probability [m]."""

@@ -388,9 +388,9 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
 
 def _log_means(logs: Floats, weight: Floats, response: Ints, count: int) -> Floats:
     """(count,) float64: mean logarithm under each response, over that under the first (`weight` (c, pairs))."""
-    of_each = _sums(response, weight.sum(axis=0), count)
-    means = _sums(response, (weight * logs[:, None]).sum(axis=0), count) / np.maximum(of_each, 1e-12)
-    return means - means[0]
+    of_each, total = (_sums(response, part.sum(axis=0), count) for part in (weight, weight * logs[:, None]))
+    means = np.divide(total, of_each, out=np.full(count, total.sum() / of_each.sum()), where=of_each > 0.0)
+    return np.asarray(means - means[0])
 
 
 def _sums(which: Ints, weight: Floats, count: int) -> Floats:

@@ -259,8 +259,7 @@ class SecondOpinion:
         if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
             return self._kept(own)
         self._response, self._clear = 0.0, None
-        is_asked = not own.valid or is_straight
-        chosen = self._with_day_model(own, level, horizon, free, time) if is_asked else own
+        chosen = self._with_day_model(own, level, horizon, free, time, is_straight)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:
@@ -276,7 +275,7 @@ class SecondOpinion:
         return _with_calibration(own, self._scale, self._response)
 
     def _with_day_model(
-        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
+        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
     ) -> Estimate:
         earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
@@ -285,9 +284,12 @@ class SecondOpinion:
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
+        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
+        if own.valid and not is_straight:
+            # It follows no bend: there it shows what responses change, not how dense the fog is.
+            return own
         shows_none = math.isinf(verdict.interval[1]) and agree(own.visibility_interval, verdict.interval)
         self._clear = verdict.interval if shows_none else None
-        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:
             return chosen

@@ -81,8 +81,12 @@ def test_contrast_beyond_its_fog_ends_an_estimate(said):
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
-def test_a_bent_road_is_the_joint_fits(said):
-    assert said(OWN, DENSER, is_straight=False)[1] == 0
+def test_on_a_bent_road_the_joint_fit_answers_and_the_day_model_says_what_responses_change(said):
+    found, looks = said(OWN, replace(DENSER, response_deviation=0.1), is_straight=False)
+    assert looks == 1
+    assert found.extinction == OWN.extinction
+    assert found.common_deviation == pytest.approx(math.hypot(SCALE, 0.1))
+    assert found.standard_deviation == pytest.approx(math.hypot(0.0015, 0.03 * math.hypot(SCALE, 0.1)))
 
 
 CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)

@@ -55,7 +55,9 @@ class ControlledDriving:
             self._advice,
             lamps=self._advice.lamps if request.lamps is None else request.lamps,
             warning=self._advice.warning if request.warning is None else request.warning,
-            control=None if acceleration is None else EgoControl(acceleration),
+            control=None
+            if acceleration is None
+            else EgoControl(acceleration, brakes_with_driver=self._config.driver == "human"),
         )
 
     def _actuated(self, wanted: float | None) -> float | None:

@@ -6,12 +6,13 @@ are failures, since those servers treat skipped tests as passed.
 
 import platform
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fogsim.core.files.atomic import write_text
+from fogsim.scenario import Scenario
 from fogsim.testing.collection import label_of
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.page import broken_text, case_lines, command_text, judgement_text
@@ -59,6 +60,7 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
     # The runs are those of all clauses: each has its share of their time.
     share = outcome.duration / (len(outcome.judgements) + bool(outcome.broken))
     case = _case(outcome, judgement.title, share)
+    add_requirements(case, judgement.run.scenario, [judgement.name])
     text = judgement_text(judgement)
     if judgement.outcome is not Outcome.PASSED:
         failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(text))
@@ -84,6 +86,16 @@ def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequen
 def _case(outcome: FileOutcome, name: str, seconds: float) -> ET.Element:
     attributes = {"classname": xml_text(str(outcome.test.path)), "name": xml_text(name), "time": _seconds(seconds)}
     return ET.Element("testcase", attributes)
+
+
+def add_requirements(case: ET.Element, scenario: Scenario, names: Container[str]) -> None:
+    """Add the requirements of expectations as properties, as pytest writes its own and Jenkins and Xray read them."""
+    expected = [one for name, one in scenario.expect.items() if name in names]
+    ids = dict.fromkeys(one for expectation in expected for one in expectation.requirement)
+    if ids:
+        properties = ET.SubElement(case, "properties")
+        for one in ids:
+            ET.SubElement(properties, "property", name="requirement", value=xml_text(one))
 
 
 def xml_text(text: str) -> str:

@@ -50,6 +50,8 @@ def test_requests_pass_delay_lag_and_limits() -> None:
     reached = [-8.0 * (1.0 - math.exp(-steps)) for steps in (1, 2, 3, 4)]
     assert found == pytest.approx([0.0, 0.0, *reached])
     assert driven("none", [9.0], delay=0.0, lag=0.0, accelerating=2.0) == [2.0]
+    part = driven("human", [-8.0, -8.0, None, None], delay=0.125, lag=0.0)
+    assert part == pytest.approx([None, -6.0, -8.0, -2.0]), "a quarter of the period is still the request before"
 
 
 def test_who_drives_without_a_request() -> None:
@@ -124,6 +126,9 @@ def test_mistakes_name_what_is_wrong(tmp_path) -> None:
         "driver goes with controller": SCENARIO.replace("controller: CONTROLLER, ", ""),
         "must have a method control\\(\\) or control_by_belief": SCENARIO.replace("CONTROLLER", "'mine:Idle'"),
         "did you mean 'emergency_brake'": SCENARIO.replace("CONTROLLER", "emergency_brak"),
+        "a whole multiple of clocks.camera_period_s, got 0.25 s and 0.1 s": SCENARIO.replace(
+            "CONTROLLER", "{method: emergency_brake, period: 0.25 s}"
+        ),
         "braking_mps2": SCENARIO.replace("CONTROLLER", "{method: emergency_brake, braking: -3 m/s²}"),
     }
     for message, text in wrong.items():

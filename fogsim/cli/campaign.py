@@ -137,6 +137,8 @@ def _report(
     if junit is not None:
         write_campaign_junit(junit, campaign, found, settings)
     lines = [counts_text(found), rate_text(found)]
+    if (broken := next((one.message for one in found.results if one.message is not None), None)) is not None:
+        lines.append(f"the first error: {broken}")
     if campaign.earlier:
         lines.append(changes_text(campaign.earlier, found))
     if smallest is not None:

@@ -95,7 +95,9 @@ def campaign_command(
                 progress.update(task, completed=done, description=f"{done} of {campaign.budget} cases{failures}")
 
             found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
-            smallest = smallest_failing(campaign, found, out, _engine(engine, address, 1))
+            progress.update(task, description="searching the smallest failing case")
+            # One case after another: a cluster would be connected to for each.
+            smallest = smallest_failing(campaign, found, out, _engine(CampaignEngine.LOCAL, None, 1))
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished cases are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None

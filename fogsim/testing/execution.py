@@ -67,9 +67,9 @@ def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path, odd: OddFil
     return {**outcome, "duration_s": round(time.monotonic() - begun, 3)}
 
 
-def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
+def check_to_file(scenario: Scenario, seed: int, result: Path, odd: OddFile | None = None) -> str | None:
     """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
-    outcome = check_outcome(scenario, seed, result.with_suffix(""))
+    outcome = check_outcome(scenario, seed, result.with_suffix(""), odd)
     write_json(result, outcome)
     return outcome.get("message")
 
@@ -86,9 +86,7 @@ class CoverageCheck:
 
     def to_file(self, scenario: Scenario, seed: int, result: Path) -> str | None:
         """As `check_to_file`."""
-        outcome = self.outcome(scenario, seed, result.with_suffix(""))
-        write_json(result, outcome)
-        return outcome.get("message")
+        return check_to_file(scenario, seed, result, self.odd)
 
 
 @dataclass(frozen=True, slots=True)

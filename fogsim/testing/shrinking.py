@@ -43,9 +43,9 @@ class SmallestCase:
 def smallest_text(test: FogTest, found: SmallestCase, settings: Sequence[str] = ()) -> str:
     """The smallest case in words, with the command that runs it."""
     passes = ", ".join(f"{name}={value}" for name, value in found.passes_at.items())
-    told = f"; it does not with {passes}" if passes else ""
+    limit = f", which no longer fails with {passes}" if passes else ""
     run = replace(test.runs[0], levels=found.values)
-    return f"the smallest case that fails ({found.tried} more runs){told}: {command_text(test, run, settings)}"
+    return f"smallest failing case after {found.tried} more runs{limit}: {command_text(test, run, settings)}"
 
 
 def shrink(
@@ -145,5 +145,5 @@ def _nearer(values: Values, name: str, first: str, fails: Fails) -> tuple[Values
         if found is None:
             break
         failing, passing = ((failing + passing) / 2, passing) if found else (failing, (failing + passing) / 2)
-    told = [value_text(number_with_unit(one, bad[1])) for one in (failing, passing)]
-    return {**values, name: told[0]}, told[1]
+    ends = [value_text(number_with_unit(one, bad[1])) for one in (failing, passing)]
+    return {**values, name: ends[0]}, ends[1]

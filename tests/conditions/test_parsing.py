@@ -120,6 +120,6 @@ def test_the_signals_of_a_condition() -> None:
 def test_one_signal_by_itself() -> None:
     assert parse_signal("gap(ego, b)") == Reference("gap(X, Y)", ("ego", "b"))
     assert str(parse_signal("ego.curvature")) == "ego.curvature"
-    for written, told in (("ego.sped", "did you mean 'ego.speed'"), ("ego.speed > 3", "the end"), ("", "a signal")):
-        with pytest.raises(ValueError, match=told):
+    for written, message in (("ego.sped", "did you mean 'ego.speed'"), ("ego.speed > 3", "the end"), ("", "a signal")):
+        with pytest.raises(ValueError, match=message):
             parse_signal(written)

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from drawn_scenario import SCENARIO
 
 from fogsim.conditions import Finding, FindingVerdict
 from fogsim.core.files.atomic import write_json
@@ -19,21 +20,6 @@ from fogsim.testing.campaign.drawing_plan import Findings
 from fogsim.testing.campaign.outputs import rate_text, write_campaign_junit, write_cases, write_report
 from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign, smallest_failing
 from fogsim.testing.results import finding_to_json
-
-SCENARIO = """
-name: drawn
-duration: 1 s
-road: {template: motorway, length: 1 km}
-actors: {ego: {position: 50 m, speed: $speed}}
-fog: {visibility: $fog}
-renderer: none
-sut: {estimators: []}
-expect: {safe: {always: ego.speed > 1 km/h, requirement: [SYS-1, SYS 2]}}
-space:
-  fog: {lognormal: [100 m, 1], at_least: 20 m, at_most: 1000 m}
-  speed: {uniform: [50 km/h, 120 km/h]}
-  run: seeds
-"""
 
 
 class Closed:

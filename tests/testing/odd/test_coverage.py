@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_scenario import SCENARIO as DRAWN
 
 from fogsim.conditions import SIGNALS, Finding, FindingVerdict
 from fogsim.core.files.atomic import write_json
@@ -23,20 +24,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Step
 from tests.recorders.synthetic import make_step
 
-SCENARIO = """
-name: drawn
-duration: 1 s
-road: {template: motorway, length: 1 km}
-actors: {ego: {position: 50 m, speed: $speed}}
-fog: {visibility: $fog}
-renderer: none
-sut: {estimators: []}
-expect: {safe: {always: ego.speed > 1 km/h}}
-space:
-  fog: {uniform: [50 m, 1500 m]}
-  speed: {uniform: [50 km/h, 120 km/h]}
-  run: seeds
-"""
+SCENARIO = DRAWN.replace("{lognormal: [100 m, 1], at_least: 20 m, at_most: 1000 m}", "{uniform: [50 m, 1500 m]}")
 
 
 def at(second: int, visibility: float, speed: float, x: float) -> Step:

@@ -9,6 +9,7 @@ where a measurement names them, and their imports are not followed, since these 
 import ast
 import hashlib
 import json
+import os
 import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
@@ -26,12 +27,12 @@ DATA = {".csv", ".frag", ".json", ".npz", ".sumocfg", ".vert", ".xml", ".yaml"}
 
 
 class Checkout:
-    """Imports and digests of a checkout's files; `memory` caches them, since parsing all takes seconds."""
+    """Imports and digests of a checkout's files; its .cache/ keeps them, since parsing all takes seconds."""
 
-    def __init__(self, root: Path, memory: Path | None = None) -> None:
-        self.root, self._memory = root, memory
-        known = memory is not None and memory.exists()
-        self._known: dict[str, tuple[str, list[str]]] = json.loads(memory.read_text()) if memory and known else {}
+    def __init__(self, root: Path) -> None:
+        self.root, self._memory = root, root / ".cache" / "digests.json"
+        known = self._memory.read_text(encoding="utf-8") if self._memory.exists() else "{}"
+        self._known: dict[str, tuple[str, list[str]]] = json.loads(known)
         self._read: dict[str, tuple[str, list[str]] | None] = {}
         self._next: dict[str, list[str]] = {}
         self._remembered = len(self._known)
@@ -126,9 +127,13 @@ class Checkout:
         return self._known[raw]
 
     def _remember(self) -> None:
-        if self._memory and len(self._known) > self._remembered:
+        if len(self._known) > self._remembered:
             self._memory.parent.mkdir(parents=True, exist_ok=True)
-            self._memory.write_text(json.dumps(self._known), encoding="utf-8")
+            # Another process may read it meanwhile.
+            written = self._memory.with_suffix(f".{os.getpid()}")
+            written.write_text(json.dumps(self._known), encoding="utf-8")
+            written.replace(self._memory)
+            self._remembered = len(self._known)
 
 
 def flat(tree: ast.AST) -> str:

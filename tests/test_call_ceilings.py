@@ -6,34 +6,38 @@ from itertools import islice
 from typing import Any
 
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 
 CEILINGS = {
-    "demo": ("motorway_fog_bank", [], 3450),
-    "demo, 640x480": ("motorway_fog_bank", ["camera.width=640", "camera.height=480"], 3550),
-    "negru2013": ("motorway_fog_bank", ["estimators=[negru2013]"], 2200),
-    "city": ("city_fog", [], 6200),
-    "night": ("night_motorway_fog", [], 4750),
-    "patches of fog": ("patchy_fog", [], 5600),
+    "demo": ("motorway_fog_bank", [EARLY], 3300),
+    "demo, 640x480": ("motorway_fog_bank", [EARLY, "camera.width=640", "camera.height=480"], 3100),
+    "negru2013": ("motorway_fog_bank", [EARLY, "estimators=[negru2013]"], 1850),
+    "city": ("city_fog", [], 5300),
+    "night": ("night_motorway_fog", [], 3850),
+    "patches of fog": ("patchy_fog", [], 5450),
 }
 """Scenario, settings, and most calls a frame of Python's and C's functions, about a tenth above what it takes."""
 
-SKIPPED, COUNTED = 20, 30
+SKIPPED, WINDOWS, COUNTED = 10, 3, 10
+"""Frames before the first of some windows, and frames in each: as many as between two decisions."""
+
 SMALL = ["camera.width=160", "camera.height=120"]
 
 
 @pytest.mark.parametrize("name", CEILINGS)
 def test_frames_take_few_calls(name: str) -> None:
     scenario, settings, most = CEILINGS[name]
-    loaded = fogsim.load_scenario(scenario, [*SMALL, *settings])
-    # What a process does once, such as loading kernels, is done in the first run.
-    for profiler in (cProfile.Profile(), cProfile.Profile()):
-        steps = fogsim.run(loaded, seed=1)
-        next(islice(steps, SKIPPED, None))
+    steps = fogsim.run(fogsim.load_scenario(scenario, [*SMALL, *settings]), seed=1)
+    next(islice(steps, SKIPPED - 1, None))
+    calls = []
+    for profiler in (cProfile.Profile() for _ in range(WINDOWS)):
         profiler.enable()
         assert sum(1 for _ in islice(steps, COUNTED)) == COUNTED
         profiler.disable()
-        steps.close()
         stats: Any = pstats.Stats(profiler)
-    assert stats.total_calls / COUNTED <= most
+        calls.append(stats.total_calls / COUNTED)
+    steps.close()
+    # What a process does once, such as loading kernels, is done in one window or another.
+    assert min(calls) <= most

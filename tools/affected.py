@@ -70,7 +70,7 @@ def main(reference: str = "") -> None:
     since = reference or next(iter(_git("merge-base", "HEAD", "main")), "HEAD")
     new = ("ls-files", "--others", "--exclude-standard")
     changed = {*_git("diff", "--name-only", since), *_git(*new)}
-    checkout = Checkout(ROOT, ROOT / ".cache" / "imports.json")
+    checkout = Checkout(ROOT)
     others = (f":!tests/{folder}" for folder in OWN_COMMAND)
     tests = _git(*new, "--cached", "tests/**/test_*.py", "tests/test_*.py", *others)
     sys.stdout.writelines(f"{test}\n" for test in affected(changed, checkout, sorted(set(tests))))

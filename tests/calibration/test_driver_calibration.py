@@ -37,16 +37,20 @@ def passages(count: int, seed: int, kinds: Mapping[str, float] | None = None) ->
     return Passages(visibility, speed, headway, np.full(count, -1))
 
 
-def test_speeds_come_back_within_intervals_that_hold() -> None:
+def test_speeds_come_back() -> None:
+    ratio = fit_drivers(passages(5000, 99)).constants["overdriving"]
+    assert ratio.high - ratio.low < 0.1
+    assert ratio.value == pytest.approx(1.7, rel=0.03)
+
+
+@pytest.mark.nightly
+def test_intervals_of_constants_hold() -> None:
     held = []
     for seed in range(24):
         found = fit_drivers(passages(500, seed)).constants
         held += [one.low <= TRUE[name] <= one.high for name, one in found.items()]
     # Of 72 intervals of 90 %, 7.2 exclude the truth on average, with a standard deviation of 2.5.
     assert sum(not one for one in held) <= 14
-    ratio = fit_drivers(passages(5000, 99)).constants["overdriving"]
-    assert ratio.high - ratio.low < 0.1
-    assert ratio.value == pytest.approx(1.7, rel=0.03)
 
 
 def test_shares_of_kinds_come_back() -> None:

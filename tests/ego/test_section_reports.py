@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.errors import InputError
@@ -10,7 +11,7 @@ from fogsim.scenario import Scenario
 from fogsim.values import Step
 
 BANK = "fog={outside_visibility_m: 2000, banks: [{start_m: 1300, end_m: 3000, edge_m: 100, visibility_m: 60}]}"
-QUIET = ("renderer=none", "estimators=[]", "duration_s=20", "clocks.camera_period_s=1", "clocks.decision_period_s=1")
+QUIET = (EARLY, "renderer=none", "estimators=[]", "duration_s=5", "clocks.camera_period_s=1", "clocks.decision_period_s=1")
 SIGNS = ("drivers.advised=signs", "drivers.harmonisation=null")
 
 

@@ -26,7 +26,13 @@ def estimated(margin, seed: int) -> FailureRate:
     return failure_rate(proposal, places, margin(places))
 
 
-@pytest.mark.parametrize("shape", MARGINS)
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "plane, alike beyond",
+        *(pytest.param(one, marks=pytest.mark.nightly) for one in ("plane", "sphere", "two sides")),
+    ],
+)
 def test_a_rate_of_one_in_ten_thousand(shape: str) -> None:
     found = [estimated(MARGINS[shape], seed) for seed in range(100)]
     known = [one for one in found if one.is_known]

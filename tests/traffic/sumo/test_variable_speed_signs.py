@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from early_motorway import EARLY
+
 import fogsim
 from fogsim.values import Step
 
@@ -11,7 +13,8 @@ QUIET = (
     "traffic.events=[]",
     "clocks.camera_period_s=1",
     "clocks.decision_period_s=1",
-    "duration_s=75",
+    EARLY,
+    "duration_s=45",
     "fog.visibility_m=3000",
 )
 LIMIT = 15.0

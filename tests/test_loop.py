@@ -106,7 +106,9 @@ def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
     assert np.all(moved > 10.0)  # half a second at more than 20 m/s
 
 
-@pytest.mark.parametrize("visibility", [50.0, pytest.param(100.0, marks=pytest.mark.nightly), 200.0])
+@pytest.mark.parametrize(
+    "visibility", [50.0, *(pytest.param(one, marks=pytest.mark.nightly) for one in (100.0, 200.0))]
+)
 def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_belief(visibility: float) -> None:
     scenario = fogsim.load_scenario(
         "motorway_fog_bank",

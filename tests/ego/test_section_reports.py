@@ -11,7 +11,14 @@ from fogsim.scenario import Scenario
 from fogsim.values import Step
 
 BANK = "fog={outside_visibility_m: 2000, banks: [{start_m: 1300, end_m: 3000, edge_m: 100, visibility_m: 60}]}"
-QUIET = (EARLY, "renderer=none", "estimators=[]", "duration_s=5", "clocks.camera_period_s=1", "clocks.decision_period_s=1")
+QUIET = (
+    EARLY,
+    "renderer=none",
+    "estimators=[]",
+    "duration_s=5",
+    "clocks.camera_period_s=1",
+    "clocks.decision_period_s=1",
+)
 SIGNS = ("drivers.advised=signs", "drivers.harmonisation=null")
 
 

@@ -77,7 +77,7 @@ def test_a_platform_that_cannot_draw_off_screen_is_named() -> None:
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize("missing", ["OpenGL", "pyrender"])
+@pytest.mark.parametrize("missing", [pytest.param("OpenGL", marks=pytest.mark.nightly), "pyrender"])
 def test_without_opengl_the_cpu_draws(missing: str) -> None:
     code = (
         f"import sys\nsys.modules['{missing}'] = None\nsys.argv = ['w', 'none', 'auto']\n"

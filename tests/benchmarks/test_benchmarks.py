@@ -23,7 +23,12 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
 @pytest.mark.parametrize(
     ("name", "arguments", "keys"),
     [
-        ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
+        pytest.param(
+            "loop.py",
+            ("--size", "64x48", "--steps", "3", "--repeat", "1"),
+            {"env", "camera", "vehicles", "steps_per_s"},
+            marks=SLOW,
+        ),
         pytest.param(
             "photograph_roads.py",
             ("--images", "1"),
@@ -92,10 +97,11 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             },
             marks=SLOW,
         ),
-        (
+        pytest.param(
             "frames.py",
             ("--size", "64x48", "--frames", "2", "--repeat", "1"),
             {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},
+            marks=SLOW,
         ),
         pytest.param(
             "renderers.py",

@@ -16,7 +16,7 @@ MOTORWAY = DATA.parents[1] / "scenarios" / "motorway_fog_bank"
 NET = MOTORWAY / "motorway.net.xml"
 QUIET = ("--no-step-log", "true", "--no-warnings", "true")
 CROWD = (
-    *("--net-file", str(NET), "--route-files", str(MOTORWAY / "motorway.rou.xml")),
+    *("--net-file", str(NET), "--route-files", str(ROUTES)),
     *("--step-length", "0.1", "--seed", "5", *QUIET),
 )
 """SUMO's command line for the motorway's own traffic."""

@@ -4,27 +4,24 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.helpers.command import run_script
+
 PROGRAM = Path(__file__).resolve().parents[2] / "benchmarks" / "networks.py"
-NETWORKS = ("grid", "spider", "random", "left_hand", "roundabout", "rail")
+NETWORKS = ("grid", "spider", "random", "left_hand", "roundabout")
 RUNS = ["SUMO alone", "inf m", "30 m"]
 
 
-@pytest.fixture(scope="module")
-def records() -> list[dict[str, Any]]:
-    arguments = ["--json", "--seconds", "40", "--step", "1", "--visibilities", "inf", "30", "--networks", *NETWORKS]
-    command = [sys.executable, str(PROGRAM), *arguments, "--one-process"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
+# The trains' network is large.
+@pytest.mark.parametrize("networks", [NETWORKS, pytest.param(("rail",), marks=pytest.mark.nightly)])
+def test_clear_air_changes_nothing_and_fog_only_trains_nothing(networks: tuple[str, ...]) -> None:
+    arguments = ["--json", "--seconds", "40", "--step", "1", "--visibilities", "inf", "30", "--networks", *networks]
+    done = run_script(PROGRAM, *arguments, "--one-process")
     assert done.returncode == 0, done.stdout + done.stderr
-    found: list[dict[str, Any]] = json.loads(done.stdout)
-    return found
-
-
-def test_clear_air_changes_nothing_and_fog_only_trains_nothing(records: list[dict[str, Any]]) -> None:
-    for name in NETWORKS:
+    records = json.loads(done.stdout)
+    for name in networks:
         rows = {row["run"]: row for row in records if row["network"] == name}
         assert list(rows) == RUNS
         assert rows["SUMO alone"]["vehicles"] >= 3
@@ -33,6 +30,7 @@ def test_clear_air_changes_nothing_and_fog_only_trains_nothing(records: list[dic
         assert rows["30 m"]["same"] is (name == "rail")
 
 
+@pytest.mark.nightly
 def test_a_town_with_everything_in_it_is_built_and_runs_to_its_end() -> None:
     program = PROGRAM.with_name("foreign_networks.py")
     small = ["--blocks", "4", "--per-hour", "900", "--seconds", "120", "--renderer", "none"]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sumo
+from early_motorway import EARLY
 
 from fogsim.scenario import build, load_scenario
 from fogsim.traffic import TraciLink, Traffic, libsumo_traffic, traci_traffic
@@ -18,7 +19,7 @@ from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, SpeedAdvice, TrafficSnapshot
 from tests.traffic.common import driven
 
-SETUP = replace(build.traffic_setup(load_scenario("motorway_fog_bank")), reading_radius=500.0)
+SETUP = replace(build.traffic_setup(load_scenario("motorway_fog_bank", [EARLY])), reading_radius=500.0)
 HOST = "127.0.0.1"
 GUI = Path(sumo.SUMO_HOME, "bin", "sumo-gui")
 REQUIRED = os.environ.get("CI") == "true"

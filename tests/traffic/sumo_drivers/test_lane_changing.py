@@ -243,7 +243,7 @@ def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road, illuminance: flo
         perception = DriversPerception(DriversView(api, Fog(0.0), sight, roster)) if parts else None
         for _ in range(200):
             if perception is not None:
-                perception.update({"ego": Lamp.NONE}, Lamps())
+                perception.update({"ego": Lamp.POSITION | Lamp.LOW_BEAM}, Lamps())
             road.link.step()
         get = api.vehicle
         return [(v, get.getLaneID(v), get.getLanePosition(v)) for v in get.getIDList()]

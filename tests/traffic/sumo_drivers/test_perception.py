@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import early_motorway
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
@@ -224,10 +225,9 @@ def test_a_lane_change_model_that_cannot_be_told_keeps_seeing(setup: TrafficSetu
 @pytest.fixture
 def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
     """The motorway's own traffic in fog of 60 m, drivers as the test sets them."""
-    folder = NET.parent
     busy = replace(
         setup,
-        routes=(folder / "motorway.rou.xml",),
+        routes=(early_motorway.ROUTES,),
         warm_up_limit=600.0,
         drivers=DriverSetup(within_sight, spread=0.0, compliance=Compliance(rate=0.5)),
     )
@@ -255,7 +255,7 @@ def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(c
 def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
     """Mean time headway that drivers want in fog of 30 m by night, when they see a leader's lamps [s]."""
     drivers = DriverSetup(unaffected, spread=0.0, misjudgement=misjudgement)
-    routes = (NET.parent / "motorway.rou.xml",)
+    routes = (early_motorway.ROUTES,)
     sight = DriverSight(0.1)
     with contextlib.closing(
         libsumo_traffic(

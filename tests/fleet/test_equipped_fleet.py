@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.errors import InputError, SimulationError
@@ -82,10 +83,10 @@ def test_each_sees_by_its_own_camera_and_is_advised_and_lit_by_its_own_belief():
 
 
 def test_nobody_is_equipped_unless_asked_and_named_ones_are():
-    assert all(not step.equipped for step in fogsim.run(small("renderer=none", "estimators=[]"), 1))
-    ids = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1))).traffic.ids
-    same_way = [one for one in ids if one.startswith("east")][:2]
-    named = small("renderer=none", "estimators=[]", f"traffic.ego=[ego,{','.join(same_way)}]")
+    steps = list(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1))
+    assert all(not step.equipped for step in steps)
+    same_way = [one for one in steps[0].traffic.ids if one.startswith("east")][:2]
+    named = small(EARLY, "renderer=none", "estimators=[]", f"traffic.ego=[ego,{','.join(same_way)}]")
     first = next(iter(fogsim.run(named, 1)))
     assert {one.vehicle_id for one in first.equipped} <= {*same_way}
     assert first.equipped
@@ -117,7 +118,7 @@ def test_what_a_script_asks_of_fog_holds_for_those_who_come_later():
 
 
 def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
-    scenario = small("traffic.equipped=20 %", "renderer=none", "estimators=[]")
+    scenario = small(EARLY, "traffic.equipped=20 %", "renderer=none", "estimators=[]")
     with ClosedLoop(scenario, camera_processes=1) as loop:
         loop.start(1)
         process = loop._fleet._pools[0]._process
@@ -135,7 +136,7 @@ def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed():
         Estimate("b", 0.04, 0.001, reach=80.0),
         Estimate.invalid("c", "no"),
     )
-    step = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1)))
+    step = next(iter(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1)))
     ((vehicle, report),) = camera_messages(dataclasses.replace(step, estimates=estimates))
     assert vehicle == "ego"
     assert (report.extinction, report.relative_deviation) == (0.04, pytest.approx(0.025))
@@ -160,7 +161,7 @@ def test_who_cannot_be_equipped_is_told(written, told):
 
 def test_places_along_a_route_with_a_bend():
     route = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 100.0, 0.0]])
-    step = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1)))
+    step = next(iter(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1)))
     some = {
         "ids": ("a", "b", "c", "d"),
         "position": np.array([[50.0, 2.0, 0.0], [98.0, 40.0, 0.0], [50.0, 3.0, 0.0], [50.0, 40.0, 0.0]]),

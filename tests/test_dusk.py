@@ -75,18 +75,15 @@ def test_dusk_takes_the_same_factor_each_second() -> None:
     assert Ramp(0.0).turned(0.0, 10.0, 10.0, by_factors=True).at(5.0) == 5.0  # no factor leads away from nothing
 
 
-@pytest.mark.parametrize(
-    ("settings", "told"),
-    [
+def test_what_cannot_be_drawn_is_refused() -> None:
+    for settings, told in [
         (["renderer=reference"], "the renderer reference knows no lamplight"),
         (["light.illuminance_lx=0"], "goes on from the light that there is, and light.illuminance_lx is 0"),
         (["timeline.0.do.light.illuminance_lx=0"], "no factor leads to illuminance_lx: 0"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused(settings: list[str], told: str) -> None:
-    dusk = DUSK.replace("illuminance: 0.05 lx", "illuminance_lx: 0.05")
-    with pytest.raises(fogsim.InputError, match=told):
-        fogsim.load_scenario("motorway_fog_bank", [dusk, *settings])
+    ]:
+        dusk = DUSK.replace("illuminance: 0.05 lx", "illuminance_lx: 0.05")
+        with pytest.raises(fogsim.InputError, match=told):
+            fogsim.load_scenario("motorway_fog_bank", [dusk, *settings])
 
 
 @pytest.mark.nightly

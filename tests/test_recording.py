@@ -86,16 +86,15 @@ def test_a_recorder_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("mistake", "kind"),
-    [({"seed": -1}, InputError), ({"seed": 1.5}, InputError), ({"recorders": ("table", "film")}, UnknownNameError)],
-)
-def test_mistakes_that_stop_a_run_before_its_first_step_leave_nothing(
-    tmp_path: Path, mistake: dict[str, object], kind: type[Exception]
-) -> None:
-    with pytest.raises(kind):
-        record_run(**{"scenario": short(), "seed": 1, "out": tmp_path / "new" / "out", **mistake})
-    assert list(tmp_path.iterdir()) == []
+def test_mistakes_that_stop_a_run_before_its_first_step_leave_nothing(tmp_path: Path) -> None:
+    for mistake, kind in [
+        ({"seed": -1}, InputError),
+        ({"seed": 1.5}, InputError),
+        ({"recorders": ("table", "film")}, UnknownNameError),
+    ]:
+        with pytest.raises(kind):
+            record_run(**{"scenario": short(), "seed": 1, "out": tmp_path / "new" / "out", **mistake})
+        assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", [b"run:1", b"2026-11-22T01:14:00", b"-x", b"run\xff"])

@@ -108,9 +108,8 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_are_told_at_their_place(tmp_path: Path) -> None:
+    for old, new, told in [
         ("{left: failed}", "{lefft: failed}", "actors.slow.lamps.position.lefft: unknown key; did you mean 'left'"),
         ("{left: failed}", "broken", "actors.slow.lamps.position: must be on, off, failed, automatic, or a block of"),
         ("{left: failed}", "{}", "actors.slow.lamps.position: no action given; allowed: left, right"),
@@ -135,9 +134,7 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
             "timeline.1.do.new: lamps.stop.middle: a truck has no third stop lamp",
         ),
         ("{stop: {left: failed", "{stop: {lefft: failed", "timeline.0.do.slow.lamps.stop.lefft: unknown key"),
-    ],
-)
-def test_mistakes_are_told_at_their_place(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(fogsim.InputError) as error:
-        written(tmp_path, FILE.replace(old, new))
-    assert told in str(error.value)
+    ]:
+        with pytest.raises(fogsim.InputError) as error:
+            written(tmp_path, FILE.replace(old, new))
+        assert told in str(error.value)

@@ -95,9 +95,8 @@ LATE.timestamp.seconds = 7
 PATH = MotionRequest(motion_request_type=MotionRequest.MOTION_REQUEST_TYPE_TRAJECTORY)
 
 
-@pytest.mark.parametrize(
-    ("answer", "message"),
-    [
+def test_what_is_no_answer_ends_the_run() -> None:
+    for answer, message in [
         (lambda _: [], r"no answer within 0.3 s \(controller.parameters.timeout\) to the message of 0 s"),
         (dripping, r"no answer within 0.3 s"),
         (lambda _: None, "the process closed the connection"),
@@ -110,12 +109,10 @@ PATH = MotionRequest(motion_request_type=MotionRequest.MOTION_REQUEST_TYPE_TRAJE
         (lambda _: [framed(request(position_x=1.0))], "got desired_state.position"),
         (lambda _: [framed(request(acceleration_x=1.0, velocity_x=0.5))], "expected an acceleration or a speed"),
         (lambda _: [framed(request(acceleration_x=math.nan))], "acceleration must be finite"),
-    ],
-)
-def test_what_is_no_answer_ends_the_run(answer: Answer, message: str) -> None:
-    with pytest.raises((MethodError, InputError), match=message) as caught:
-        asked(answer, timeout=0.3)
-    assert "controller 'osi'" in str(caught.value)
+    ]:
+        with pytest.raises((MethodError, InputError), match=message) as caught:
+            asked(answer, timeout=0.3)
+        assert "controller 'osi'" in str(caught.value)
 
 
 def test_a_process_that_does_not_listen_is_named(free_port: Callable[[], int]) -> None:

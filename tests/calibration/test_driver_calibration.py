@@ -95,19 +95,16 @@ def _flow(block: str) -> str:
     return f"speed_choice: {{{method}, {parameters}}}, {spread}"
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
+    for text, message in [
         ("visibility,speed\n", "expected columns visibility_m and either speed_kmh or speed_mps"),
         ("visibility_m,speed_kmh\n60,fast\n", "data.csv:2.*speed_kmh"),
         ("visibility_m,speed_kmh,session\n60,80,a\n60,80,\n", "data.csv:3: session is empty"),
         ("visibility_m,speed_kmh\n60,80\n", "at least 30 vehicles in fog .* got 1"),
-    ],
-)
-def test_what_cannot_be_fitted_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "data.csv").write_text(text)
-    with pytest.raises(InputError, match=message):
-        fit_drivers(read_passages(tmp_path / "data.csv"))
+    ]:
+        (tmp_path / "data.csv").write_text(text)
+        with pytest.raises(InputError, match=message):
+            fit_drivers(read_passages(tmp_path / "data.csv"))
 
 
 def test_a_users_own_choice(tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:

@@ -9,9 +9,8 @@ from fogsim.conditions.moment import Body, clearance
 CAR = Body(0.0, 0.0, 0.0, 4.0, 2.0)
 
 
-@pytest.mark.parametrize(
-    ("other", "apart"),
-    [
+def test_the_distance_between_two_bodies() -> None:
+    for other, apart in [
         (Body(14.0, 0.0, 0.0, 4.0, 2.0), 10.0),  # ahead: its rear is at x = 10 m
         (Body(-7.0, 0.0, 0.0, 4.0, 2.0), 3.0),  # behind: the rear is at x = −4 m
         (Body(0.0, 5.0, 0.0, 4.0, 2.0), 3.0),  # next to it: sides at y = 1 m and y = 4 m
@@ -22,13 +21,11 @@ CAR = Body(0.0, 0.0, 0.0, 4.0, 2.0)
         (Body(2.0, 2.0, math.pi / 4, 1.0, 0.2), None),  # askew: between the nearest corner and the corner of the front
         (Body(-2.0, 3.0, math.pi / 2, 6.0, 0.5), 0.0),  # across it, with no corner in the other
         (CAR, 0.0),
-    ],
-)
-def test_the_distance_between_two_bodies(other: Body, apart: float | None) -> None:
-    if apart is None:
-        apart = min(math.hypot(max(x, 0.0), max(y - 1.0, 0.0)) for x, y in other.corners())
-    assert clearance(CAR, other) == pytest.approx(apart, abs=1e-9)
-    assert clearance(other, CAR) == pytest.approx(apart, abs=1e-9)
+    ]:
+        nearest = min(math.hypot(max(x, 0.0), max(y - 1.0, 0.0)) for x, y in other.corners())
+        expected = pytest.approx(nearest if apart is None else apart, abs=1e-9)
+        assert clearance(CAR, other) == expected
+        assert clearance(other, CAR) == expected
 
 
 def test_points_of_a_body() -> None:

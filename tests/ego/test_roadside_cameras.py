@@ -131,16 +131,13 @@ def test_a_section_goes_by_the_last_report_of_a_sensor_wherever_that_was_seen() 
     assert {section.reported for section in meters.measure(fog)} == {0.001}
 
 
-@pytest.mark.parametrize(
-    ("settings", "told"),
-    [
+def test_what_cannot_be_is_refused() -> None:
+    for settings, told in [
         (("sensors.reports.roadside={camera: {}, wrong: 5 %}",), r"wrong is of sensors .*leave out wrong or camera"),
         (("sensors.reports.roadside={camera: {}, deviation: 0.2}",), r"roadside: deviation is of sensors"),
         ((CAMERAS, "renderer=none", "estimators=[]"), r"reports\.roadside\.camera takes images, and renderer: none"),
         (("sensors.reports.roadside={camera: {estimator: joint}}",), r"camera\.estimator: unknown estimator 'joint'"),
         (("sensors.reports.roadside={camera: {mount_height_m: 0}}",), r"camera\.mount_height_m"),
-    ],
-)
-def test_what_cannot_be_is_refused(settings: tuple[str, ...], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        fogsim.load_scenario("motorway_fog_bank", list(settings))
+    ]:
+        with pytest.raises(InputError, match=told):
+            fogsim.load_scenario("motorway_fog_bank", list(settings))

@@ -64,9 +64,8 @@ def test_signs_are_read_from_afar():
     ]
 
 
-@pytest.mark.parametrize(
-    ("settings", "told"),
-    [
+def test_what_cannot_inform_is_told():
+    for settings, told in [
         (("advice={method: fixed_speed, informed_by: sensors}",), "needs sensors.reports.roadside"),
         (
             (
@@ -78,8 +77,6 @@ def test_signs_are_read_from_afar():
         ),
         (("advice={method: fixed_speed, informed_by: sensor}",), "sensors"),
         (("lighting={method: legal, informed_by: sensors}",), "informed_by"),
-    ],
-)
-def test_what_cannot_inform_is_told(settings, told):
-    with pytest.raises(InputError, match=told):
-        scenario(*settings)
+    ]:
+        with pytest.raises(InputError, match=told):
+            scenario(*settings)

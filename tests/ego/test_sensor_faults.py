@@ -116,19 +116,16 @@ def test_the_picture_of_the_sign_map_knows_nothing_of_the_truth() -> None:
         np.testing.assert_array_equal(other.observation.sign_map_from_above, one.observation.sign_map_from_above)
 
 
-@pytest.mark.parametrize(
-    ("fault", "told"),
-    [
+def test_mistakes_in_faults_are_told_by_key_and_value() -> None:
+    for fault, told in [
         ("{fault: wetlens}", r"sensors\.faults\.0\.fault: unknown fault 'wetlens'; did you mean 'wet_lens'\?"),
         ("{sensor: lead}", r"sensors\.faults\.0\.fault: this key is missing"),
         ("{sensor: lead, fault: wet_lens}", r"sensors\.faults\.0\.sensor: input should be 'camera'; got 'lead'"),
         ("{fault: wet_lens, covrage: 0.1}", r"sensors\.faults\.0\.covrage: unknown key; did you mean 'coverage'\?"),
         ("{fault: wet_lens, at: 3 km}", r"sensors\.faults\.0\.at: the unit 'km' does not fit"),
-    ],
-)
-def test_mistakes_in_faults_are_told_by_key_and_value(fault: str, told: str) -> None:
-    with pytest.raises(fogsim.InputError, match=told):
-        fogsim.load_scenario("motorway_fog_bank", [f"sensors.faults=[{fault}]"])
+    ]:
+        with pytest.raises(fogsim.InputError, match=told):
+            fogsim.load_scenario("motorway_fog_bank", [f"sensors.faults=[{fault}]"])
 
 
 def test_a_sign_that_is_not_there_stops_the_run_at_its_beginning() -> None:

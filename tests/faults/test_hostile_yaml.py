@@ -80,13 +80,13 @@ def test_what_is_no_regular_file_is_not_read(tmp_path: Path, reader: Reader) -> 
             reader(path)
 
 
-@pytest.mark.parametrize("name", ["", "a\0b", "x" * 300])
-def test_names_that_no_file_can_have(name: str) -> None:
-    with pytest.raises(InputError, match=r"^unknown scenario "):
-        load_scenario(name)
-    for setting in (f"traffic.net={name!r}", f"traffic.routes=[{name!r}]"):
-        with pytest.raises(InputError, match=r"^--set .*: traffic\.(net|routes)"):
-            load_scenario("motorway_fog_bank", [setting.replace("\0", "\\0").replace("'", '"')])
+def test_names_that_no_file_can_have() -> None:
+    for name in ["", "a\0b", "x" * 300]:
+        with pytest.raises(InputError, match=r"^unknown scenario "):
+            load_scenario(name)
+        for setting in (f"traffic.net={name!r}", f"traffic.routes=[{name!r}]"):
+            with pytest.raises(InputError, match=r"^--set .*: traffic\.(net|routes)"):
+                load_scenario("motorway_fog_bank", [setting.replace("\0", "\\0").replace("'", '"')])
 
 
 def test_values_are_what_they_look_like() -> None:

@@ -108,9 +108,8 @@ def test_the_ego_has_two_names(tmp_path: Path) -> None:
     assert "gap(ego, parked) names the same vehicle twice" in line
 
 
-@pytest.mark.parametrize(
-    "written",
-    [
+def test_what_can_come_is_read(tmp_path: Path) -> None:
+    for written in [
         "expect: {safe: {never: ego.collision, always: ego.position < 1 km}}",
         "expect: {safe: {eventually: time >= 2 s, within: 2 s}}",
         "expect: {safe: {never: ego.collision for 2 s}}",
@@ -119,12 +118,10 @@ def test_the_ego_has_two_names(tmp_path: Path) -> None:
         "expect: {safe: {metric: traffic_fog_time_share < 100 %}}",
         "expect: {safe: {metric: traffic_delay_share < 150 %}}",
         "timeline: [{when: time >= 0 s, do: {ego: {brake: {}}}}]",
-    ],
-)
-def test_what_can_come_is_read(tmp_path: Path, written: str) -> None:
-    file = tmp_path / "fine.fog.yaml"
-    file.write_text(f"{PLAIN}{written}\n".replace("lanes: 1, on", "lanes: 2, on"), encoding="utf-8")
-    load_scenario(file)
+    ]:
+        file = tmp_path / "fine.fog.yaml"
+        file.write_text(f"{PLAIN}{written}\n".replace("lanes: 1, on", "lanes: 2, on"), encoding="utf-8")
+        load_scenario(file)
 
 
 def test_triggers_may_be_late_where_a_run_is_shortened_or_imported(tmp_path: Path) -> None:

@@ -72,6 +72,8 @@ def test_the_commands_have_options_with_numbers_and_paths() -> None:
     assert len(PATHS) > 20
 
 
-@pytest.mark.parametrize("light", ["nan", "nan,1,1", "1e400", "x", "1,2", "-1", ""])
-def test_an_airlight_that_is_no_pixel_value_is_refused(refusal: Callable[..., str], light: str) -> None:
-    assert "--airlight" in refusal("fog", "photo.png", "--visibility", "50", "--out", "x.png", f"--airlight={light}")
+def test_an_airlight_that_is_no_pixel_value_is_refused(refusal: Callable[..., str]) -> None:
+    for light in ["nan", "nan,1,1", "1e400", "x", "1,2", "-1", ""]:
+        assert "--airlight" in refusal(
+            "fog", "photo.png", "--visibility", "50", "--out", "x.png", f"--airlight={light}"
+        )

@@ -52,7 +52,7 @@ def test_a_limit_that_is_none(sumo_process: Callable) -> None:
         traffic.close()
 
 
-@pytest.mark.parametrize("timeout", [0.0, -1.0, float("nan")])
-def test_a_limit_that_is_no_time_is_refused(timeout: float) -> None:
-    with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
-        fogsim.connect(town(), timeout=timeout)
+def test_a_limit_that_is_no_time_is_refused() -> None:
+    for timeout in [0.0, -1.0, float("nan")]:
+        with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
+            fogsim.connect(town(), timeout=timeout)

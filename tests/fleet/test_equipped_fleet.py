@@ -145,18 +145,15 @@ def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed():
     assert camera_messages(dataclasses.replace(step, estimates=(Estimate("a", 0.03, 0.02),))) == ()
 
 
-@pytest.mark.parametrize(
-    ("written", "told"),
-    [
+def test_who_cannot_be_equipped_is_told():
+    for written, told in [
         ("traffic.equipped_vehicles=[nobody]", "nobody"),
         ("traffic.ego=[ego, ego]", "named twice"),
         ("traffic.equipped=1.5", "equipped"),
         ("traffic.ego=[]", "empty list"),
-    ],
-)
-def test_who_cannot_be_equipped_is_told(written, told):
-    with pytest.raises(InputError, match=told):
-        small(written)
+    ]:
+        with pytest.raises(InputError, match=told):
+            small(written)
 
 
 def test_places_along_a_route_with_a_bend():

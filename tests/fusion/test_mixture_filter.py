@@ -69,9 +69,9 @@ def test_it_lags_behind_a_bank_where_the_grid_filter_does_not():
     assert lagging.visibility > 200.0
 
 
-@pytest.mark.parametrize(("time", "place"), [(math.nan, 0.0), (0.0, math.inf), (-1.0, 0.0)])
-def test_impossible_instants_are_refused(time, place):
-    fusion = make("mixture_filter")
-    fusion.update_at([], 0.0, 0.0)
-    with pytest.raises(InputError, match="mixture_filter"):
-        fusion.update_at([], time, place)
+def test_impossible_instants_are_refused():
+    for time, place in [(math.nan, 0.0), (0.0, math.inf), (-1.0, 0.0)]:
+        fusion = make("mixture_filter")
+        fusion.update_at([], 0.0, 0.0)
+        with pytest.raises(InputError, match="mixture_filter"):
+            fusion.update_at([], time, place)

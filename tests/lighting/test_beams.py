@@ -26,9 +26,8 @@ def toward(beam, right, up):
     return float(luminous_intensity(beam, math.radians(right), math.radians(up)))
 
 
-@pytest.mark.parametrize(
-    ("beam", "right", "up", "candela"),
-    [
+def test_tables_hold_what_was_published():
+    for beam, right, up, candela in [
         (high_beam, 0, 0, 37005),
         (high_beam, 1, 0, 39590),
         (high_beam, 20, 2, 285),
@@ -38,10 +37,8 @@ def toward(beam, right, up):
         (low_beam, -10, 4, 147),
         (low_beam, -45, 0, 23),
         (low_beam, 45, 0, 4),
-    ],
-)
-def test_tables_hold_what_was_published(beam, right, up, candela):
-    assert toward(beam(), right, up) == pytest.approx(candela)
+    ]:
+        assert toward(beam(), right, up) == pytest.approx(candela)
 
 
 def test_flux_is_that_of_the_reports():
@@ -91,9 +88,8 @@ def test_scaled_beam_is_brighter_everywhere():
         scaled_beam(low_beam(), -1)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_tables_that_cannot_be_are_refused():
+    for text, message in [
         (TABLE.replace("50", ""), r"row 2, column 2 must hold a number, got ''"),
         (TABLE.replace("50", "nan"), r"finite number of candela.*0° up, 0° right.*nan"),
         (TABLE.replace("50", "-5"), r"candela ≥ 0.*-5"),
@@ -101,11 +97,9 @@ def test_scaled_beam_is_brighter_everywhere():
         (TABLE.replace("-1,0,1", "0,-1,1"), r"azimuth must be two or more finite, ascending"),
         (TABLE.replace("\n0,40", "\n-2,40"), r"elevation must be two or more finite, ascending"),
         ("up\\right,0,1\n", r"two or more rows"),
-    ],
-)
-def test_tables_that_cannot_be_are_refused(text, message):
-    with pytest.raises(InputError, match=message):
-        read_beam(text, "table")
+    ]:
+        with pytest.raises(InputError, match=message):
+            read_beam(text, "table")
 
 
 def test_shape_must_fit_the_directions():

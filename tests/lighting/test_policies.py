@@ -36,9 +36,8 @@ def lasting(policy: VehicleLightingPolicy, visibility: float, seen: Observation,
     return policy.choose_lamps(believe(visibility), seen, 20.0, first).lamps
 
 
-@pytest.mark.parametrize(
-    ("visibility", "seen", "expected"),
-    [
+def test_gallen2014_prefers_high_beams_above_100_m_where_nobody_is_dazzled() -> None:
+    for visibility, seen, expected in [
         (CLEAR, NIGHT, HIGH),
         (130.0, NIGHT, HIGH),
         (110.0, NIGHT, LOW),
@@ -50,12 +49,8 @@ def lasting(policy: VehicleLightingPolicy, visibility: float, seen: Observation,
         (CLEAR, with_lead(120.0), HIGH),
         (CLEAR, dataclasses.replace(NIGHT, light=LightMeasurement(1000.0)), LOW),
         (CLEAR, dataclasses.replace(NIGHT, light=None), LOW),
-    ],
-)
-def test_gallen2014_prefers_high_beams_above_100_m_where_nobody_is_dazzled(
-    visibility: float, seen: Observation, expected: Lamp
-) -> None:
-    assert lasting(Gallen2014(), visibility, seen) == expected
+    ]:
+        assert lasting(Gallen2014(), visibility, seen) == expected
 
 
 def test_high_beams_stay_to_100_m_and_come_from_120_m_on() -> None:

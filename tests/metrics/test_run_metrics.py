@@ -42,9 +42,9 @@ def test_numbers_are_written_to_nine_digits() -> None:
         assert type(told["outer"]) is type(value)
 
 
-@pytest.mark.parametrize("value", [-0.0, -1e-17, 4e-10])
-def test_what_is_nothing_has_no_sign(value: float) -> None:
-    assert str(RunSummary({"key": value}, {}).to_json()["key"]) == "0.0"
+def test_what_is_nothing_has_no_sign() -> None:
+    for value in [-0.0, -1e-17, 4e-10]:
+        assert str(RunSummary({"key": value}, {}).to_json()["key"]) == "0.0"
 
 
 def test_the_last_bits_of_a_number_are_not_written() -> None:

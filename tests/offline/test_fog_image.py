@@ -225,18 +225,15 @@ def test_a_camera_file_is_read_in_its_readers_units(folder: Path) -> None:
     assert load_camera(folder / "camera.yaml") == CAMERA
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_in_a_camera_file_are_told(folder: Path) -> None:
+    for old, new, told in [
         ("focal_length_px", "focal_lenght_px", "camera.yaml:3: focal_lenght_px: unknown key; did you mean 'focal_len"),
         ("height: 48\n", "", "height: this key is missing"),
         ("width: 64", "width: 0", "camera.yaml:1: width: input should be greater than or equal to 1; got 0"),
         ("linear", "log", "response: input should be 'linear', 'gamma' or 'srgb'"),
         ("pitch_deg: 2.0", "pitch_deg: .nan", "pitch_deg"),
         ("[31.5, 20.25]", "[31.5]", "principal_point_px"),
-    ],
-)
-def test_mistakes_in_a_camera_file_are_told(folder: Path, old: str, new: str, told: str) -> None:
-    (folder / "camera.yaml").write_text(CAMERA_YAML.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(InputError, match=told.replace("[", r"\[")):
-        load_camera(folder / "camera.yaml")
+    ]:
+        (folder / "camera.yaml").write_text(CAMERA_YAML.replace(old, new, 1), encoding="utf-8")
+        with pytest.raises(InputError, match=told.replace("[", r"\[")):
+            load_camera(folder / "camera.yaml")

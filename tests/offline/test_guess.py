@@ -101,18 +101,15 @@ def test_a_camera_file_says_what_it_was_guessed_from_and_reads_back(drive, tmp_p
     assert [one.name for one in tmp_path.iterdir()] == ["camera.yaml"]
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
+def test_mistakes_are_told(drive) -> None:
+    for options, told in [
         ({"mount_height": 0.0}, "--mount-height must lie"),
         ({"mount_height": float("nan")}, "--mount-height must lie"),
         ({"field_of_view": math.radians(200.0)}, "--field-of-view must lie"),
         ({"mount_height": 1.3, "horizon_row": math.inf}, "--horizon-row must be"),
-    ],
-)
-def test_mistakes_are_told(drive, options: dict, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        guess_camera(find_source(drive.folder / "images"), **options)
+    ]:
+        with pytest.raises(InputError, match=told):
+            guess_camera(find_source(drive.folder / "images"), **options)
 
 
 def test_images_of_two_sizes_are_of_two_cameras(drive, tmp_path: Path) -> None:

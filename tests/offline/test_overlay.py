@@ -103,21 +103,18 @@ def test_an_error_leaves_no_file(drive, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [
+def test_mistakes_are_told_before_anything_is_read(drive, tmp_path: Path) -> None:
+    for name, told in [
         ("a.gif", "ends in .mp4, .png or .jpg, got .gif"),
         ("a", "got no ending"),
         ("a.png", "a picture holds one image"),
         ("nowhere/a.mp4", "there is no folder"),
         ("there.mp4", "already exists"),
-    ],
-)
-def test_mistakes_are_told_before_anything_is_read(drive, tmp_path: Path, name: str, told: str) -> None:
-    (tmp_path / "there.mp4").write_bytes(b"mine")
-    with pytest.raises(InputError, match=told):
-        OverlayFile(tmp_path / name, find_source(drive.folder / "images"), drive.camera, ["negru2013"])
-    assert (tmp_path / "there.mp4").read_bytes() == b"mine"
+    ]:
+        (tmp_path / "there.mp4").write_bytes(b"mine")
+        with pytest.raises(InputError, match=told):
+            OverlayFile(tmp_path / name, find_source(drive.folder / "images"), drive.camera, ["negru2013"])
+        assert (tmp_path / "there.mp4").read_bytes() == b"mine"
 
 
 def test_what_is_read_is_never_replaced(drive, tmp_path: Path) -> None:

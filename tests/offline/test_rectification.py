@@ -168,13 +168,13 @@ def test_what_a_lens_cannot_show_repeats_its_border() -> None:
     assert np.all(straight[:, :60] == 0)
 
 
-@pytest.mark.parametrize(
-    ("lens", "told"),
-    [((-2.0, 0.0, 0.0, 0.0), r"folds the image over 157 px .* goes on to 236 px"), ((0.1, -9.0, 0.0, 0.0), "folds")],
-)
-def test_a_lens_that_folds_the_image_is_refused(lens: tuple[float, ...], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        Straightener(Calibration(CAMERA, lens))
+def test_a_lens_that_folds_the_image_is_refused() -> None:
+    for lens, told in [
+        ((-2.0, 0.0, 0.0, 0.0), r"folds the image over 157 px .* goes on to 236 px"),
+        ((0.1, -9.0, 0.0, 0.0), "folds"),
+    ]:
+        with pytest.raises(InputError, match=told):
+            Straightener(Calibration(CAMERA, lens))
 
 
 def written(folder: Path, keys: str) -> Calibration:
@@ -186,9 +186,8 @@ def written(folder: Path, keys: str) -> Calibration:
     return load_calibration(folder / "camera.yaml")
 
 
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [
+def test_mistakes_are_told_with_their_line(tmp_path: Path) -> None:
+    for keys, told in [
         ("distortion: [0.1, 0.2]\n", r"camera.yaml:7: distortion.* missing"),
         ("distortion: [0.1, 0.2, 0, 0, 0.3]\n", r"camera.yaml:7: distortion: .*4 items.* got \[0.1"),
         ("distortion: [.nan, 0, 0, 0]\n", r"camera.yaml:7: distortion.*finite number; got nan"),
@@ -196,11 +195,9 @@ def written(folder: Path, keys: str) -> Calibration:
         ("distorsion: [0, 0, 0, 0]\n", "did you mean 'distortion'"),
         ("yaw_deg: 90\n", r"camera.yaml:7: yaw_deg: .*less than 60; got 90"),
         ("yaw_deg: .inf\n", "yaw_deg"),
-    ],
-)
-def test_mistakes_are_told_with_their_line(tmp_path: Path, keys: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        written(tmp_path, keys)
+    ]:
+        with pytest.raises(InputError, match=told):
+            written(tmp_path, keys)
 
 
 def test_whoever_needs_a_pinhole_is_not_given_another_camera(tmp_path: Path) -> None:

@@ -100,11 +100,11 @@ def test_a_told_horizon_is_a_level_camera_with_its_axis_in_the_middle(tmp_path: 
             calibration_from_options(tmp_path / "clear.png", *changed)
 
 
-@pytest.mark.parametrize("pitch", [-40.0, 60.0])
-def test_a_horizon_outside_the_image_is_refused(pitch: float) -> None:
-    camera = dataclasses.replace(CAMERA, pitch=math.radians(pitch))
-    with pytest.raises(InputError, match=r"horizon, on row .* is not within the image of rows 0 … 47"):
-        RoadPlane(Calibration(camera)).distance()
+def test_a_horizon_outside_the_image_is_refused() -> None:
+    for pitch in [-40.0, 60.0]:
+        camera = dataclasses.replace(CAMERA, pitch=math.radians(pitch))
+        with pytest.raises(InputError, match=r"horizon, on row .* is not within the image of rows 0 … 47"):
+            RoadPlane(Calibration(camera)).distance()
 
 
 def test_a_lens_that_folds_the_image_is_refused() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -263,14 +262,11 @@ def test_a_map_of_elsewhere_is_refused(folder: Path, place: tuple[float, float],
         watch("else.geojson")
 
 
-@pytest.mark.parametrize(
-    ("asked", "told"),
-    [
+def test_uses_that_are_refused(folder: Path) -> None:
+    for asked, told in [
         (lambda source: watch_signs(Path("map.geojson"), Path("track.csv"), source, CAMERA), "these images are stills"),
         (lambda _: watch(offset=math.inf), "--track-offset must be a number"),
         (lambda _: estimate_images("0.png", CAMERA, signs=Path("map.geojson")), "signs and track go together"),
-    ],
-)
-def test_uses_that_are_refused(folder: Path, asked: Callable[[ImageFiles], object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        asked(ImageFiles((Path("0.png"), Path("1.png")), False, 1.0))
+    ]:
+        with pytest.raises(InputError, match=told):
+            asked(ImageFiles((Path("0.png"), Path("1.png")), False, 1.0))

@@ -256,9 +256,8 @@ def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position:
     assert motion(run(file, "duration_s=0.1")[0], "Lead")[0] == pytest.approx(x, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_values_that_mean_something_else_are_refused(tmp_path: Path) -> None:
+    for old, new, told in [
         ('<AbsoluteTargetSpeed value="2"/>', '<AbsoluteTargetSpeed value="-2"/>', "vehicles do not drive backwards"),
         (
             '<SpeedAction>\n<SpeedActionDynamics dynamicsShape="linear"',
@@ -279,11 +278,9 @@ def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position:
             "rain and snow are not",
         ),
         ('<Center x="1.4" y="0"', '<Center x="1.4" y="0.5"', "Center: y: a body lies about its reference point"),
-    ],
-)
-def test_values_that_mean_something_else_are_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        _loaded(_changed(tmp_path, "chain_of_parameters", (old, new)))
+    ]:
+        with pytest.raises(InputError, match=told):
+            _loaded(_changed(tmp_path, "chain_of_parameters", (old, new)))
 
 
 def test_constraints_hold_for_the_values_that_a_catalog_is_given(tmp_path: Path) -> None:

@@ -156,9 +156,8 @@ def test_test_runs_have_their_numbers_as_seeds(folder: Path) -> None:
     assert speeds == pytest.approx([1.25 * float(case.levels["ego_kmh"]) for case, _ in loaded.cases], rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("definition", "told"),
-    [
+def test_what_is_no_distribution_is_told(folder: Path) -> None:
+    for definition, told in [
         (f"<Deterministic>{_single('ego_kmhh', SPEEDS)}</Deterministic>", "declares no parameter 'ego_kmhh'; did you"),
         (f"<Deterministic>{_single('faster', SPEEDS) * 2}</Deterministic>", "an earlier distribution has the same"),
         (f"<Deterministic>{_single('faster', RANGE.replace('0.1', '-1'))}</Deterministic>", "a stepWidth above 0"),
@@ -181,12 +180,10 @@ def test_test_runs_have_their_numbers_as_seeds(folder: Path) -> None:
         (_stochastic("faster", '<PoissonDistribution expectedValue="1"/>', runs=0), "whole number of 1 … 100,000"),
         ('<Stochastic numberOfTestRuns="3"/>', "expected StochasticDistribution inside, got nothing"),
         ("", "expected Stochastic or Deterministic inside, got "),
-    ],
-)
-def test_what_is_no_distribution_is_told(folder: Path, definition: str, told: str) -> None:
-    with pytest.raises(InputError, match=r"varied.xosc:1: /OpenSCENARIO/ParameterValueDistribution") as refused:
-        read_parameter_cases(_file(folder, definition))
-    assert told in str(refused.value)
+    ]:
+        with pytest.raises(InputError, match=r"varied.xosc:1: /OpenSCENARIO/ParameterValueDistribution") as refused:
+            read_parameter_cases(_file(folder, definition))
+        assert told in str(refused.value)
 
 
 def test_a_missing_base_is_told_with_what_is_there(folder: Path) -> None:

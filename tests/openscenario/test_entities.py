@@ -94,21 +94,18 @@ def _like(other: str) -> str:
     return speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
 
 
-@pytest.mark.parametrize(
-    ("begin", "actor", "action"),
-    [
+def test_who_is_no_entity_is_named(tmp_path: Path) -> None:
+    for begin, actor, action in [
         ({"Ghost": lane(90)}, "Ego", speed(5)),
         ({"Ego": f"{lane(30)}\n{_like('Ghost')}"}, "Ego", speed(5)),
         ({}, "Ghost", speed(5)),
         ({}, "Ego", _like("Ghost")),
-    ],
-)
-def test_who_is_no_entity_is_named(tmp_path: Path, begin: dict[str, str], actor: str, action: str) -> None:
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30), **begin}, {actor: event("e", action, after(1))})
-    with pytest.raises(InputError) as refused:
-        read_openscenario(file)
-    (line,) = str(refused.value).splitlines()
-    assert line.endswith("[Ghost]: there is no vehicle 'Ghost'")
+    ]:
+        file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30), **begin}, {actor: event("e", action, after(1))})
+        with pytest.raises(InputError) as refused:
+            read_openscenario(file)
+        (line,) = str(refused.value).splitlines()
+        assert line.endswith("[Ghost]: there is no vehicle 'Ghost'")
 
 
 def test_a_story_waits_for_a_vehicle_with_a_blank_in_its_name(tmp_path: Path) -> None:
@@ -120,12 +117,12 @@ def test_a_story_waits_for_a_vehicle_with_a_blank_in_its_name(tmp_path: Path) ->
     assert times["then"] - times["slow"] == pytest.approx(2.0, abs=0.21)
 
 
-@pytest.mark.parametrize(("ahead", "is_free"), [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)])
-def test_no_vehicle_begins_where_another_one_is(tmp_path: Path, ahead: float, is_free: bool) -> None:
-    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, {"Ego": lane(90), "Lead": lane(90 + ahead)})
-    if is_free:
-        first = first_step(file)
-        assert set(first.traffic.ids) == {"Ego", "Lead"}
-    else:
-        with pytest.raises(InputError, match="Lead cannot begin where it is to: Ego is there"):
-            read_openscenario(file)
+def test_no_vehicle_begins_where_another_one_is(tmp_path: Path) -> None:
+    for ahead, is_free in [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)]:
+        file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, {"Ego": lane(90), "Lead": lane(90 + ahead)})
+        if is_free:
+            first = first_step(file)
+            assert set(first.traffic.ids) == {"Ego", "Lead"}
+        else:
+            with pytest.raises(InputError, match="Lead cannot begin where it is to: Ego is there"):
+                read_openscenario(file)

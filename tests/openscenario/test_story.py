@@ -239,11 +239,11 @@ def test_what_waits_for_a_value_that_nothing_sets_is_left_out(
         assert {*read_openscenario(file).data["expect"]} == {"idle", "waits"}
 
 
-@pytest.mark.parametrize("count", ["0", "1.5", "101"])
-def test_counts_out_of_range_are_refused(tmp_path: Path, count: str) -> None:
-    events = event("e", speed(5), after(1)).replace('ExecutionCount="1"', f'ExecutionCount="{count}"')
-    with pytest.raises(InputError, match=r"Event\[e\]: maximumExecutionCount: expected 1 … 100, got"):
-        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": events}))
+def test_counts_out_of_range_are_refused(tmp_path: Path) -> None:
+    for count in ["0", "1.5", "101"]:
+        events = event("e", speed(5), after(1)).replace('ExecutionCount="1"', f'ExecutionCount="{count}"')
+        with pytest.raises(InputError, match=r"Event\[e\]: maximumExecutionCount: expected 1 … 100, got"):
+            read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": events}))
 
 
 def test_the_end_of_the_road_ends_therun(tmp_path: Path) -> None:

@@ -37,9 +37,8 @@ def read(tmp_path: Path) -> Callable[..., dict[str, Any]]:
     return reading
 
 
-@pytest.mark.parametrize(
-    ("condition", "told"),
-    [
+def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
+    for condition, told in [
         ('<SpeedCondition value="3" rule="lessThan"/>', "ego.speed < 3 m/s"),
         ('<AccelerationCondition value="-2" rule="lessOrEqual"/>', "ego.acceleration <= -2 m/s²"),
         ('<RelativeSpeedCondition entityRef="Lead" value="1" rule="lessThan"/>', "speed_difference(ego, Lead) < 1 m/s"),
@@ -91,10 +90,8 @@ def read(tmp_path: Path) -> Callable[..., dict[str, Any]]:
             "ego.position < 153.671 m or ego.position > 253.671 m",
         ),
         ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "ego.collision"),
-    ],
-)
-def test_conditions(read: Callable[..., dict[str, Any]], condition: str, told: str) -> None:
-    assert told in read((STAND_STILL, condition))["end_when"]
+    ]:
+        assert told in read((STAND_STILL, condition))["end_when"]
 
 
 @pytest.mark.parametrize(

@@ -99,10 +99,10 @@ def test_marks_stand_at_the_rows_that_were_found(row: float) -> None:
     assert abs(marked.mean() - 4 * (row + 0.5)) <= 1.0
 
 
-@pytest.mark.parametrize("row", [-5.0, 130.0, math.nan, None, "top"])
-def test_rows_outside_the_image_or_unknown_are_not_marked(row: object) -> None:
-    step = make_step(estimates=(estimate("m", 100.0, horizon_row=row),))
-    assert not (np.asarray(draw_camera_picture(step)) == BELIEF).all(axis=-1).any()
+def test_rows_outside_the_image_or_unknown_are_not_marked() -> None:
+    for row in [-5.0, 130.0, math.nan, None, "top"]:
+        step = make_step(estimates=(estimate("m", 100.0, horizon_row=row),))
+        assert not (np.asarray(draw_camera_picture(step)) == BELIEF).all(axis=-1).any()
 
 
 def test_many_methods_clear_air_and_no_advice_can_be_drawn() -> None:

@@ -65,8 +65,8 @@ def test_versions_come_from_what_is_installed() -> None:
     assert set(found) >= {"fogsim", "libsumo", "pyrender", "opencv-python-headless", "gymnasium", "platform"}
 
 
-@pytest.mark.parametrize("value", [math.inf, math.nan, object()])
-def test_what_json_cannot_hold_is_refused_and_leaves_no_file(tmp_path: Path, value: object) -> None:
-    with pytest.raises(InputError, match="finite numbers"):
-        write_json(tmp_path / "metrics.json", {"value": value})
-    assert list(tmp_path.iterdir()) == []
+def test_what_json_cannot_hold_is_refused_and_leaves_no_file(tmp_path: Path) -> None:
+    for value in [math.inf, math.nan, object()]:
+        with pytest.raises(InputError, match="finite numbers"):
+            write_json(tmp_path / "metrics.json", {"value": value})
+        assert list(tmp_path.iterdir()) == []

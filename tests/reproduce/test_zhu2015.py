@@ -114,10 +114,10 @@ def test_drives_are_the_same_again(done) -> None:
     assert again.records == tuple(r for r in done.records if r["drive"] == 0)
 
 
-@pytest.mark.parametrize("few", [Size(0, 2, 3), Size(2, 0, 3), Size(2, 2, 2), Size(2, 2, 3, 0)])
-def test_too_few_of_anything_is_refused(few) -> None:
-    with pytest.raises(InputError, match="at least"):
-        reproduce(few)
+def test_too_few_of_anything_is_refused() -> None:
+    for few in [Size(0, 2, 3), Size(2, 0, 3), Size(2, 2, 2), Size(2, 2, 3, 0)]:
+        with pytest.raises(InputError, match="at least"):
+            reproduce(few)
 
 
 def test_a_drive_moves_sways_and_follows(renderer) -> None:

@@ -77,9 +77,8 @@ def test_python_says_the_same(tmp_path: Path) -> None:
     assert doing == fs.VehicleActions(depart=fs.DepartAction(type="motorcycle", on="ramp", position_m=50))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_are_told_at_their_place(tmp_path: Path) -> None:
+    for old, new, told in [
         (
             "type: lorry",
             "type: lory",
@@ -91,12 +90,10 @@ def test_python_says_the_same(tmp_path: Path) -> None:
         ("on: ramp", "edges: [a]", "timeline.0.do.merging.depart: edges go with a network"),
         ("like: ego, gap: 100 m", "like: ego", "timeline.0.do.near.depart: like and gap_m go together"),
         ("like: ego", "position: 5 m, like: ego", "give like, or a route (position_m), not both"),
-    ],
-)
-def test_mistakes_are_told_at_their_place(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(fogsim.InputError) as error:
-        scenario_of(tmp_path, ROAD.replace(old, new))
-    assert told in str(error.value)
+    ]:
+        with pytest.raises(fogsim.InputError) as error:
+            scenario_of(tmp_path, ROAD.replace(old, new))
+        assert told in str(error.value)
 
 
 def test_edges_of_a_network_are_looked_up() -> None:

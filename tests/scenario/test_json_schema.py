@@ -45,9 +45,9 @@ def test_editors_find_nothing_wrong_with_whole_scenarios_of_the_docs(scenarios, 
     assert [places(scenarios, block) for block in whole] == [[]] * len(whole)
 
 
-@pytest.mark.parametrize("study", STUDIES, ids=lambda path: path.stem)
-def test_editors_find_nothing_wrong_with_shipped_studies(study):
-    assert places(Draft202012Validator(json_schema(StudyFile)), study.read_text()) == []
+def test_editors_find_nothing_wrong_with_shipped_studies():
+    for study in STUDIES:
+        assert places(Draft202012Validator(json_schema(StudyFile)), study.read_text()) == []
 
 
 def test_editors_find_what_is_wrong(scenarios):
@@ -87,11 +87,11 @@ def test_a_scenario_of_ones_own_begins_as_the_one_it_is_begun_from(tmp_path):
         begin_scenario("mine", "motorway_fog_bank", tmp_path)
 
 
-@pytest.mark.parametrize("name", ["", "..", "a/b", "a b", "x" * 101])
-def test_a_name_that_no_scenario_can_have_makes_nothing(tmp_path, name):
-    with pytest.raises(InputError, match="a scenario's name has letters"):
-        begin_scenario(name, "motorway_fog_bank", tmp_path)
-    assert not list(tmp_path.iterdir())
+def test_a_name_that_no_scenario_can_have_makes_nothing(tmp_path):
+    for name in ["", "..", "a/b", "a b", "x" * 101]:
+        with pytest.raises(InputError, match="a scenario's name has letters"):
+            begin_scenario(name, "motorway_fog_bank", tmp_path)
+        assert not list(tmp_path.iterdir())
 
 
 def test_files_that_lie_elsewhere_are_named_by_their_place(tmp_path):

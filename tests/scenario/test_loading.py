@@ -36,19 +36,18 @@ def test_by_name_file_and_folder(folder: Path) -> None:
     assert resolved(by_file) == resolved(load_scenario("motorway_fog_bank"))
 
 
-@pytest.mark.parametrize(
-    ("settings", "nearest"),
-    [
+def test_a_traffic_step_that_sumo_cannot_make_is_refused_with_the_nearest() -> None:
+    for settings, nearest in [
         (["clocks.traffic_step_s=0.0125"], "0.01 or 0.02 s; got 0.0125"),
         ([f"clocks.traffic_step_s={1 / 30!r}"], "0.025 or 0.05 s; got 0.0333"),
         ([f"clocks.{key}_s=0.0125" for key in ("traffic_step", "camera_period")], "0.012 or 0.013 s; got 0.0125"),
-    ],
-)
-def test_a_traffic_step_that_sumo_cannot_make_is_refused_with_the_nearest(settings: list[str], nearest: str) -> None:
-    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: SUMO counts time in whole milliseconds") as error:
-        load_scenario("motorway_fog_bank", settings)
-    assert str(error.value).startswith(f"--set {settings[0]}")
-    assert nearest in str(error.value)
+    ]:
+        with pytest.raises(
+            InputError, match=r"clocks\.traffic_step_s: SUMO counts time in whole milliseconds"
+        ) as error:
+            load_scenario("motorway_fog_bank", settings)
+        assert str(error.value).startswith(f"--set {settings[0]}")
+        assert nearest in str(error.value)
 
 
 def test_a_traffic_step_below_sumo_s_tick_is_refused_with_the_least() -> None:

@@ -133,18 +133,15 @@ def test_what_stands_beside_a_road_is_drawn_where_it_is_said_to_be(tmp_path: Pat
     assert roof.bottom == 5.2
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_what_does_not_fit_beside_a_road_is_told(tmp_path: Path) -> None:
+    for old, new, told in [
         ("at: 20 m, side", "at: 1990 m, side", "scenario.yaml:3: road: obstructions.0: ends beyond its way"),
         ("kind: hedge", "kind: hedge, along: ramp", "obstructions.0: the road has no way 'ramp'"),
         ("tunnel_at: 200 m", "tunnel_at: 1700 m", "road: the tunnel ends 100 m beyond the road"),
         ("kind: wall", "kind: wal", "scenario.yaml:6: road.obstructions.1.kind"),
-    ],
-)
-def test_what_does_not_fit_beside_a_road_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        loaded(tmp_path, BESIDE.replace(old, new, 1))
+    ]:
+        with pytest.raises(InputError, match=told):
+            loaded(tmp_path, BESIDE.replace(old, new, 1))
 
 
 OWN_NET = """

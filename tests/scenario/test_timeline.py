@@ -79,9 +79,8 @@ def test_mistakes_of_conditions_and_names() -> None:
     assert "timeline.1.name: names of entries must differ, but 'a' occurs twice" in mistake(two)
 
 
-@pytest.mark.parametrize(
-    ("do", "setting", "told"),
-    [
+def test_what_does_not_fit_the_scenario_is_told() -> None:
+    for do, setting, told in [
         (
             "fog: {density: 2}",
             "fog={visibility_m: inf}",
@@ -97,12 +96,10 @@ def test_mistakes_of_conditions_and_names() -> None:
             "light.illuminance_lx=0",
             "goes on from the light that there is",
         ),
-    ],
-)
-def test_what_does_not_fit_the_scenario_is_told(do: str, setting: str, told: str) -> None:
-    text = mistake(f"{{when: time > 1 s, do: {{{do}}}}}", setting)
-    assert told in text
-    assert "timeline.0.do." in text
+    ]:
+        text = mistake(f"{{when: time > 1 s, do: {{{do}}}}}", setting)
+        assert told in text
+        assert "timeline.0.do." in text
 
 
 def test_a_line_of_a_file_is_named(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.scenario.sensors.faults import AnyFault, FaultSection, fault_of
+from fogsim.scenario.sensors.faults import AnyFault, fault_of
 from fogsim.sensors import (
     Fix,
     Gps,
@@ -119,8 +119,8 @@ def test_a_sign_that_is_not_there_cannot_be_missing() -> None:
         check_sign_ids([SignsMissing(Where.WORLD, ("bb",))], SIGNS)
 
 
-@pytest.mark.parametrize("section", get_args(get_args(AnyFault)[0]), ids=lambda one: one.__name__)
-def test_each_section_makes_the_fault_that_it_names(section: type[FaultSection]) -> None:
-    (name,) = get_args(section.model_fields["fault"].annotation)
-    written = section(fault=name)
-    assert fault_of(written).name == f"{written.sensor} {name}"
+def test_each_section_makes_the_fault_that_it_names() -> None:
+    for section in get_args(get_args(AnyFault)[0]):
+        (name,) = get_args(section.model_fields["fault"].annotation)
+        written = section(fault=name)
+        assert fault_of(written).name == f"{written.sensor} {name}"

@@ -128,11 +128,11 @@ def test_a_grid_is_counted_before_it_is_built(tmp_path: Path, seeds: str, told: 
         load_study(written(tmp_path, f"scenario: motorway_fog_bank\nfactors:\n{factors}\nseeds: {seeds}\n"))
 
 
-@pytest.mark.parametrize("number", [10**5, 10**5 + 1, 10**40])
-def test_a_grid_has_a_limit(number: int) -> None:
-    mistake = grid_mistake({"fog": number, "policy": 1})
-    assert (mistake is None) == (number == 10**5)
-    assert mistake is None or "100,000 are allowed" in mistake
+def test_a_grid_has_a_limit() -> None:
+    for number in [10**5, 10**5 + 1, 10**40]:
+        mistake = grid_mistake({"fog": number, "policy": 1})
+        assert (mistake is None) == (number == 10**5)
+        assert mistake is None or "100,000 are allowed" in mistake
 
 
 def test_cells_are_counted_while_they_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,16 +19,16 @@ def test_clear_air_is_exactly_clear() -> None:
     assert visibility_from_extinction(0.0) == math.inf
 
 
-@pytest.mark.parametrize("visibility", [0.0, -1.0, math.nan])
-def test_impossible_visibility_is_refused(visibility: float) -> None:
-    with pytest.raises(ValueError, match="positive"):
-        extinction_from_visibility(visibility)
+def test_impossible_visibility_is_refused() -> None:
+    for visibility in [0.0, -1.0, math.nan]:
+        with pytest.raises(ValueError, match="positive"):
+            extinction_from_visibility(visibility)
 
 
-@pytest.mark.parametrize("extinction", [-1e-9, math.nan])
-def test_impossible_extinction_is_refused(extinction: float) -> None:
-    with pytest.raises(ValueError, match="negative"):
-        visibility_from_extinction(extinction)
+def test_impossible_extinction_is_refused() -> None:
+    for extinction in [-1e-9, math.nan]:
+        with pytest.raises(ValueError, match="negative"):
+            visibility_from_extinction(extinction)
 
 
 def test_times_have_no_noise_of_binary_fractions() -> None:

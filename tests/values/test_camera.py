@@ -41,10 +41,10 @@ def test_a_principal_point_is_two_finite_numbers() -> None:
             replace(CAMERA, principal_point=point)
 
 
-@pytest.mark.parametrize("response", ["log", None, math.nan])
-def test_an_unknown_response_answers_with_the_known_ones(response: object) -> None:
-    with pytest.raises(InputError, match=r"camera response: .*linear, gamma, srgb, got"):
-        replace(CAMERA, response=response)
+def test_an_unknown_response_answers_with_the_known_ones() -> None:
+    for response in ["log", None, math.nan]:
+        with pytest.raises(InputError, match=r"camera response: .*linear, gamma, srgb, got"):
+            replace(CAMERA, response=response)
 
 
 def test_numbers_of_any_type_make_the_same_camera() -> None:

@@ -2,7 +2,6 @@
 
 import math
 import platform
-from typing import Any
 
 import numpy as np
 import pytest
@@ -186,19 +185,16 @@ def test_transmittance_is_that_of_koschmieder() -> None:
     assert np.all(np.diff(near[12, :, 1]) > 0.0)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "told"),
-    [
+def test_what_is_no_layer_is_refused() -> None:
+    for wrong, told in [
         ({"ground_albedo": 1.2}, "albedo of the ground must lie within 0 … 1, got 1.2"),
         ({"ground_albedo": math.nan}, "ground_albedo must be a number, finite or nothing, got nan"),
         ({"ground_albedo": RHO, "top": math.inf}, "even layer of fog on flat land, not with no top"),
         ({"ground_albedo": RHO, "banks": (FogBank((0, 0), (1, 0), 0, 50, 10, 0.1),)}, "not with banks"),
         ({"ground_albedo": RHO, "patches": FogPatches(20, 5, 0.3)}, "not with patches"),
-    ],
-)
-def test_what_is_no_layer_is_refused(wrong: dict[str, Any], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        FogField(0.03, (1.0, 1.0, 1.0), **({"top": 250.0} | wrong))
+    ]:
+        with pytest.raises(InputError, match=told):
+            FogField(0.03, (1.0, 1.0, 1.0), **({"top": 250.0} | wrong))
 
 
 def test_an_eye_above_the_layer_and_unknown_layers_are_refused() -> None:

@@ -126,9 +126,8 @@ def test_oncoming_lamps_shorten_sight():
     assert blinded < 0.95 * visibility_distance(low_beam(), 300, veil_share=0.1)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
+def test_impossible_arguments_are_refused():
+    for call, message in [
         (lambda: visibility_distance(low_beam(), 0.0), "meteorological visibility"),
         (lambda: visibility_distance(low_beam(), math.nan), "meteorological visibility"),
         (lambda: visibility_distance(low_beam(), 100, veil_share=-1), "veil_share"),
@@ -136,8 +135,6 @@ def test_oncoming_lamps_shorten_sight():
         (lambda: veiling_luminance(-1.0, 0.1), "illuminance"),
         (lambda: veiling_luminance(1.0, -0.1), "angle of a glare source"),
         (lambda: veiling_luminance(1.0, 0.1, age=0), "age must be positive"),
-    ],
-)
-def test_impossible_arguments_are_refused(call, message):
-    with pytest.raises(InputError, match=message):
-        call()
+    ]:
+        with pytest.raises(InputError, match=message):
+            call()

@@ -113,21 +113,18 @@ def test_the_same_cases_before_and_after(campaign: Campaign, tmp_path: Path) -> 
     assert load_campaign(campaign.file, against=tmp_path / "b").earlier[0].verdict == rows[0]["verdict"]
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
+def test_what_is_no_earlier_campaign(campaign: Campaign, tmp_path: Path) -> None:
+    for table, message in [
         (None, "no cases.csv of a campaign is there"),
         ("case,purpose,fog [m],seed,verdict\n", "expected the columns case, purpose, fog \\[m\\], speed"),
         ("case,purpose,fog [m],speed [km/h],seed,verdict\n", "has no case"),
         ("case,purpose,fog [m],speed [km/h],seed,verdict\n0,space,x,1,2,passed\n", "cases.csv:2: expected a case"),
         ("", "expected the columns"),
-    ],
-)
-def test_what_is_no_earlier_campaign(campaign: Campaign, tmp_path: Path, table: str | None, message: str) -> None:
-    if table is not None:
-        (tmp_path / "cases.csv").write_text(table)
-    with pytest.raises(InputError, match=message):
-        load_campaign(campaign.file, against=tmp_path)
+    ]:
+        if table is not None:
+            (tmp_path / "cases.csv").write_text(table)
+        with pytest.raises(InputError, match=message):
+            load_campaign(campaign.file, against=tmp_path)
 
 
 def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, tmp_path: Path) -> None:

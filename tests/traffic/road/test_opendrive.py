@@ -94,21 +94,18 @@ def test_whom_a_signal_speaks_to(tmp_path: Path, t: str, orientation: str, headi
     assert sign.heading == pytest.approx(heading)
 
 
-@pytest.mark.parametrize(
-    ("attributes", "kind", "value"),
-    [
+def test_what_a_signal_says(tmp_path: Path) -> None:
+    for attributes, kind, value in [
         ('type="274" value="-1" subtype="60"', "speed_limit", 60 / 3.6),
         ('type="R2-1" name="SpeedLimit" value="65" unit="mph"', "speed_limit", 65 * 0.44704),
         ('type="274" value="30" unit="m/s"', "speed_limit", 30.0),
         ('type="276"', "xodr.276", 0.0),
         ('type="274" value="-1" subtype="-1"', "xodr.274", 0.0),
         ('type="262" value="7.5" unit="t"', "xodr.262", 7.5),
-    ],
-)
-def test_what_a_signal_says(tmp_path: Path, attributes: str, kind: str, value: float) -> None:
-    (sign,) = opendrive_signs(file(tmp_path, f'<signal id="s" s="40" t="-6" {attributes}/>'))
-    assert sign.kind == kind
-    assert sign.value == pytest.approx(value)
+    ]:
+        (sign,) = opendrive_signs(file(tmp_path, f'<signal id="s" s="40" t="-6" {attributes}/>'))
+        assert sign.kind == kind
+        assert sign.value == pytest.approx(value)
 
 
 def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:
@@ -118,9 +115,8 @@ def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:
 POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><poly3 a="0"/></geometry>'
 
 
-@pytest.mark.parametrize(
-    ("signals", "geometries", "message"),
-    [
+def test_signals_that_cannot_be_placed(tmp_path: Path) -> None:
+    for signals, geometries, message in [
         ('<signal id="a" s="400" t="1"/>', CURVE, r"road '7': signal 'a': expected s on the road, 0 … 230 m, got 400"),
         ('<signal id="a" s="40"/>', CURVE, "t must be a number within .*, got ''"),
         (
@@ -132,11 +128,9 @@ POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><poly3 a="0"/></g
         ('<signal id="a" s="40" t="1" value="fast"/>', CURVE, "value must be a number within .*, got 'fast'"),
         ('<signal id="a" s="4" t="1" type="274" value="9" unit="kn"/>', CURVE, "expected the speed's unit to be one"),
         ('<signal id="a" s="4" t="1"/>', CURVE.replace('hdg="0"', ""), "<geometry> needs the attribute 'hdg'"),
-    ],
-)
-def test_signals_that_cannot_be_placed(tmp_path: Path, signals: str, geometries: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        opendrive_signs(file(tmp_path, signals, geometries))
+    ]:
+        with pytest.raises(InputError, match=message):
+            opendrive_signs(file(tmp_path, signals, geometries))
 
 
 def test_what_is_no_opendrive_file(tmp_path: Path) -> None:

@@ -33,17 +33,14 @@ def test_a_corner_that_is_told_twice_counts_once(tmp_path: Path) -> None:
     np.testing.assert_array_equal(wall.line, [[0.0, 0.0, 1.5], [10.0, 0.0, 2.0]])
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_in_structures_are_told(tmp_path: Path) -> None:
+    for old, new, told in [
         ("structure.wall", "structure.wal", "poly 'w': unknown kind of structure 'wal'; did you mean 'wall'"),
         ('key="top"', 'key="height"', "poly 'w': <param key=.top. value=.…./> is missing"),
         ('"3"', '"high"', "poly 'w': top must be a number within .*, got 'high'"),
         ('"3"', '"0"', "a top over its bottom"),
-    ],
-)
-def test_mistakes_in_structures_are_told(tmp_path: Path, old: str, new: str, told: str) -> None:
-    file = tmp_path / "a.add.xml"
-    file.write_text(WALL.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(InputError, match=told):
-        structures([file])
+    ]:
+        file = tmp_path / "a.add.xml"
+        file.write_text(WALL.replace(old, new, 1), encoding="utf-8")
+        with pytest.raises(InputError, match=told):
+            structures([file])

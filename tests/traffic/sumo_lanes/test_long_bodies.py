@@ -111,21 +111,18 @@ def test_road_vehicles_bend_with_the_road(link: LibsumoLink, tmp_path: Path) -> 
     assert counts == {"road_train": {3}, "tram": {3}, "bus": {2}, "semi": {0, 2}}
 
 
-@pytest.mark.parametrize(
-    ("vehicle_class", "length", "carriage", "lengths"),
-    [
+def test_bodies_are_divided() -> None:
+    for vehicle_class, length, carriage, lengths in [
         ("rail", 180.0, math.nan, [(180.0 - 6 * 0.6) / 7] * 7),
         ("rail", 50.0, 10.0, [(50.0 - 4 * 0.6) / 5] * 5),
         ("bus", 18.0, math.nan, [9.0, 9.0]),
         ("trailer", 16.5, 12.0, [6.2, 12.0]),
         ("truck", 16.5, math.nan, [6.2, 13.65]),
-    ],
-)
-def test_bodies_are_divided(vehicle_class: str, length: float, carriage: float, lengths: list[float]) -> None:
-    found = sections(vehicle_class, length, carriage)
-    assert [one.end - one.start for one in found] == pytest.approx(lengths)
-    assert found[0].start == 0.0
-    assert found[-1].end == pytest.approx(length)
+    ]:
+        found = sections(vehicle_class, length, carriage)
+        assert [one.end - one.start for one in found] == pytest.approx(lengths)
+        assert found[0].start == 0.0
+        assert found[-1].end == pytest.approx(length)
 
 
 def test_lamps_burn_at_the_ends_of_a_body(link: LibsumoLink) -> None:

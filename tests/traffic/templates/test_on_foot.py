@@ -47,20 +47,17 @@ def test_crossings_of_streets_have_places_along_every_way() -> None:
     assert way_of(STREETS, Walker("p", position=280.0, crosses_at=292.0))[2] == "same_way.back"
 
 
-@pytest.mark.parametrize(
-    ("layout", "walker", "told"),
-    [
+def test_persons_who_cannot_walk_so_are_refused() -> None:
+    for layout, walker, told in [
         (ROAD_TEMPLATES["straight"]().layout(), Walker("p"), "the road has none; give road.footways: true"),
         (ROAD, Walker("p", crosses_at=200.0), "no crossing at 200 m; there are some at 400 m"),
         (ROAD, Walker("p", way="ramp"), "the road has no way 'ramp'; it has same_way, oncoming"),
         (ROAD, Walker("p", position=900.0), "must begin within 0 … 700 m of its way, got 900 m"),
         (STREETS, Walker("p", crosses_at=308.0), "cannot cross there without another crossing before it"),
-    ],
-)
-def test_persons_who_cannot_walk_so_are_refused(layout: Layout, walker: Walker, told: str) -> None:
-    with pytest.raises(PlacementError, match="p: ") as refused:
-        walkers_text(layout, [walker], Footfall())
-    assert told in str(refused.value)
+    ]:
+        with pytest.raises(PlacementError, match="p: ") as refused:
+            walkers_text(layout, [walker], Footfall())
+        assert told in str(refused.value)
 
 
 TEXT = """

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -120,8 +120,8 @@ def test_whole_numbers_of_numpy_are_whole_numbers(method: str) -> None:
         ESTIMATORS[method](CAMERA, **{name: np.int64(7)})
 
 
-@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.int8, np.uint64])
-def test_numbers_of_numpy_are_numbers_without_a_warning(kind: type[np.number[Any]]) -> None:
-    assert mismatch(float, kind(3)) is None
-    assert mismatch(Annotated[float, Range(0.0, 1e300)], kind(3)) is None
-    assert mismatch(float, np.float32("nan")) == "a number, finite"
+def test_numbers_of_numpy_are_numbers_without_a_warning() -> None:
+    for kind in [np.float16, np.float32, np.float64, np.int8, np.uint64]:
+        assert mismatch(float, kind(3)) is None
+        assert mismatch(Annotated[float, Range(0.0, 1e300)], kind(3)) is None
+        assert mismatch(float, np.float32("nan")) == "a number, finite"

@@ -18,12 +18,12 @@ def believe(visibility: float) -> Belief:
     return Belief(cells, weight / weight.sum())
 
 
-@pytest.mark.parametrize("visibility", [45.0, 60.0, 100.0, 200.0])
-def test_one_can_stop_within_the_visibility(visibility: float) -> None:
-    adviser = StoppingSightDistance()
-    speed = adviser.advise(believe(visibility), LIMIT, 0.0, SpeedAdvice()).speed
-    assert stopping_sight_distance(speed, 2.5, 3.4) <= visibility
-    assert stopping_sight_distance(speed + adviser.rounding, 2.5, 3.4) > visibility * 0.98
+def test_one_can_stop_within_the_visibility() -> None:
+    for visibility in [45.0, 60.0, 100.0, 200.0]:
+        adviser = StoppingSightDistance()
+        speed = adviser.advise(believe(visibility), LIMIT, 0.0, SpeedAdvice()).speed
+        assert stopping_sight_distance(speed, 2.5, 3.4) <= visibility
+        assert stopping_sight_distance(speed + adviser.rounding, 2.5, 3.4) > visibility * 0.98
 
 
 def test_advice_is_a_multiple_of_ten() -> None:

@@ -47,11 +47,11 @@ def test_published_steps() -> None:
         )
 
 
-@pytest.mark.parametrize("visibility", [80.0, 110.0, 160.0, 190.0])
-def test_virginia_lets_everybody_stop_within_sight(visibility: float) -> None:
-    speed = ADVISERS["virginia_i77"]().advise(certain_of(visibility), LIMIT, 0.0, SpeedAdvice()).speed
-    assert stopping_sight_distance(speed, 2.5, 3.4) < visibility
-    assert speed / (5 * MPH) == pytest.approx(round(speed / (5 * MPH)))
+def test_virginia_lets_everybody_stop_within_sight() -> None:
+    for visibility in [80.0, 110.0, 160.0, 190.0]:
+        speed = ADVISERS["virginia_i77"]().advise(certain_of(visibility), LIMIT, 0.0, SpeedAdvice()).speed
+        assert stopping_sight_distance(speed, 2.5, 3.4) < visibility
+        assert speed / (5 * MPH) == pytest.approx(round(speed / (5 * MPH)))
 
 
 def test_a_step_rises_only_after_the_hold_and_never_above_the_limit() -> None:

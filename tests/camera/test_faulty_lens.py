@@ -20,18 +20,15 @@ def seen(radiance: np.ndarray, *kinds: FaultKind, seed: int = 4) -> np.ndarray:
     return FaultyLens().look_through(radiance, CAMERA, faults)
 
 
-@pytest.mark.parametrize(
-    ("distance", "one", "other", "area"),
-    [
+def test_circles_share_what_geometry_says() -> None:
+    for distance, one, other, area in [
         (0.0, 1.0, 2.0, math.pi),
         (1.0, 3.0, 2.0, 4.0 * math.pi),
         (3.0, 1.0, 2.0, 0.0),
         # Two circles of radius 1 whose middles lie on each other: 2π/3 − √3/2.
         (1.0, 1.0, 1.0, 2.0 * math.pi / 3.0 - math.sqrt(3.0) / 2.0),
-    ],
-)
-def test_circles_share_what_geometry_says(distance: float, one: float, other: float, area: float) -> None:
-    assert float(shared_area(np.array([distance]), one, other)[0]) == pytest.approx(area, abs=1e-9)
+    ]:
+        assert float(shared_area(np.array([distance]), one, other)[0]) == pytest.approx(area, abs=1e-9)
 
 
 def test_blots_take_as_much_light_as_they_cover() -> None:

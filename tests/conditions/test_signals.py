@@ -147,24 +147,21 @@ def test_on_a_lap_a_place_is_near_to_the_ego() -> None:
     assert read("other.position", seam) == pytest.approx(850.0)
 
 
-@pytest.mark.parametrize(
-    ("lane", "value", "right", "left"),
-    [
+def test_lanes() -> None:
+    for lane, value, right, left in [
         ("motorway_1", LanePlace(0, 2), True, False),
         ("wide_2", LanePlace(2, 3), False, True),
         (":junction_0_1", LanePlace(1, None), None, None),
         (":junction_0_0", LanePlace(0, None), True, False),
         ("", None, None, None),
-    ],
-)
-def test_lanes(lane: str, value: LanePlace | None, right: bool | None, left: bool | None) -> None:
-    step = placed(make_step(), (60.0, 0.0), (0.0, 0.0), lane=(lane, "motorway_2"))
-    assert read("other.lane", step) == value
-    assert Watch(parse_condition("other.lane == right")).update(step) is right
-    assert Watch(parse_condition("other.lane == left")).update(step) is left
-    assert Watch(parse_condition("other.lane != left")).update(step) is (None if left is None else not left)
-    if value is not None:
-        assert Watch(parse_condition(f"other.lane == {value.number}")).update(step) is True
+    ]:
+        step = placed(make_step(), (60.0, 0.0), (0.0, 0.0), lane=(lane, "motorway_2"))
+        assert read("other.lane", step) == value
+        assert Watch(parse_condition("other.lane == right")).update(step) is right
+        assert Watch(parse_condition("other.lane == left")).update(step) is left
+        assert Watch(parse_condition("other.lane != left")).update(step) is (None if left is None else not left)
+        if value is not None:
+            assert Watch(parse_condition(f"other.lane == {value.number}")).update(step) is True
 
 
 def test_a_wider_road_is_no_change_of_lane() -> None:

@@ -34,11 +34,11 @@ def test_grid_spans_ten_metres_to_ten_kilometres():
     assert ends == pytest.approx([10_000, 10])
 
 
-@pytest.mark.parametrize("visibility", [15.0, 60.0, 250.0, 900.0, 4000.0])
-def test_converges_to_a_steady_measurement(visibility):
-    belief = feed(make("grid_filter"), [measured(visibility)] * 50)
-    assert belief.visibility == pytest.approx(visibility, rel=0.03)
-    assert belief.log_standard_deviation < 0.1
+def test_converges_to_a_steady_measurement():
+    for visibility in [15.0, 60.0, 250.0, 900.0, 4000.0]:
+        belief = feed(make("grid_filter"), [measured(visibility)] * 50)
+        assert belief.visibility == pytest.approx(visibility, rel=0.03)
+        assert belief.log_standard_deviation < 0.1
 
 
 def test_one_good_estimate_is_the_posterior_of_bayes():
@@ -147,12 +147,12 @@ def test_extreme_estimates_leave_a_distribution():
             assert belief.probability.sum() == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("gap", [5e-324, 1e-12, 1e6, 1e300])
-def test_any_gap_in_time_leaves_a_distribution(gap):
-    fusion = make("grid_filter")
-    fusion.update([measured(100.0)], 0.0)
-    belief = fusion.update([measured(100.0)], gap)
-    assert belief.probability.sum() == pytest.approx(1.0, abs=1e-12)
+def test_any_gap_in_time_leaves_a_distribution():
+    for gap in [5e-324, 1e-12, 1e6, 1e300]:
+        fusion = make("grid_filter")
+        fusion.update([measured(100.0)], 0.0)
+        belief = fusion.update([measured(100.0)], gap)
+        assert belief.probability.sum() == pytest.approx(1.0, abs=1e-12)
 
 
 def test_noisy_drive_through_a_bank_keeps_its_ninety_percent_interval():

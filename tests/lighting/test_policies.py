@@ -71,26 +71,21 @@ def test_a_wish_must_last_and_high_beams_are_left_at_once() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("country", "rear_fog", "front_fog", "high_in_fog"),
-    [
+def test_countries_allow_what_is_written() -> None:
+    for country, rear_fog, front_fog, high_in_fog in [
         ("germany", {40.0}, {40.0, 90.0}, True),
         ("united_kingdom", {40.0, 90.0}, {40.0, 90.0}, True),
         ("france", {40.0, 90.0, 300.0, 600.0}, {40.0, 90.0, 300.0, 600.0}, False),
         ("unece", {40.0}, {40.0, 90.0, 300.0, 600.0}, False),
-    ],
-)
-def test_countries_allow_what_is_written(
-    country: Any, rear_fog: set[float], front_fog: set[float], high_in_fog: bool
-) -> None:
-    policy = LegalRules(country)
-    found = {v: lasting(policy, v, sensed(oncoming=True)) for v in (40.0, 90.0, 300.0, 600.0, CLEAR)}
-    assert {v for v, lamps in found.items() if Lamp.REAR_FOG in lamps} == rear_fog
-    assert {v for v, lamps in found.items() if Lamp.FRONT_FOG in lamps} == front_fog
-    assert all(Lamp.LOW_BEAM in lamps for lamps in found.values())
-    assert (Lamp.HIGH_BEAM in lasting(policy, 300.0, NIGHT)) is high_in_fog
-    assert lasting(policy, CLEAR, NIGHT) == HIGH
-    assert lasting(policy, CLEAR, with_lead(90.0)) == LOW
+    ]:
+        policy = LegalRules(country)
+        found = {v: lasting(policy, v, sensed(oncoming=True)) for v in (40.0, 90.0, 300.0, 600.0, CLEAR)}
+        assert {v for v, lamps in found.items() if Lamp.REAR_FOG in lamps} == rear_fog
+        assert {v for v, lamps in found.items() if Lamp.FRONT_FOG in lamps} == front_fog
+        assert all(Lamp.LOW_BEAM in lamps for lamps in found.values())
+        assert (Lamp.HIGH_BEAM in lasting(policy, 300.0, NIGHT)) is high_in_fog
+        assert lasting(policy, CLEAR, NIGHT) == HIGH
+        assert lasting(policy, CLEAR, with_lead(90.0)) == LOW
 
 
 def test_each_rule_names_its_source() -> None:

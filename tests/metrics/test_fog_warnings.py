@@ -81,21 +81,20 @@ def test_banks_in_which_one_can_stop_in_sight_do_not_count():
     assert found(at(0, 1010.0), at(1, 1100.0))["fog_banks_entered"] == 0
 
 
-@pytest.mark.parametrize(
-    ("place", "outside", "speed", "false"),
-    [
+def test_false_warnings_are_those_without_reason():
+    for place, outside, speed, false in [
         (480.0, 20_000.0, 30.0, 1),  # 520 m before the bank
         (525.0, 20_000.0, 30.0, 0),  # 475 m before it
         (3000.0, 20_000.0, 30.0, 1),  # clear air
         (3000.0, 200.0, 30.0, 0),  # 208 m to stop
         (3000.0, 200.0, 25.0, 1),  # 154 m to stop
-    ],
-)
-def test_false_warnings_are_those_without_reason(place: float, outside: float, speed: float, false: int):
-    steps = [at(i, place, warning, outside=outside, speed=speed) for i, warning in enumerate((None, FOG, FOG, None))]
-    values = found(*steps)
-    assert values["false_fog_warnings"] == false
-    assert values["false_fog_warnings_per_h"] == pytest.approx(120.0 * false)
+    ]:
+        steps = [
+            at(i, place, warning, outside=outside, speed=speed) for i, warning in enumerate((None, FOG, FOG, None))
+        ]
+        values = found(*steps)
+        assert values["false_fog_warnings"] == false
+        assert values["false_fog_warnings_per_h"] == pytest.approx(120.0 * false)
 
 
 def test_a_warning_for_which_there_was_reason_when_it_was_decided_is_not_false():

@@ -6,7 +6,6 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-import pytest
 from PIL import Image
 
 from fogsim.metrics import RunMetrics, step_metrics
@@ -157,16 +156,16 @@ def test_clear_air_without_leader_can_be_drawn(tmp_path: Path) -> None:
     assert "true clear" in Page(report(tmp_path, steps)).text
 
 
-@pytest.mark.parametrize("count", [1, 5, MOST_PICTURES, 17, 1000])
-def test_pictures_are_spread_evenly_from_the_first_to_the_last_step(count: int) -> None:
-    album = Album()
-    for index in range(count):
-        album.add(make_step(index, time=float(index)))
-    times = [picture.time for picture in album.chosen()]
-    assert len(times) == min(count, MOST_PICTURES)
-    assert times[0] == 0.0
-    assert times[-1] == count - 1
-    gaps = [later - earlier for earlier, later in itertools.pairwise(times)]
-    assert all(gap > 0 for gap in gaps)
-    if count == 1000:
-        assert max(gaps) < 3 * min(gaps)
+def test_pictures_are_spread_evenly_from_the_first_to_the_last_step() -> None:
+    for count in [1, 5, MOST_PICTURES, 17, 1000]:
+        album = Album()
+        for index in range(count):
+            album.add(make_step(index, time=float(index)))
+        times = [picture.time for picture in album.chosen()]
+        assert len(times) == min(count, MOST_PICTURES)
+        assert times[0] == 0.0
+        assert times[-1] == count - 1
+        gaps = [later - earlier for earlier, later in itertools.pairwise(times)]
+        assert all(gap > 0 for gap in gaps)
+        if count == 1000:
+            assert max(gaps) < 3 * min(gaps)

@@ -13,18 +13,15 @@ def scenario(*overrides: str) -> Scenario:
     return load_scenario("motorway_fog_bank", overrides)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "automatic"),
-    [
+def test_exposure_is_automatic_unless_it_is_fixed() -> None:
+    for overrides, automatic in [
         ([], True),
         (["camera.saturation_luminance_cdpm2=5000"], False),
         (["camera.exposure.mode=fixed"], False),
         (["camera.exposure.mode=fixed", "camera.saturation_luminance_cdpm2=5000"], False),
         (["camera.exposure.mode=auto"], True),
-    ],
-)
-def test_exposure_is_automatic_unless_it_is_fixed(overrides: list[str], automatic: bool) -> None:
-    assert scenario(*overrides).camera.automatic is automatic
+    ]:
+        assert scenario(*overrides).camera.automatic is automatic
 
 
 def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:

@@ -40,17 +40,14 @@ def test_a_file_that_varies_nothing_has_one_case() -> None:
     assert with_case(document({"a": "$5"}), case).data == {"a": "$5"}
 
 
-@pytest.mark.parametrize(
-    ("written", "values"),
-    [
+def test_ranges_and_lists() -> None:
+    for written, values in [
         ({"from": "10 m", "to": "30 m", "step": "10 m"}, ["10 m", "20 m", "30 m"]),
         ({"from": 0.1, "to": 0.5, "step": 0.1}, [0.1, 0.2, 0.3, 0.4, 0.5]),
         ({"from": 3, "to": 0, "step": -2}, [3, 1]),
         ([True, "no fog"], [True, "no fog"]),
-    ],
-)
-def test_ranges_and_lists(written: object, values: list[object]) -> None:
-    assert [case.values["x"] for case in varied({"x": written}).cases] == values
+    ]:
+        assert [case.values["x"] for case in varied({"x": written}).cases] == values
 
 
 def test_draws_are_of_their_distribution_and_the_same_across_the_grid() -> None:

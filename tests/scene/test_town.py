@@ -49,20 +49,17 @@ def walking(*ids: str, speed: float = 1.4, x: float = 0.0, raised: bool = False)
     return PersonState(ids, places, np.zeros(count), np.full(count, speed), ("f_0",) * count, np.full(count, raised))
 
 
-@pytest.mark.parametrize(
-    ("colour", "lit"),
-    [
+def test_a_head_has_the_lenses_lit_that_it_shows() -> None:
+    for colour, lit in [
         (SignalColour.RED, SignalLight.RED),
         (SignalColour.RED_YELLOW, SignalLight.RED | SignalLight.YELLOW),
         (SignalColour.YELLOW, SignalLight.YELLOW),
         (SignalColour.GREEN, SignalLight.GREEN),
         (SignalColour.OFF, SignalLight.DARK),
-    ],
-)
-def test_a_head_has_the_lenses_lit_that_it_shows(colour: SignalColour, lit: SignalLight) -> None:
-    (batch,) = signal_batches(showing(colour), 0.0)
-    assert batch.lamps.tolist() == [int(lit)]
-    assert batch.instance.tolist() == [Instance.TRAFFIC_LIGHT]
+    ]:
+        (batch,) = signal_batches(showing(colour), 0.0)
+        assert batch.lamps.tolist() == [int(lit)]
+        assert batch.instance.tolist() == [Instance.TRAFFIC_LIGHT]
 
 
 def test_what_blinks_is_lit_half_of_the_time() -> None:

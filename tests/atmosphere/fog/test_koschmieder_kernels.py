@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 
 from fogsim.atmosphere import fogged_radiance, optical_depth
 from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
@@ -33,18 +32,18 @@ def test_transmission_of_nothing_and_of_everything() -> None:
     assert np.all(seen[2:] < 1e-30)
 
 
-@pytest.mark.parametrize("visibility", [20.0, 80.0, 400.0, 5000.0])
-def test_a_frame_is_the_closed_form_within_a_quarter_of_a_12_bit_step(visibility: float) -> None:
-    rng = np.random.default_rng(2)
-    shape = (CAMERA.height, CAMERA.width)
-    distance = rng.uniform(0.0, 3.0 * visibility, shape).astype(np.float32)
-    scene = View(rng.uniform(0, 5000, (*shape, 3)).astype(np.float32), distance, np.zeros(shape, np.int32))
-    k = math.log(20.0) / visibility
-    pose = CameraPose((0.0, 0.0, 1.38), 0.4)
-    seen = fogged_radiance(scene, FogField(k, AIRLIGHT), pose.position, ray_from_pixel(CAMERA, pose))
-    transmittance = np.exp(-k * distance.astype(np.float64))[..., None]
-    exact = scene.radiance * transmittance + np.array(AIRLIGHT) * (1.0 - transmittance)
-    assert np.abs(seen - exact).max() < 0.25 * 5000.0 / 4095.0
+def test_a_frame_is_the_closed_form_within_a_quarter_of_a_12_bit_step() -> None:
+    for visibility in [20.0, 80.0, 400.0, 5000.0]:
+        rng = np.random.default_rng(2)
+        shape = (CAMERA.height, CAMERA.width)
+        distance = rng.uniform(0.0, 3.0 * visibility, shape).astype(np.float32)
+        scene = View(rng.uniform(0, 5000, (*shape, 3)).astype(np.float32), distance, np.zeros(shape, np.int32))
+        k = math.log(20.0) / visibility
+        pose = CameraPose((0.0, 0.0, 1.38), 0.4)
+        seen = fogged_radiance(scene, FogField(k, AIRLIGHT), pose.position, ray_from_pixel(CAMERA, pose))
+        transmittance = np.exp(-k * distance.astype(np.float64))[..., None]
+        exact = scene.radiance * transmittance + np.array(AIRLIGHT) * (1.0 - transmittance)
+        assert np.abs(seen - exact).max() < 0.25 * 5000.0 / 4095.0
 
 
 def test_every_direction_through_a_bank_within_a_12_bit_step() -> None:

@@ -16,16 +16,16 @@ def over_the_sphere(phase, weight=np.ones_like):
     return 2 * math.pi * np.trapezoid(phase(angle) * weight(angle) * np.sin(angle), angle)
 
 
-@pytest.mark.parametrize("droplets", Droplets)
-def test_values_are_those_of_another_mie_code(droplets):
-    table = read_table("mie_fog.csv")
-    ours = phase_function(droplets)(np.radians(table["angle"]))
-    assert ours == pytest.approx(table[droplets], rel=0.07)
+def test_values_are_those_of_another_mie_code():
+    for droplets in Droplets:
+        table = read_table("mie_fog.csv")
+        ours = phase_function(droplets)(np.radians(table["angle"]))
+        assert ours == pytest.approx(table[droplets], rel=0.07)
 
 
-@pytest.mark.parametrize("droplets", Droplets)
-def test_all_light_goes_somewhere(droplets):
-    assert over_the_sphere(phase_function(droplets)) == pytest.approx(1.0, abs=2e-3)
+def test_all_light_goes_somewhere():
+    for droplets in Droplets:
+        assert over_the_sphere(phase_function(droplets)) == pytest.approx(1.0, abs=2e-3)
 
 
 @pytest.mark.parametrize(("droplets", "mean"), MEAN_COSINE.items())

@@ -13,17 +13,17 @@ TUNNEL = Tunnel(np.array([[100.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), HALF_WIDTH, HE
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.4)
 
 
-@pytest.mark.parametrize("distance", [0.5, 3.0, 10.0, 40.0])
-def test_the_skys_share_is_the_integral_over_the_portal(distance: float) -> None:
-    n = 400
-    across = (np.arange(2 * n) + 0.5) / n * HALF_WIDTH - HALF_WIDTH
-    up = (np.arange(n) + 0.5) / n * HEIGHT
-    y, z = np.meshgrid(across, up)
-    squared = distance**2 + y**2 + z**2
-    # cos of the angle at the road times cos of that at the portal, over π r².
-    integrand = z * distance / (np.pi * squared**2)
-    integral = float(integrand.sum()) * (HALF_WIDTH / n) * (HEIGHT / n)
-    assert sky_share(distance, HALF_WIDTH, HEIGHT) == pytest.approx(integral, rel=2e-3)
+def test_the_skys_share_is_the_integral_over_the_portal() -> None:
+    for distance in [0.5, 3.0, 10.0, 40.0]:
+        n = 400
+        across = (np.arange(2 * n) + 0.5) / n * HALF_WIDTH - HALF_WIDTH
+        up = (np.arange(n) + 0.5) / n * HEIGHT
+        y, z = np.meshgrid(across, up)
+        squared = distance**2 + y**2 + z**2
+        # cos of the angle at the road times cos of that at the portal, over π r².
+        integrand = z * distance / (np.pi * squared**2)
+        integral = float(integrand.sum()) * (HALF_WIDTH / n) * (HEIGHT / n)
+        assert sky_share(distance, HALF_WIDTH, HEIGHT) == pytest.approx(integral, rel=2e-3)
 
 
 def test_limits_of_the_skys_share() -> None:

@@ -57,14 +57,16 @@ def test_veil_of_high_beams(kind, veils):
     assert high_beam_veil(CLEAR, kind) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("kilocandela", "distances"),
-    [(20, (50.5, 45.0, 39.0)), (40, (59.8, 53.0, 46.0)), (80, (69.8, 62.0, 53.5)), (160, (81.0, 71.5, 62.2))],
-)
-def test_clear_air_by_even_light(kilocandela, distances):
-    for road, distance in zip((0.010, 0.0125, 0.015), distances, strict=True):
-        seen = visibility_distance(even_pair(1000 * kilocandela), CLEAR, pavement=Pavement(road))
-        assert seen == pytest.approx(distance, rel=0.01)
+def test_clear_air_by_even_light():
+    for kilocandela, distances in [
+        (20, (50.5, 45.0, 39.0)),
+        (40, (59.8, 53.0, 46.0)),
+        (80, (69.8, 62.0, 53.5)),
+        (160, (81.0, 71.5, 62.2)),
+    ]:
+        for road, distance in zip((0.010, 0.0125, 0.015), distances, strict=True):
+            seen = visibility_distance(even_pair(1000 * kilocandela), CLEAR, pavement=Pavement(road))
+            assert seen == pytest.approx(distance, rel=0.01)
 
 
 @pytest.mark.parametrize(("road", "high", "low"), [(0.010, 64.6, 55.3), (0.0125, 57.6, 48.8), (0.015, 50.6, 41.5)])
@@ -73,18 +75,17 @@ def test_clear_air_by_median_beams(road, high, low):
     assert visibility_distance(low_beam(), CLEAR, pavement=Pavement(road)) == pytest.approx(low, rel=0.005)
 
 
-@pytest.mark.parametrize(
-    ("kind", "road", "in_fog", "in_thick_fog"),
-    [
+def test_high_beams_in_fog():
+    for kind, road, in_fog, in_thick_fog in [
         (FogKind.RADIATION, 0.010, 37.1, 21.8),
         (FogKind.RADIATION, 0.0125, 34.6, 20.7),
         (FogKind.ADVECTION, 0.0125, 40.0, 25.0),
         (FogKind.ADVECTION, 0.015, 36.7, 23.7),
-    ],
-)
-def test_high_beams_in_fog(kind, road, in_fog, in_thick_fog):
-    assert visibility_distance(high_beam(), 300, kind, pavement=Pavement(road)) == pytest.approx(in_fog, rel=0.01)
-    assert visibility_distance(high_beam(), 100, kind, pavement=Pavement(road)) == pytest.approx(in_thick_fog, rel=0.01)
+    ]:
+        assert visibility_distance(high_beam(), 300, kind, pavement=Pavement(road)) == pytest.approx(in_fog, rel=0.01)
+        assert visibility_distance(high_beam(), 100, kind, pavement=Pavement(road)) == pytest.approx(
+            in_thick_fog, rel=0.01
+        )
 
 
 @pytest.mark.parametrize(

@@ -52,22 +52,19 @@ def test_age_factor_jumps_as_published():
     assert age_factor(64.0001) == pytest.approx(1.90098, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("function", "mismatch", "join"),
-    [
+def test_branches_meet_within_their_own_mismatch():
+    for function, mismatch, join in [
         (flux_root, 0.011, 0.6),
         (luminance_root, 0.007, 0.6),
         (flux_root, 0.011, 0.00418),
         (luminance_root, 0.007, 0.00418),
-    ],
-)
-def test_branches_meet_within_their_own_mismatch(function, mismatch, join):
-    assert function(join * 1.0001) == pytest.approx(float(function(join * 0.9999)), rel=mismatch)
+    ]:
+        assert function(join * 1.0001) == pytest.approx(float(function(join * 0.9999)), rel=mismatch)
 
 
-@pytest.mark.parametrize(("distance", "size"), [(60, 10.3132), (83, 7.4554), (100, 6.1879), (150, 4.1253)])
-def test_angular_size(distance, size):
-    assert np.degrees(angular_size(0.18, distance)) * 60 == pytest.approx(size, rel=1e-4)
+def test_angular_size():
+    for distance, size in [(60, 10.3132), (83, 7.4554), (100, 6.1879), (150, 4.1253)]:
+        assert np.degrees(angular_size(0.18, distance)) * 60 == pytest.approx(size, rel=1e-4)
 
 
 def test_visibility_level_of_the_small_target():

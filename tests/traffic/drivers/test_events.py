@@ -4,9 +4,8 @@ import math
 from collections.abc import Sequence
 
 import highway_env  # noqa: F401 - registers its environments
-import pytest
 
-from fogsim.traffic import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
+from fogsim.traffic import BrakeEvent, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.drivers.events import Script, Situation
 from fogsim.traffic.sumo_lanes.route_position import signed_gap
 from fogsim.values import Reason, Unplayed, UnplayedEvent
@@ -72,20 +71,17 @@ def after(script: Script, present: set[str], seen: set[str], *, lanes: bool = Tr
     return script.unplayed(seen, present)
 
 
-@pytest.mark.parametrize(
-    ("event", "reason"),
-    [
+def test_each_event_that_was_not_played_says_why() -> None:
+    for event, reason in [
         (BrakeEvent("a", Trigger(at_position=5000.0, name="x")), Reason.NOT_REACHED),
         (BrakeEvent("gone", Trigger(at_time=0.0, name="x")), Reason.LEFT),
         (BrakeEvent("nobody", Trigger(at_time=0.0, name="x")), Reason.NEVER_SEEN),
         (LaneChangeEvent("a", Trigger(at_time=0.0, name="x"), -1), Reason.NO_LANE),
-    ],
-)
-def test_each_event_that_was_not_played_says_why(event: Event, reason: Reason) -> None:
-    told = after(Script([event]), {"a"}, {"a", "gone"}, lanes=False)
-    assert told.events == (UnplayedEvent("x", reason),)
-    assert told.vehicles == (("nobody",) if reason is Reason.NEVER_SEEN else ())
-    assert told.is_final == (reason in (Reason.LEFT, Reason.NO_LANE))
+    ]:
+        told = after(Script([event]), {"a"}, {"a", "gone"}, lanes=False)
+        assert told.events == (UnplayedEvent("x", reason),)
+        assert told.vehicles == (("nobody",) if reason is Reason.NEVER_SEEN else ())
+        assert told.is_final == (reason in (Reason.LEFT, Reason.NO_LANE))
 
 
 def test_nothing_is_told_of_what_was_played() -> None:

@@ -63,28 +63,23 @@ def two_vehicles(top: float) -> Any:
     return SimpleNamespace(vehicle=vehicle)
 
 
-@pytest.mark.parametrize(
-    ("y", "height", "top", "hidden"),
-    [
+def test_a_vehicle_is_hidden_when_every_corner_is() -> None:
+    for y, height, top, hidden in [
         ((-9.0, 9.0), 2.0, 1.5, True),
         ((-9.0, 9.0), 2.0, 4.0, False),  # its roof stands out over the wall
         ((-9.0, 9.0), 0.5, 1.5, False),  # over a kerb
         ((-9.0, 0.3), 2.0, 1.5, False),  # its left side stands out
         ((-9.0, 0.7), 2.0, 1.5, True),
-    ],
-)
-def test_a_vehicle_is_hidden_when_every_corner_is(
-    y: tuple[float, float], height: float, top: float, hidden: bool
-) -> None:
-    api, wall = two_vehicles(top), across(y, height)
-    clear = FieldAccess(FogField(0.0, (3000.0,) * 3))
-    view = DriversView(api, clear, DriverSight(10_000.0), cast("Roster", None), obstructions=wall)
-    assert view.hidden_vehicles is not None
-    assert view.hidden_vehicles.are_hidden(PAIRS[:1]) == [hidden]
-    assert view.hidden_vehicles.are_hidden([]) == []
-    sight = VehicleSight(view)
-    assert sight.sees(PAIRS[:1], {}) == [not hidden]
-    assert sight.certainly_seen == 0.0
+    ]:
+        api, wall = two_vehicles(top), across(y, height)
+        clear = FieldAccess(FogField(0.0, (3000.0,) * 3))
+        view = DriversView(api, clear, DriverSight(10_000.0), cast("Roster", None), obstructions=wall)
+        assert view.hidden_vehicles is not None
+        assert view.hidden_vehicles.are_hidden(PAIRS[:1]) == [hidden]
+        assert view.hidden_vehicles.are_hidden([]) == []
+        sight = VehicleSight(view)
+        assert sight.sees(PAIRS[:1], {}) == [not hidden]
+        assert sight.certainly_seen == 0.0
 
 
 def drive(folder: Path, obstructions: str, *overrides: str) -> list[fogsim.Step]:

@@ -26,20 +26,17 @@ def way_of(layout: Layout, walker: Walker) -> tuple[str, float, str, float]:
     return str(ends[0]), float(person.get("departPos") or 0), str(ends[1]), float(walk.get("arrivalPos") or 0)
 
 
-@pytest.mark.parametrize(
-    ("walker", "way"),
-    [
+def test_persons_walk_on_or_cross() -> None:
+    for walker, way in [
         (Walker("p", position=300.0), ("same_way", 300.0, "same_way.1", 297.0)),
         (Walker("p", position=300.0, is_left=True), ("oncoming.1", 97.0, "oncoming", 0.0)),
         (Walker("p", position=390.0, crosses_at=400.0), ("same_way", 390.0, "oncoming.1", 15.0)),
         (Walker("p", position=390.0, is_left=True, crosses_at=405.0), ("oncoming.1", 7.0, "same_way", 382.0)),
         (Walker("p", position=423.0, crosses_at=400.0), ("same_way.1", 20.0, "oncoming", 282.0)),
-    ],
-)
-def test_persons_walk_on_or_cross(walker: Walker, way: tuple[str, float, str, float]) -> None:
-    found = way_of(ROAD, walker)
-    assert (found[0], found[2]) == (way[0], way[2])
-    assert (found[1], found[3]) == pytest.approx((way[1], way[3]), abs=0.02)
+    ]:
+        found = way_of(ROAD, walker)
+        assert (found[0], found[2]) == (way[0], way[2])
+        assert (found[1], found[3]) == pytest.approx((way[1], way[3]), abs=0.02)
 
 
 def test_crossings_of_streets_have_places_along_every_way() -> None:

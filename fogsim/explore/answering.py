@@ -157,7 +157,9 @@ class Explorer:
         """The choices as a user would set them."""
         settings = [f"{KEYS[name]}={value:g}" for name, value in asked.chosen.items()]
         if "visibility" in asked.chosen and self._scenario.fog.visibility_m is None:
-            settings = ["fog.outside_visibility_m=null", "fog.banks=[]", *settings]
+            # Expectations may name the banks.
+            expect = ["expect={}"] if self._scenario.expect else []
+            settings = ["fog.outside_visibility_m=null", "fog.banks=[]", *expect, *settings]
         return settings
 
     def _equipment(self, config: RunConfig) -> EgoEquipment:

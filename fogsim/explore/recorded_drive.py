@@ -26,7 +26,7 @@ class RecordedDrive:
     def __init__(self, config: RunConfig, seed: int) -> None:
         check_ego(config.traffic.ego, "fogsim explore")
         if config.world.renderer == NO_RENDERER:
-            raise InputError("renderer: none draws no frames to be explored; choose another one: --set renderer=auto")
+            raise InputError("renderer: none draws no frames; --set renderer=auto, with estimators if there are none")
         self._config = _without_frames(config)
         self._loop, self._policy = ClosedLoop(self._config), own_policy(self._config)
         self._timeline, self.moments = Timeline(config.script), list[Moment]()

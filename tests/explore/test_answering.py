@@ -7,7 +7,7 @@ from early_motorway import EARLY
 
 from fogsim.errors import InputError
 from fogsim.explore.answering import Explorer, Question, question
-from fogsim.scenario import load_scenario
+from fogsim.scenario import catalogue, load_scenario
 
 SMALL = [EARLY, "renderer=cpu", "camera.width=160", "camera.height=120", "duration_s=2"]
 IN_FOG = Question(time=0.5, chosen={"visibility": 80.0})
@@ -133,3 +133,17 @@ def test_only_a_drive_with_frames_is_explored() -> None:
                 "fusion=grid_filter",
             ]
         )
+
+
+@pytest.mark.nightly
+def test_every_shipped_scenario_is_explored() -> None:
+    for name in catalogue():
+        # One draws nothing and has no estimators.
+        estimators = ["estimators=[joint_road]"] if "renderer: none" in catalogue()[name].read_text("utf-8") else []
+        explorer = Explorer(load_scenario(name, [*SMALL[1:4], *estimators]), name, 1)
+        explorer.drive.start()
+        for chosen in ({}, {"visibility": 80.0}, {"visibility": 80.0, "light": 2000.0}):
+            answer = explorer.answer(Question(time=1.0, chosen=chosen))
+            assert answer is not None
+            assert answer["estimates"], name
+        explorer.close()

@@ -135,6 +135,7 @@ def test_only_a_drive_with_frames_is_explored() -> None:
         )
 
 
+@pytest.mark.timeout(1800)  # night methods calibrate themselves for each camera
 @pytest.mark.nightly
 def test_every_shipped_scenario_is_explored() -> None:
     for name in catalogue():

@@ -14,7 +14,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.$(EXTRAS)'; }
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test affected nightly hooks portability cluster notebooks site browse wheel pythons lint types contracts ci tables clean
+.PHONY: help check demo test affected nightly hooks portability cluster notebooks site browse wheel pythons release lint types contracts ci tables clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -89,14 +89,14 @@ $(VENV)/.installed-notebooks: pyproject.toml $(VENV)/.installed-test
 notebooks: $(VENV)/.installed-notebooks ## Run the notebooks from their first cell to their last
 	@$(BIN)/python -m pytest -q -n auto tests/notebooks
 
-$(VENV)/.installed-docs: EXTRAS := [docs]
+$(VENV)/.installed-docs: EXTRAS := [docs,notebooks]
 $(VENV)/.installed-docs: pyproject.toml $(VENV)/.installed-test
 	@echo "Installing MkDocs into $(VENV) (once) …"
 	@$(INSTALL)
 	@touch $@
 
 site: export NO_MKDOCS_2_WARNING := 1
-site: $(VENV)/.installed-docs ## Build the documentation site into site/, to be opened in a browser
+site: $(VENV)/.installed-docs $(VENV)/.compiled ## Build the documentation site into site/; runs the notebooks (some minutes) if code has changed
 	@$(BIN)/mkdocs build --quiet
 	@echo "site/index.html"
 
@@ -109,6 +109,15 @@ wheel: $(VENV)/.installed-test ## Build sdist and wheel into dist/, the wheel wi
 
 pythons: $(VENV)/.installed-test ## Install the wheel into an empty environment of each Python 3.11 to 3.13 that is here, and run it
 	@$(BIN)/python -m pytest -q tests/pythons
+
+# Whatever fails ends it before the sums are written: without them there is nothing to be uploaded.
+release: $(VENV)/.installed-test ## Build sdist and wheels into dist/, check them in each Python, write SHA256SUMS; refuses outdated tables
+	@test -z "$$(git status --porcelain)" || { echo "Commit or remove what 'git status' lists: a release is of a commit."; exit 1; }
+	@$(BIN)/python docs/rerun_tables.py --current || { echo "Measure them again: make tables, and make tables STUDIES=1"; exit 1; }
+	@rm -rf dist
+	@$(BIN)/python -m build --sdist --no-isolation --outdir dist
+	@WHEELS="$(CURDIR)/dist" $(BIN)/python -m pytest -q -rs tests/pythons
+	@cd dist && sha256sum * > SHA256SUMS && cat SHA256SUMS
 
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/python tools/check_docstrings.py

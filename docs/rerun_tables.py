@@ -56,6 +56,7 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         ("--dry-run", "print the commands and how long they would take"),
         ("--list", "print which files have changed since the tables were measured"),
         ("--check", "exit code 1 if a page does not state what was measured and what has changed since"),
+        ("--current", "exit code 1 if code that a table depends on has changed since it was measured"),
         ("--page", "write that into the pages"),
         ("--stamp", "record tables as measured by the code as it is now"),
     ):
@@ -70,6 +71,10 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         complaints = stamps.complaints()
         say("\n".join(complaints) or "every table is as measured, and the page lists what has changed since")
         return int(bool(complaints))
+    if given.current:
+        outdated = [name for name, files in stamps.changed().items() if files != []]
+        say(f"code has changed since these were measured: {', '.join(outdated) or 'none'}")
+        return int(bool(outdated))
     chosen = [names[name] for name in given.names] or [one for one in measurements if one.is_study == given.studies]
     if not (given.names or given.all):
         changed = stamps.changed()

@@ -4,13 +4,19 @@ Scenarios' own pages, notebooks, the changelog and the command line's reference 
 files of docs/, so that no text is there twice. Links are written as they hold in the checkout, and are led to them.
 """
 
+import functools
+import hashlib
+import json
+import os
 import posixpath
 import re
+import shutil
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
 import typer.main
+from code_digests import Checkout
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
@@ -20,6 +26,7 @@ from typer.cli import get_docs_for_click
 from fogsim.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[1]
+COPIES = ROOT / "build" / "site"
 LINK = re.compile(r"(!?\[[^\[\]]*\])\(([^)\s#]*)(#[^)\s]*)?\)")
 
 
@@ -40,7 +47,8 @@ PLACES = {page.relative_to(ROOT).as_posix(): place for place, page in pages_else
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Put the version below each page."""
+    """Put the version below each page; notebooks that match `NOTEBOOKS_NOT_RUN` are shown without outputs."""
+    config.plugins["mkdocs-jupyter"].config["execute_ignore"] = os.environ.get("NOTEBOOKS_NOT_RUN", "").split()
     config.copyright = f"FogSim {version('fogsim')}"
     return config
 
@@ -48,6 +56,13 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 @event_priority(100)  # before the notebooks' plugin, which looks for what it reads
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are no files of docs/."""
+    # What notebooks have written when they ran the last time.
+    shutil.rmtree(COPIES, ignore_errors=True)
+    # Notebooks run without the settings of whoever builds the site; their kernels would warn of how they are reached.
+    profile = COPIES / "ipython" / "profile_default"
+    profile.mkdir(parents=True)
+    (profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 'ERROR'\n", encoding="utf-8")
+    os.environ["IPYTHONDIR"] = str(profile.parent)
     for place, page in pages_elsewhere():
         if page.suffix == ".ipynb":
             files.append(linked_notebook(place, page, config))
@@ -59,14 +74,26 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def linked_notebook(place: str, notebook: Path, config: MkDocsConfig) -> File:
-    """Give a notebook whose links hold on the site, as a file that the notebooks' plugin reads."""
-    folder = ROOT / "build" / "site"
-    copy = folder / place
+    """Give a notebook whose links hold on the site, as a file that the notebooks' plugin reads and runs."""
+    copy = COPIES / place
     copy.parent.mkdir(parents=True, exist_ok=True)
     text = notebook.read_text(encoding="utf-8")
     led = led_to_pages(text, notebook.relative_to(ROOT).parent.as_posix(), place)
-    copy.write_text(re.sub(r"\.md(#[^)\s]*)?\)", r".html\1)", led), encoding="utf-8")
-    return File(place, str(folder), config.site_dir, config.use_directory_urls)
+    content = json.loads(re.sub(r"\.md(#[^)\s]*)?\)", r".html\1)", led))
+    # The plugin keeps outputs for as long as a notebook stays the same: they are of this code alone.
+    content["metadata"]["code"] = code_digest()
+    copy.write_text(json.dumps(content, ensure_ascii=False, indent=1), encoding="utf-8")
+    return File(place, str(COPIES), config.site_dir, config.use_directory_urls)
+
+
+@functools.cache
+def code_digest() -> str:
+    """Digest of the code and data on which outputs of notebooks depend."""
+    modules = [
+        one.relative_to(ROOT).as_posix() for folder in ("fogsim", "envs") for one in (ROOT / folder).rglob("*.py")
+    ]
+    files = Checkout(ROOT).files((*modules, "fogsim", "scenarios"))
+    return hashlib.sha256(json.dumps(files).encode()).hexdigest()
 
 
 @event_priority(100)

@@ -18,6 +18,7 @@ from fogsim.cli.campaign import campaign_command
 from fogsim.cli.compile import compile_command
 from fogsim.cli.dataset import dataset_command
 from fogsim.cli.doctor import doctor_command
+from fogsim.cli.explore import explore_command
 from fogsim.cli.images.estimate import estimate_command
 from fogsim.cli.images.fog import fog_command
 from fogsim.cli.images.restore import restore_command
@@ -94,6 +95,7 @@ app.command("run")(run_command)
 app.command("test")(check_command)
 app.command("campaign")(campaign_command)
 app.command("study")(study_command)
+app.command("explore")(explore_command)
 app.command("view")(view_command)
 app.command("recover")(recover_command)
 app.command("list")(list_command)

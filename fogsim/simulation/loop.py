@@ -23,6 +23,8 @@ from fogsim.values import (
     Command,
     Ending,
     FogField,
+    RoadNetwork,
+    SignMap,
     Step,
     TrafficSnapshot,
     TrafficStep,
@@ -328,6 +330,18 @@ class ClosedLoop:
         if step is None or step.truth.pose is None:
             raise SimulationError("the run has not been started: call start()")
         return self._equipment.surrounding(step.traffic, step.ego, step.truth.pose)
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Return the roads around the ego and their signs.
+
+        Raises
+        ------
+        SimulationError
+            If the run has not been started.
+        """
+        if self._step is None:
+            raise SimulationError("the run has not been started: call start()")
+        return self._traffic.network()
 
     def _with_ending(self, step: Step) -> Step:
         """A step; one at which the scenario's end has come, with it."""

@@ -198,7 +198,11 @@ def test_changed_code_is_listed_and_changed_prose_is_not(root: Path, rerun: Run)
     change(road, '"""The width."""', '"""How wide it is."""  # a comment')
     change(root / "fogsim" / "idle.py", "1", "2")
     assert rerun("--check").returncode == 0
+    assert rerun("--current").returncode == 0
     change(road, "return WIDTH", "return WIDTH + 0.0")
+    current = rerun("--current")
+    assert current.returncode == 1
+    assert "code has changed since these were measured: " in current.stdout
     done = rerun("--check")
     assert done.returncode == 1
     assert "on width: " in done.stdout

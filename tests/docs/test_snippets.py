@@ -39,8 +39,8 @@ MENTIONS = {page: re.findall(r"`((?:fogsim|python) [^`]+)`", text) for page, tex
 """Those within the text, perhaps with words in place of values."""
 
 KNOWN: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]  # a group has commands
-PARSED_ONLY = ("reproduce", "recover", "compile", "calibrate")
-"""Commands that take minutes, that need a run that was killed (tests/faults has some), or that `make test` has run."""
+PARSED_ONLY = ("reproduce", "recover", "compile", "calibrate", "explore")
+"""Commands that take minutes or run until interrupted, that need a run that was killed, or that `make test` has run."""
 TRAINS = "stable_baselines3"
 """What takes a quarter of an hour and an extra: examples/train_ppo.py is that, tried by hand."""
 SERVES = "serve_forever"

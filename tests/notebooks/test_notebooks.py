@@ -46,7 +46,8 @@ def test_a_notebook_begins_and_ends_as_all_do(path: Path) -> None:
     """It says what it needs and how long it takes, and what to try next: three to five things."""
     first, *_, last = read(path).cells
     assert re.match(r"# .+\n\n", first.source)
-    assert re.search(r"\nIt needs `pip install 'fogsim\[notebooks\]'` and takes about [^.]+ on two cores", first.source)
+    install = re.escape("[FogSim](../docs/tutorial/first_run.md#install), `pip install 'fogsim[notebooks]'`")
+    assert re.search(rf"\nIt needs {install} and about [^.]+ on two cores", first.source)
     assert NEXT in last.source
     assert 3 <= len(re.findall(r"^- ", last.source.partition(NEXT)[2], re.MULTILINE)) <= 5
 

@@ -1,6 +1,8 @@
 """One version: what is installed, what is cited, and what the changelog tells of."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -25,3 +27,20 @@ def test_the_citation_has_what_its_format_asks_for() -> None:
     # Citation File Format 1.2.0: these four are required.
     assert citation["cff-version"] == "1.2.0"
     assert all(citation[key] for key in ("message", "title", "authors"))
+
+
+def test_no_text_installs_what_no_index_has() -> None:
+    """FogSim is installed from a checkout or a wheel; an extra by name is added to that installation."""
+    texts = [*CHECKOUT.glob("*.md"), *CHECKOUT.glob("notebooks/*.ipynb"), *CHECKOUT.glob("docs/**/*.md")]
+    for folder in ("fogsim", "envs", "examples", "scenarios"):
+        texts += [one for one in (CHECKOUT / folder).rglob("*") if one.suffix in {".md", ".py", ".html"}]
+    assert len(texts) > 500
+    wrong = re.compile(r"pip install ['\"]?fogsim(?!\[)")
+    assert [path for path in texts if wrong.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_an_extra_is_added_to_the_installation_without_an_index() -> None:
+    command = [sys.executable, "-m", "pip", "install", "--no-index", "--dry-run", "--disable-pip-version-check"]
+    done = subprocess.run([*command, "fogsim[test]"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Would install" not in done.stdout

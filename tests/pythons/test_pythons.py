@@ -1,6 +1,7 @@
 """The wheel, installed with all that it asks for into an empty environment of each Python here (``make pythons``).
 
 It is built with kernels, so that runs compile none. Minutes for each: a gigabyte is downloaded, and all is compiled.
+`WHEELS` names a folder in which the wheels stay (``make release``).
 """
 
 import os
@@ -77,10 +78,10 @@ def test_the_wheel_runs_in_an_empty_environment(version: str, folder: Path, run:
         pytest.skip(f"no Python {version} here")
     place = folder / version
     run(interpreter, "-m", "venv", place)
-    python, dist = place / "bin" / "python", folder / f"dist-{version}"
+    python, dist = place / "bin" / "python", Path(os.environ.get("WHEELS", folder / "dist"))
     pip = (python, "-m", "pip", "--quiet", "--disable-pip-version-check")
     run(*pip, "wheel", "--no-deps", "--wheel-dir", dist, CHECKOUT, HATCH_BUILD_HOOK_ENABLE_CUSTOM="true")
-    run(*pip, "install", *dist.glob("fogsim-*.whl"))
+    run(*pip, "install", max(dist.glob("fogsim-*.whl"), key=lambda wheel: wheel.stat().st_mtime))
     run(place / "bin" / "fogsim", "run", "motorway_fog_bank", *SHORT, "--out", f"runs-{version}")
     run(python, "-W", "error", "-c", TRAINS)
     run(python, "-c", DRIVES)

@@ -4,16 +4,14 @@ It is opened from its folder, as by somebody who has nothing else: no server, no
 """
 
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urldefrag, urlparse
 
 import pytest
-from playwright.sync_api import Browser, Error, Page, Request, sync_playwright
+from playwright.sync_api import Browser, Error, Page, Request
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PHONE = {"width": 390, "height": 844}
@@ -36,6 +34,9 @@ QUERIES = {
     "Koschmieder": "explanation/",
 }
 """What is typed into the search, and the page (or folder) that must be among what is found."""
+
+RUN = "08_airlight"
+"""The notebook that is run here: `make notebooks` runs them all."""
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -63,24 +64,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text=True,
         check=False,
         # Material tells of its own future at each start otherwise.
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS_NOT_RUN": "0[1-7]_*"},
     )
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     return folder
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    program = shutil.which("chromium") or shutil.which("google-chrome")
-    if program is None:
-        assert "CI" not in os.environ, "CI installs what tools/check_system.py --all-tests names"
-        pytest.skip("no Chromium")
-    with sync_playwright() as playwright:
-        # Root has no sandbox in containers, and pages are our own.
-        started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +131,12 @@ def test_pages_load_with_their_figures_and_ask_nobody(visits: dict[str, Visit]) 
     assert {name: visit.complaints for name, visit in visits.items() if visit.complaints} == {}
     assert {name: visit.dead_pictures for name, visit in visits.items() if visit.dead_pictures} == {}
     assert {name: visit.elsewhere for name, visit in visits.items() if visit.elsewhere} == {}
+
+
+def test_notebooks_show_what_they_print_and_draw(site: Path) -> None:
+    text = (site / "notebooks" / f"{RUN}.html").read_text(encoding="utf-8")
+    assert text.count('class="jp-RenderedImage') >= 1
+    assert "application/vnd.jupyter.stderr" not in text
 
 
 def test_no_link_is_dead(visits: dict[str, Visit], site: Path) -> None:

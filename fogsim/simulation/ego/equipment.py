@@ -21,8 +21,8 @@ from fogsim.simulation.ego.measurements import EgoSensors
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras
 from fogsim.simulation.ego.sensor_faults import FaultSchedule
-from fogsim.simulation.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
-from fogsim.simulation.run_config import NO_RENDERER, RunConfig
+from fogsim.simulation.ego.view_rendering import EgoView, MakeView, Surrounding, view_of_world
+from fogsim.simulation.run_config import RunConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Belief,
@@ -66,11 +66,13 @@ class EgoEquipment:
     ----------
     config : RunConfig
         The run; of its traffic, only the reading radius is used.
+    make_view : callable
+        Makes what draws the world.
     """
 
-    def __init__(self, config: RunConfig) -> None:
+    def __init__(self, config: RunConfig, make_view: MakeView = view_of_world) -> None:
         camera, period = config.camera, config.periods.camera_period
-        self._config = config
+        self._config, self._make_view = config, make_view
         self._rig = CameraRig(camera, period)
         self._body_pitch = BodyPitch(camera.suspension, period)
         self._sensors = EgoSensors(config.sensors)
@@ -166,9 +168,8 @@ class EgoEquipment:
             if self._view_renderer is not None:
                 self._view_renderer.close()
             world = self._config.world
-            kind = NoView if world.renderer == NO_RENDERER else ViewRenderer
             standing = faulty_signs(signs, of_signs, Where.WORLD) if of_signs else signs
-            self._view_renderer = kind(world, self._config.camera, road, standing, self._body)
+            self._view_renderer = self._make_view(world, self._config.camera, road, standing, self._body)
             self._sign_faults = of_signs
             if self._fog_now is not None:
                 self._view_renderer.enter_fog(self._fog_now)

@@ -1,6 +1,6 @@
 """What the ego's camera looks at: the scene of a run, the renderer that draws it, and the air and lamps in it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 
@@ -24,7 +24,7 @@ from fogsim.scene import (
     traffic_batches,
 )
 from fogsim.simulation.ego.near_scene import FEW_LANES, NearScene
-from fogsim.simulation.run_config import RunConfig, WorldConfig
+from fogsim.simulation.run_config import NO_RENDERER, RunConfig, WorldConfig
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Batch,
@@ -177,25 +177,35 @@ class ViewRenderer:
         self, world: WorldConfig, camera: CameraConfig, network: RoadNetwork, signs: SignMap, body: str = CAR
     ) -> None:
         self.signs = signs
-        self.fog: FogField = world.fog.along(network.route, network.structures)
-        self._camera, self._samples = camera.on(body), camera.samples
-        self._drawn_camera = supersampled(self._camera, self._samples)
-        self._setback = camera.mount(body).setback
-        has_bonnet = camera.has_bonnet and body == CAR
-        self._bonnet = Bonnet(self._setback - _BEHIND_BUMPER) if has_bonnet else None
-        self._world, self._network = world, network
-        self._daylight = world.illuminance
-        # Lamps that were lit in the picture only from a moment on would be a jump in it.
-        self._by_lamplight = min(world.darkest, self._daylight) < DAY_ILLUMINANCE
+        self._network, self._body = network, body
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
-        self._air = Air(self.fog, world.fog.droplets)
-        photons = self.fog.ground_albedo is not None
-        self._sides = side_light(self.fog, world.fog.droplets) if photons else EVEN_LIGHT
         self._renderer: Renderer | None = None
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False
+        self._look_by(world, camera)
         self._plan_scene_along(network.route)
+
+    def change(self, world: WorldConfig, camera: CameraConfig) -> None:
+        """Look by another camera, in other fog and light, at the same scene: what stands and who draws it stay."""
+        self._look_by(world, camera)
+        self._light_scene()
+        if self._renderer is not None:
+            self._renderer.set_daylight(self._sky, self._sides)
+
+    def _look_by(self, world: WorldConfig, camera: CameraConfig) -> None:
+        self.fog: FogField = world.fog.along(self._network.route, self._network.structures)
+        self._camera, self._samples = camera.on(self._body), camera.samples
+        self._drawn_camera = supersampled(self._camera, self._samples)
+        self._setback = camera.mount(self._body).setback
+        has_bonnet = camera.has_bonnet and self._body == CAR
+        self._bonnet = Bonnet(self._setback - _BEHIND_BUMPER) if has_bonnet else None
+        self._world, self._daylight = world, world.illuminance
+        # Lamps that were lit in the picture only from a moment on would be a jump in it.
+        self._by_lamplight = min(world.darkest, self._daylight) < DAY_ILLUMINANCE
+        self._air = Air(self.fog, world.fog.droplets)
+        photons = self.fog.ground_albedo is not None
+        self._sides = side_light(self.fog, world.fog.droplets) if photons else EVEN_LIGHT
         if self._by_lamplight:
             self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
@@ -211,6 +221,13 @@ class ViewRenderer:
         # Other renderers may draw what is farther away.
         self._near_scene = NearScene(plan, FEW_LANES if world.renderer in LIMITED else plan.lanes)
         self._street_lamps = street_lamp_heads(self._near_scene.scene) + around.origin
+        self._light_scene()
+        self._free_renderer()
+        if self._near_scene.is_whole:
+            self._make_renderer()
+
+    def _light_scene(self) -> None:
+        """Find out by what light the scene is drawn."""
         self._streets = None
         self._sky = self._sky_of(self._daylight)
         if len(self._street_lamps) and self._by_lamplight:
@@ -218,9 +235,6 @@ class ViewRenderer:
         if self._tunnels:
             self._sky = max(self._sky, DARKEST_SKY)
         self._tunnel_light = TunnelLight(self._tunnels, self._sky)
-        self._free_renderer()
-        if self._near_scene.is_whole:
-            self._make_renderer()
 
     def _sky_of(self, illuminance: float) -> float:
         """Illuminance of the sky in which the scene is drawn [lx]."""
@@ -340,3 +354,13 @@ class ViewRenderer:
         """Free the renderer; closing twice is allowed."""
         self._free_renderer()
         self._is_closed = True
+
+
+MakeView = Callable[[WorldConfig, CameraConfig, RoadNetwork, SignMap, str], EgoView]
+"""Makes what draws a world for a camera on a body kind."""
+
+
+def view_of_world(world: WorldConfig, camera: CameraConfig, network: RoadNetwork, signs: SignMap, body: str) -> EgoView:
+    """What draws a world, or nothing if no renderer is to."""
+    kind = NoView if world.renderer == NO_RENDERER else ViewRenderer
+    return kind(world, camera, network, signs, body)

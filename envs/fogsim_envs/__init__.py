@@ -51,6 +51,12 @@ gymnasium.register(
 )
 
 gymnasium.register(
+    id="fogsim/FogAdvisoryBatch-v1",
+    vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchEnv",
+    reward_threshold=21.0,
+)
+
+gymnasium.register(
     id="fogsim/FogHighway-v1",
     entry_point="fogsim_envs.task.highway:FogHighwayV1Env",
     max_episode_steps=375,

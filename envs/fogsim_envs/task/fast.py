@@ -29,10 +29,10 @@ from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
 _DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
 
-_FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
+FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
 """The ego starts 300 m before the bank."""
 
-_FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
+FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
 
 
 @checked_parameters
@@ -90,8 +90,8 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,
-            scenario_distribution=_FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
-            fog_distribution=_FAST_FOG if is_own and fog_distribution is None else fog_distribution,
+            scenario_distribution=FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
+            fog_distribution=FAST_FOG if is_own and fog_distribution is None else fog_distribution,
             split=split,
             observation="state",
             overrides=(*(_DEFAULT if is_own else ()), *_WITHOUT_FRAMES, *overrides),

@@ -4,12 +4,10 @@
     python examples/train_ppo.py --minutes 5 --out advisory.zip
     python examples/train_ppo.py --agent advisory.zip --on fogsim/FogAdvisoryFast-v1      # evaluates a saved agent
 
-Minutes are the processor's. Evaluation is on 100 episodes of the split "test", which training never has; the rule is
-given with its own constants, and with those that are best on 512 episodes of the split "train".
+Minutes are the processor's. Evaluation is on 100 episodes of the split "test", which training never has.
 """
 
 import argparse
-import itertools
 import json
 import time
 
@@ -20,13 +18,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 from fogsim_envs import Evaluation, evaluate
-from fogsim_envs.batch.layout import RuleConstants
 from fogsim_envs.batch.stable_baselines import BatchVecEnv
 
 BATCH = "fogsim/FogAdvisoryBatch-v1"
 DISCOUNT = 0.999
 FIRST_RATE, LAST_RATE = 1e-3, 2e-5
-FALLBACKS = (float("inf"), 40.0 / 3.6, 50.0 / 3.6, 60.0 / 3.6, 70.0 / 3.6)
 
 
 class UntilTimeIsUp(BaseCallback):
@@ -69,15 +65,6 @@ def trained(minutes: float, seed: int) -> tuple[PPO, list[tuple[float, int, floa
     )  # fmt: skip
     agent.learn(10**9, callback=clock, progress_bar=False)
     return agent, clock.curve
-
-
-def tuned_rule() -> tuple[RuleConstants, float]:
-    """Constants of the rule that are best on episodes of the split "train", and the mean return there."""
-    choices = itertools.product((0.05, 0.25, 0.5), FALLBACKS, (0.7, 1.0, 1.3))
-    rules = [RuleConstants(quantile=q, fallback=f, sight_share=s) for q, f, s in choices]
-    found = [(evaluate("rule", BATCH, range(512), split="train", rule=rule).mean, rule) for rule in rules]
-    best, rule = max(found, key=lambda pair: pair[0])
-    return rule, best
 
 
 def compared(agent: Evaluation, other: Evaluation) -> dict[str, float]:

@@ -126,7 +126,7 @@ def begin(
     rule: RuleConstants,
 ) -> None:
     """Begin episodes in some rows (`draws` (rows,) of `DRAWN`)."""
-    scratch = np.empty(CELLS + 5)
+    scratch = np.empty(CELLS)
     for r in range(len(rows)):
         i, drawn = rows[r], draws[r]
         one = episodes.ego[i]

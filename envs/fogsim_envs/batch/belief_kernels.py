@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.values.belief import OLDEST, put_quantiles
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
+from fogsim.values.belief import NO_FOG, OLDEST
 from fogsim_envs.batch.layout import CELLS, LOG_EXTINCTION, STEP, RuleConstants, SurrogateArrays
 
 # Defaults of `fogsim.fusion.GridFilter`; a test compares the two.
@@ -16,7 +16,8 @@ _DRIFT, _LEAP_RATE, _LEAP_SCALE, _FLOOR, _OUTLIERS, _SLOW, _STILL = 0.05, 0.05, 
 _WIDTH = float(LOG_EXTINCTION[1] - LOG_EXTINCTION[0])
 _LOG_RANGE = float(LOG_EXTINCTION[-1] - LOG_EXTINCTION[0])
 _EXTINCTION = np.exp(LOG_EXTINCTION)
-_NO_FOG = math.log(OPTICAL_DEPTH_AT_VISIBILITY / 1000.0)
+_IN_FOG = np.maximum(LOG_EXTINCTION, math.log(extinction_from_visibility(NO_FOG)))
+_SHARES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _FADING = math.exp(-_WIDTH / _LEAP_SCALE)
 _CLEAR = 3e-5
 
@@ -77,7 +78,7 @@ def draw_estimate(one: NDArray[np.void], table: SurrogateArrays) -> None:
 
 @kernel
 def update_belief(one: NDArray[np.void], belief: NDArray[np.float64], scratch: NDArray[np.float64]) -> None:
-    """Let time pass and an estimate count, as `fogsim.fusion.GridFilter` does (`scratch` (CELLS + 5,))."""
+    """Let time pass and an estimate count, as `fogsim.fusion.GridFilter` does (`scratch` (CELLS,))."""
     if one.time > 0.0:
         moving = min(max(round(10.0 * one.speed / _SLOW) / 10.0, _STILL), 1.0)
         _diffuse(belief, STEP * moving, scratch)
@@ -86,61 +87,81 @@ def update_belief(one: NDArray[np.void], belief: NDArray[np.float64], scratch: N
         deviation = math.hypot(min(one.estimate_deviation, 10.0), _FLOOR * max(measured, _EXTINCTION[0]))
         outlier = 1.0 / (_LOG_RANGE * max(measured, deviation))
         share = (1.0 - _OUTLIERS) / _OUTLIERS / (math.sqrt(2.0 * math.pi) * deviation * outlier)
+        precision = 1.0 / deviation
         for i in range(CELLS):
-            far = (measured - _EXTINCTION[i]) / deviation
+            far = (measured - _EXTINCTION[i]) * precision
             if abs(far) < 6.0:
                 belief[i] *= 1.0 + share * math.exp(-0.5 * far * far)
     total = 0.0
     for i in range(CELLS):
         total += belief[i]
-    mean = fog_mean = 0.0
+    _summarise(one, belief, 1.0 / total)
+
+
+@kernel
+def _summarise(one: NDArray[np.void], belief: NDArray[np.float64], scale: float) -> None:
+    """Normalise the belief; its quantiles and deviations."""
+    mean = square = fog_mean = fog_square = reached = before = 0.0
+    place, below = 0, LOG_EXTINCTION[0]
     for i in range(CELLS):
-        belief[i] /= total
-        mean += belief[i] * LOG_EXTINCTION[i]
-        fog_mean += belief[i] * max(LOG_EXTINCTION[i], _NO_FOG)
-    variance = fog_variance = 0.0
-    for i in range(CELLS):
-        variance += belief[i] * (LOG_EXTINCTION[i] - mean) ** 2
-        fog_variance += belief[i] * (max(LOG_EXTINCTION[i], _NO_FOG) - fog_mean) ** 2
-    one.belief_deviation, one.fog_deviation = math.sqrt(variance), math.sqrt(fog_variance)
-    shares = scratch[CELLS:]
-    shares[0], shares[1], shares[2], shares[3], shares[4] = 0.95, 0.75, 0.5, 0.25, 0.05
-    put_quantiles(LOG_EXTINCTION, belief, shares)
-    one.quantile_5 = OPTICAL_DEPTH_AT_VISIBILITY / math.exp(shares[0])
-    one.quantile_25 = OPTICAL_DEPTH_AT_VISIBILITY / math.exp(shares[1])
-    one.quantile_50 = OPTICAL_DEPTH_AT_VISIBILITY / math.exp(shares[2])
-    one.quantile_75 = OPTICAL_DEPTH_AT_VISIBILITY / math.exp(shares[3])
-    one.quantile_95 = OPTICAL_DEPTH_AT_VISIBILITY / math.exp(shares[4])
+        belief[i] *= scale
+        share, value, fog = belief[i], LOG_EXTINCTION[i], _IN_FOG[i]
+        mean += share * value
+        square += share * value * value
+        fog_mean += share * fog
+        fog_square += share * fog * fog
+        middle = reached + 0.5 * share
+        reached += share
+        while place < 5 and middle > _SHARES[place]:
+            quantile = value
+            if i > 0:
+                quantile = below + (value - below) * (_SHARES[place] - before) / (middle - before)
+            _put_quantile(one, place, OPTICAL_DEPTH_AT_VISIBILITY / math.exp(quantile))
+            place += 1
+        before, below = middle, value
+    while place < 5:
+        _put_quantile(one, place, OPTICAL_DEPTH_AT_VISIBILITY / _EXTINCTION[-1])
+        place += 1
+    one.belief_deviation = math.sqrt(max(square - mean * mean, 0.0))
+    one.fog_deviation = math.sqrt(max(fog_square - fog_mean * fog_mean, 0.0))
+
+
+@kernel
+def _put_quantile(one: NDArray[np.void], place: int, visibility: float) -> None:
+    """Keep a quantile of the visibility [m] by its place in `_SHARES`."""
+    if place == 0:
+        one.quantile_95 = visibility
+    elif place == 1:
+        one.quantile_75 = visibility
+    elif place == 2:
+        one.quantile_50 = visibility
+    elif place == 3:
+        one.quantile_25 = visibility
+    else:
+        one.quantile_5 = visibility
 
 
 @kernel
 def _diffuse(belief: NDArray[np.float64], elapsed: float, scratch: NDArray[np.float64]) -> None:
     """Random walk and leaps of ln k, reflected at both ends of the grid (`elapsed` [s])."""
-    leaps = -math.expm1(-_LEAP_RATE * elapsed)
+    kept = math.exp(-_LEAP_RATE * elapsed)
+    leaps = (1.0 - kept) * (1.0 - _FADING) / (1.0 + _FADING)
     aside = 0.5 * _DRIFT * _DRIFT * elapsed / (_WIDTH * _WIDTH)
-    # A sum over exponentials to either side is two running sums.
-    forward = backward = 0.0
-    weight = 1.0
+    # A sum over exponentials to either side is two running sums; what is reflected at the end of one begins the other.
+    forward = 0.0
     for i in range(CELLS):
-        forward += weight * belief[i]
-        weight *= _FADING
-    weight = 1.0
-    for i in range(CELLS - 1, -1, -1):
-        backward += weight * belief[i]
-        weight *= _FADING
-    for i in range(CELLS):
-        forward = belief[i] + _FADING * forward
-        scratch[i] = forward - belief[i]
-    total = 0.0
+        scratch[i] = _FADING * forward
+        forward = belief[i] + scratch[i]
+    backward = forward
     for i in range(CELLS - 1, -1, -1):
         backward = belief[i] + _FADING * backward
         scratch[i] += backward
-        total += scratch[i]
-    before = belief[0]
+    before, reflected = belief[0], backward
     for i in range(CELLS):
         here, after = belief[i], belief[min(i + 1, CELLS - 1)]
         walked = (1.0 - 2.0 * aside) * here + aside * (before + after)
-        belief[i] = (1.0 - leaps) * walked + leaps * scratch[i] / total
+        reflected *= _FADING
+        belief[i] = kept * walked + leaps * (scratch[i] + reflected)
         before = here
 
 

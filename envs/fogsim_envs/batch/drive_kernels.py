@@ -302,7 +302,7 @@ def perceive(
 @kernel
 def advance(episodes: Episodes, weights: NDArray[np.float64], table: SurrogateArrays, rule: RuleConstants) -> None:
     """Let the advice and lamps of each episode be in force for one decision period (`weights` (9,) [points])."""
-    scratch, speeds = np.empty(CELLS + 5), np.zeros(OTHERS)
+    scratch, speeds = np.empty(CELLS), np.zeros(OTHERS)
     for i in range(len(episodes.ego)):
         one, others, depth = episodes.ego[i], episodes.others[i], episodes.depth[i]
         speed = _ego_speed(one, others, depth)

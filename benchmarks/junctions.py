@@ -26,7 +26,7 @@ import numpy as np
 from harness import ROOT, parse_options, publish
 
 from fogsim.atmosphere import FieldAccess
-from fogsim.traffic import AfterCollision, DriverSetup, DriverSight, TrafficSetup, libsumo_traffic
+from fogsim.traffic import SPEED_CHOICES, AfterCollision, DriverSetup, DriverSight, TrafficSetup, libsumo_traffic
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api
 from fogsim.units import extinction_from_visibility
@@ -170,7 +170,7 @@ def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float
                 advice_deceleration=2.0,
                 reading_radius=10.0,
                 sight=None if arguments.see_through_fog else DriverSight(illuminance=10_000.0),
-                drivers=DriverSetup(speed_choice=arguments.speed_choice),
+                drivers=DriverSetup(SPEED_CHOICES[arguments.speed_choice]()),
                 after_collision=AfterCollision.REMOVE,
             )
             run(visibility, setup, duration, seed, seen)

@@ -39,9 +39,9 @@ from fogsim.estimators import Estimator, make
 from fogsim.recorders.style import font
 from fogsim.render import Renderer
 from fogsim.reproduce.huang2015_chase import Scene, drawn, fogged
-from fogsim.restoration import restore_contrast
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, Observation, Response
+from fogsim.vision.restoration import restore_contrast
 
 Pixels = NDArray[np.uint8]
 Restore = Callable[[Pixels], Pixels]

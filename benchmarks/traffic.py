@@ -36,6 +36,7 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
 from fogsim.scenario.loading import clock_settings, scenario_from_config
 from fogsim.traffic import DriverSetup, TrafficSetup
+from fogsim.traffic.drivers.speed_choice import Unaffected
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.units import extinction_from_visibility
@@ -154,7 +155,7 @@ def setup(config: Path, blind: bool) -> TrafficSetup:
     usual = dataclasses.replace(usual, reading_radius=1000.0)
     if not blind:
         return usual
-    return dataclasses.replace(usual, sight=None, drivers=DriverSetup(speed_choice="unaffected"))
+    return dataclasses.replace(usual, sight=None, drivers=DriverSetup(Unaffected()))
 
 
 Block = tuple[float, float, float]

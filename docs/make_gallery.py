@@ -21,6 +21,7 @@ PAGE = HERE / "gallery.md"
 SIZE = (320, 240)
 MOMENTS: dict[str, float] = {
     "city_fog": 12.0,
+    "emergency_brake_in_fog": 9.4,
     "highway_99_corridor": 41.0,
     "motorcycle_at_dusk": 12.0,
     "pedestrian_crossing_fog": 21.0,
@@ -39,6 +40,8 @@ BEGIN, END = "<!-- table: gallery -->", "<!-- end of table -->"
 def telling_frame(name: str) -> Image.Image:
     """Frame of a scenario at its most telling moment."""
     scenario, best = fogsim.load_scenario(name), None
+    if scenario.renderer == "none":
+        scenario = fogsim.load_scenario(name, ["renderer=auto", "estimators=[joint_road]"])
     wanted, least = MOMENTS.get(name), float("inf")
     begun: float | None = None
     for step in fogsim.run(scenario, seed=0):

@@ -28,7 +28,7 @@ from fogsim.traffic.drivers.adaptation import adaptation, contrast_ratio
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Lamp, Step
+from fogsim.values import DriverWarning, Lamp, Step
 
 Titled = list[tuple[str, NDArray[np.uint8]]]
 
@@ -112,19 +112,27 @@ def estimate() -> Image.Image:
     return Overlay(camera, ["negru2013"]).draw(FrameEstimates(picture, (found,)))
 
 
-def demo_at(time: float) -> Callable[[], Image.Image]:
-    """A frame of the demo's video."""
+def demo_when(begins: Callable[[Step], bool]) -> Callable[[], Image.Image]:
+    """The first frame of the demo's video at which something holds."""
 
     def draw() -> Image.Image:
         panel, scenario = FramePanel(), fogsim.load_scenario("motorway_fog_bank")
         standard = build.safety_standard(scenario)
         for step in fogsim.run(scenario, seed=1):
             drawn = panel.draw(step, step_metrics(step, standard))
-            if step.time >= time - 1e-9:
+            if begins(step):
                 return Image.fromarray(drawn)
-        raise SystemExit(f"the demo ended before {time} s")
+        raise SystemExit("the demo ended before that moment")
 
     return draw
+
+
+def _warns_of_fog(step: Step) -> bool:
+    return step.command.warning is DriverWarning.FOG_AHEAD
+
+
+def _nears_stopped_lead(step: Step) -> bool:
+    return step.leader is not None and step.leader.speed < 0.1 and step.leader.gap < 35.0
 
 
 def road_picture(
@@ -211,8 +219,8 @@ DRAWN: dict[str, Callable[[], Image.Image]] = {
     "visibilities.jpg": visibilities,
     "estimate.jpg": estimate,
     "sensor_faults.jpg": sensor_faults,
-    "denser_fog.jpg": demo_at(39.5),
-    "demo.jpg": demo_at(98.0),
+    "denser_fog.jpg": demo_when(_warns_of_fog),
+    "demo.jpg": demo_when(_nears_stopped_lead),
     "roads.jpg": roads,
     "tunnel.jpg": tunnel,
     "night_fog.jpg": night_fog,

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.conditions import SIGNALS
 from fogsim.core.parameters import accepted_parameters, mismatch
 from fogsim.estimators import ESTIMATORS
@@ -186,7 +186,7 @@ def repairs(kind: type[Repair]) -> list[tuple[str, ...]]:
 def parameters() -> list[tuple[str, ...]]:
     """Parameters of every method that a scenario can name, with what they may be."""
     rows = []
-    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES):
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, CONTROLLERS, LIGHTING_POLICIES, SPEED_CHOICES):
         for name, method in registry.items():
             meanings = _meanings(method)
             for key, parameter in accepted_parameters(method, GIVEN_BY_THE_LOOP).items():

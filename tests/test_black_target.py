@@ -1,5 +1,7 @@
 """The definition of meteorological visibility, end to end: drawn by the renderer, seen through the fog."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -32,11 +34,8 @@ def black_wall(distance: float) -> Scene:
 
 @pytest.mark.parametrize("visibility", [40.0, 100.0, 300.0])
 def test_a_black_target_at_the_visibility_shows_five_percent_contrast(visibility: float) -> None:
-    renderer = make_renderer("auto", black_wall(visibility), illuminance=10_000.0)
-    try:
+    with contextlib.closing(make_renderer("auto", black_wall(visibility), illuminance=10_000.0)) as renderer:
         view = renderer.render((), CAMERA, POSE)
-    finally:
-        renderer.close()
     fog = FogField(extinction_from_visibility(visibility), AIRLIGHT)
     seen = fogged_radiance(view, fog, POSE.position, ray_from_pixel(CAMERA, POSE))
     middle = seen[120, 160]

@@ -206,18 +206,6 @@ def test_what_is_no_simulation() -> None:
         fogsim.attach("sumo", ego=EGO, visibility=100.0)
 
 
-def test_a_simulation_that_is_loaded_anew_is_another(libsumo: Any) -> None:
-    session = fogsim.attach(libsumo, ego="veh0", visibility=100.0, settings=SMALL)
-    for _ in range(5):
-        libsumo.simulationStep()
-        session.observe()
-    libsumo.load(ARGUMENTS)
-    libsumo.simulationStep()
-    with pytest.raises(SimulationError, match="was loaded again while FogSim was using it: attach to it"):
-        session.observe()
-    session.close()
-
-
 def test_a_simulation_that_is_lost(connection: Any) -> None:
     session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=SMALL)
     connection.simulationStep()

@@ -13,6 +13,7 @@ from fogsim.atmosphere import extinction
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build
 from fogsim.simulation import chosen_methods
+from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.road_advice import RoadAdvice
 from fogsim.simulation.road_sections import road_sections, section_limits
@@ -122,10 +123,20 @@ def test_sections_lie_where_the_scenario_puts_signs() -> None:
     assert road_sections(build.sections_config(scenario("drivers.advised=all")), 3000.0) == ()
     signs = scenario("drivers.advised=signs", "drivers.signs={from_m: 400, spacing_m: 1000, to_m: 2000}")
     assert road_sections(build.sections_config(signs), 3000.0) == (Stretch(400.0, 1400.0), Stretch(1400.0, 2000.0))
-    placed = scenario("drivers.advised=signs", "drivers.signs.at_m=[100, 900, 5000]")
+    placed = scenario("drivers.advised=signs", "drivers.signs.at_m=[100, 900]")
     assert road_sections(build.sections_config(placed), 3000.0) == (Stretch(100.0, 900.0), Stretch(900.0, math.inf))
     cars = road_sections(build.sections_config(scenario("drivers.advised=equipped")), 250.0)
     assert cars == (Stretch(0.0, 100.0), Stretch(100.0, 200.0), Stretch(200.0, math.inf))
+
+
+def test_what_is_beyond_the_route_is_refused() -> None:
+    for signs in ("{at_m: [100, 5000]}", "{from_m: 5000}"):
+        beyond = scenario("drivers.advised=signs", f"drivers.signs={signs}")
+        with pytest.raises(InputError, match=r"drivers\.signs: 5000 m is beyond the route, which is 3000 m long"):
+            road_sections(build.sections_config(beyond), 3000.0)
+    with_meter = scenario("sensors.reports.roadside={first_m: 3000, every_m: 100}")
+    with pytest.raises(InputError, match="first_m: 3000 m is beyond the route, which is 3000 m long"):
+        FogReports(build.reports_config(with_meter), ROUTE)
 
 
 def test_meters_measure_at_the_signs_and_in_the_middle_of_other_sections() -> None:

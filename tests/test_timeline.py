@@ -13,8 +13,9 @@ from fogsim.errors import UnplayedWarning
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.simulation.timeline import Timeline
-from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
+from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficStep, Truth
 from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Depart, Stop
+from tests.helpers.vehicles import vehicles
 
 BLIND = (EARLY, "renderer=none", "estimators=[]", "traffic.events=[]")
 
@@ -27,16 +28,9 @@ def timeline_of(described: Scenario) -> Timeline:
     return Timeline(described.run_config().script)
 
 
-def step(time: float, *, speed: float = 20.0, lane: str = "e_1", **vehicles: float) -> TrafficStep:
+def step(time: float, *, speed: float = 20.0, lane: str = "e_1", **places: float) -> TrafficStep:
     """An instant in which vehicles are at places along a straight road to the east."""
-    ids = tuple(vehicles)
-    n = len(ids)
-    position = np.column_stack([list(vehicles.values()), np.zeros(n), np.zeros(n)])
-    zeros, ones = np.zeros(n), np.ones(n)
-    state = TrafficState(
-        time, ids, ("car",) * n, position, zeros, speed * ones, zeros, 5 * ones, ones, ones, (lane,) * n,
-        np.zeros(n, np.int32), np.zeros((n, 3)),
-    )  # fmt: skip
+    state = vehicles([*places.values()], time=time, ids=tuple(places), speed=speed, size=(5.0, 1.0, 1.0), lane=lane)
     truth = Truth(0.01, 0.01, route=np.array([[0.0, 0, 0], [5000.0, 0, 0]]))
     return TrafficStep(
         index=round(10 * time), time=time, traffic=state, collisions=(), truth=truth, command=Command(), ending=None

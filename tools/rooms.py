@@ -99,7 +99,7 @@ def read_rooms() -> dict[str, Room]:
 
 def _imported(tree: ast.Module, known: set[str]) -> list[str]:
     found = []
-    for node in ast.walk(tree):
+    for node in _statements(tree):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in ("fogsim", "fogsim_envs"):
             for alias in node.names:
                 module = f"{node.module}.{alias.name}"
@@ -109,9 +109,17 @@ def _imported(tree: ast.Module, known: set[str]) -> list[str]:
     return ["fogsim_envs" if module.startswith("fogsim_envs") else room_of(module) for module in found]
 
 
+def _statements(tree: ast.AST) -> Iterable[ast.AST]:
+    """All statements; to look into their expressions takes most of the time."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
+            yield node
+            yield from _statements(node)
+
+
 def _lines(tree: ast.Module, text: str) -> tuple[int, int]:
     told = set()
-    for node in ast.walk(tree):
+    for node in _statements(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             told |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
     rest = [line for number, line in enumerate(text.splitlines(), 1) if number not in told]

@@ -1,7 +1,8 @@
-"""Belief to advised speed."""
+"""Belief to advised speed, and controllers that drive by what the vehicle knows."""
 
 from collections.abc import Callable
 
+from fogsim.advice.controllers import AdaptiveCruiseControl, BeliefController, Controller, EmergencyBrake, SightLimiter
 from fogsim.advice.protocol import Adviser, VehicleAdviser
 from fogsim.advice.sight_distance import FixedSpeed, NoAdvice, StoppingSightDistance
 from fogsim.advice.step_tables import (
@@ -34,4 +35,25 @@ ADVISERS: Registry[Callable[..., Adviser | VehicleAdviser]] = Registry(
     methods=("advise|advise_vehicle",),
 )
 
-__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StepTable", "StoppingSightDistance", "VehicleAdviser"]
+CONTROLLERS: Registry[Callable[..., Controller | BeliefController]] = Registry(
+    "controller",
+    {"emergency_brake": EmergencyBrake, "cruise_control": AdaptiveCruiseControl, "sight_limiter": SightLimiter},
+    group="fogsim.advice.controllers",
+    methods=("control|control_by_belief",),
+)
+
+__all__ = [
+    "ADVISERS",
+    "CONTROLLERS",
+    "AdaptiveCruiseControl",
+    "Adviser",
+    "BeliefController",
+    "Controller",
+    "EmergencyBrake",
+    "FixedSpeed",
+    "NoAdvice",
+    "SightLimiter",
+    "StepTable",
+    "StoppingSightDistance",
+    "VehicleAdviser",
+]

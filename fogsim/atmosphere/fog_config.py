@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.layer_airlight import layer_thickness
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import InputError
-from fogsim.obstruction import Tunnel, tunnels_of
 from fogsim.values import FogBank, FogField, FogShelter, Structure
+from fogsim.values.obstruction import Tunnel, tunnels_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import typer
 
 from fogsim import __version__
 from fogsim.cli.calibrate import calibrate
+from fogsim.cli.campaign import campaign_command
 from fogsim.cli.compile import compile_command
 from fogsim.cli.dataset import dataset_command
 from fogsim.cli.doctor import doctor_command
@@ -91,6 +92,7 @@ def _take_common_options(
 # In the order of --help.
 app.command("run")(run_command)
 app.command("test")(check_command)
+app.command("campaign")(campaign_command)
 app.command("study")(study_command)
 app.command("view")(view_command)
 app.command("recover")(recover_command)

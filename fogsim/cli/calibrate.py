@@ -1,4 +1,4 @@
-"""``fogsim calibrate …``: measure what methods need to know about a camera."""
+"""``fogsim calibrate …``: measure what methods need to know about a camera, or fit drivers to measurements."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,9 @@ from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.core.interruption import interruptible
 
-calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method needs to know about a camera.")
+calibrate = typer.Typer(
+    no_args_is_help=True, help="Measure what a method needs to know about a camera, or fit drivers to measurements."
+)
 
 
 @calibrate.callback()
@@ -114,3 +116,36 @@ def calibrate_halos_command(
         f"{100 * measured.mean_errors:.1f} % of the clear or the foggy ones are taken for the other): {escape(out)}",
         soft_wrap=True,
     )
+
+
+@calibrate.command("drivers")
+def calibrate_drivers_command(
+    data: Annotated[Path, typer.Argument(help="CSV of vehicles: visibility_m, speed_kmh, headway_s, session.")],
+    out: Annotated[Path, typer.Option(help="File to write: the block drivers of a scenario.")] = Path("drivers.yaml"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the constants as JSON instead of a table.")] = False,
+) -> None:
+    """Fit drivers to your own measurements of speed and headway in fog (docs/how_to/own_drivers.md)."""
+    from fogsim.calibration.driver_calibration import fit_drivers, read_passages
+    from fogsim.core.files.atomic import write_bytes
+    from fogsim.core.files.output_targets import refuse_unwritable
+
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=[data])
+    try:
+        with interruptible():
+            fitted = fit_drivers(read_passages(data))
+    except KeyboardInterrupt:
+        stderr.print("interrupted; nothing is written")
+        raise typer.Exit(INTERRUPTED) from None
+    write_bytes(out, fitted.as_yaml(data.name).encode())
+    found = {**fitted.constants, **{f"following.{kind}": share for kind, share in fitted.following.items()}}
+    if as_json:
+        typer.echo(json.dumps({name: one._asdict() for name, one in found.items()}))
+        return
+    table = Table("constant", "value", "90 % interval", box=None, pad_edge=False)
+    for name, (value, low, high) in found.items():
+        table.add_row(name, f"{value:.3f}", f"{low:.3f} to {high:.3f}")
+    stdout.print(table)
+    vehicles = f"{fitted.fog} vehicles in fog, {fitted.clear} in clear air"
+    shares = "" if fitted.following else "; too few headways for drivers.following"
+    stdout.print(f"{vehicles}{shares}: {escape(out)}", soft_wrap=True)

@@ -158,8 +158,8 @@ def _restore_contrast() -> None:
     """Restore images of a foggy road with 8 and 16 bits, also with tone mapping."""
     import numpy as np
 
-    from fogsim.restoration import METHODS, restore_contrast
     from fogsim.values import Camera
+    from fogsim.vision.restoration import METHODS, restore_contrast
 
     (width, height), *_ = _SIZES
     camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)

@@ -13,13 +13,14 @@ from fogsim.errors import FogSimError
 
 def list_command() -> None:
     """List scenarios and methods."""
-    from fogsim.advice import ADVISERS
+    from fogsim.advice import ADVISERS, CONTROLLERS
     from fogsim.estimators import ESTIMATORS
     from fogsim.fusion import FUSIONS
     from fogsim.lighting import LIGHTING_POLICIES
     from fogsim.render import RENDERERS
     from fogsim.scenario import catalogue, load_scenario
     from fogsim.study import shipped_studies
+    from fogsim.traffic import SPEED_CHOICES
 
     table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
     table.add_column("name", style="bold", no_wrap=True)
@@ -31,7 +32,7 @@ def list_command() -> None:
     stdout.print(table)
     stdout.print()
     stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")
-    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, CONTROLLERS, LIGHTING_POLICIES, SPEED_CHOICES, RENDERERS):
         # FogSim's own in order, then those of installed packages, then those that are files.
         names = ", ".join(dict.fromkeys((*registry, *registry.known, *(f"{kind}:FILE" for kind in registry.files))))
         stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}")

@@ -64,14 +64,14 @@ def view_command(
 
 def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
     """Run a scenario with its own policy to an instant [s]."""
-    from fogsim.simulation.advised_driving import AdvisedDriving
+    from fogsim.simulation.controlled_driving import own_policy
     from fogsim.simulation.loop import ClosedLoop
     from fogsim.simulation.run_config import check_ego
 
     # The viewer needs its own type of OpenGL context, so no frames are rendered.
     drawn = scenario.model_copy(update={"renderer": "cpu"}).run_config()
     check_ego(drawn.traffic.ego, "fogsim view")
-    policy = AdvisedDriving(drawn.advice, drawn.periods.decision_frames)
+    policy = own_policy(drawn)
     with SimulationProgress(stderr, at) as progress, ClosedLoop(drawn) as loop:
         step = loop.start(seed)
         while step.time < at - 1e-9:

@@ -1,5 +1,16 @@
-"""Conditions on a run: a small language over finished steps, for triggers and expectations."""
+"""Conditions on a run, a small language over its steps, and expectations: clauses that these conditions must meet."""
 
+from fogsim.conditions.clauses import (
+    Always,
+    Clause,
+    Eventually,
+    Finding,
+    FindingVerdict,
+    Happened,
+    MetricCheck,
+    Whenever,
+)
+from fogsim.conditions.expectation_watch import ExpectationWatch
 from fogsim.conditions.moment import EGO, History, Moment
 from fogsim.conditions.parsing import mended, parse_condition
 from fogsim.conditions.possibility import (
@@ -20,14 +31,22 @@ from fogsim.conditions.watching import Watch, shown_value
 __all__ = [
     "EGO",
     "SIGNALS",
+    "Always",
+    "Clause",
     "Comparison",
     "Condition",
     "Edge",
+    "Eventually",
+    "ExpectationWatch",
+    "Finding",
+    "FindingVerdict",
     "Flag",
+    "Happened",
     "Held",
     "History",
     "Kind",
     "Limits",
+    "MetricCheck",
     "Moment",
     "Need",
     "Place",
@@ -36,6 +55,7 @@ __all__ = [
     "RunContent",
     "Signal",
     "Watch",
+    "Whenever",
     "condition_mistakes",
     "lights_of",
     "mended",

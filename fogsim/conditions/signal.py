@@ -87,3 +87,13 @@ class Signal:
         """Value at a moment; None if it has none."""
         value: Value = self.value(moment, *arguments)
         return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def speed_signal(meaning: str, value: Callable[..., float | None], **further: object) -> Signal:
+    """Signal of a speed, shown in km/h."""
+    return Signal(meaning, value, unit="m/s", shown_unit="km/h", least=0.0, **further)  # type: ignore[arg-type]  # its keywords
+
+
+def length_signal(meaning: str, value: Callable[..., float | None], **further: object) -> Signal:
+    """Signal of a length in metres."""
+    return Signal(meaning, value, unit="m", **{"least": 0.0, **further})  # type: ignore[arg-type]  # in the same way

@@ -23,7 +23,7 @@ FileName = Annotated[str, "a file"]
 Check = Callable[[Any], str | None]
 """From a value to what was expected; None if the value fits."""
 
-_Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
+_Checks = tuple[list[tuple[str, Check | None]], dict[str, Check]]
 
 _NOTHING = object()
 """A value that fits no checked annotation; its check says what is expected."""
@@ -91,8 +91,7 @@ def checked_parameters(target: C) -> C:
             if check is not None and (expected := check(value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
         for name, value in options.items():
-            check = by_name.get(name)
-            if check is not None and (expected := check(value)) is not None:
+            if name in by_name and (expected := by_name[name](value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
         try:
             return call(*arguments, **options)
@@ -121,7 +120,7 @@ def _argument_checks(signature: inspect.Signature) -> _Checks:
         if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
     }
     positional = [name for name in checks if signature.parameters[name].kind is not inspect.Parameter.KEYWORD_ONLY]
-    return [(name, checks[name]) for name in positional], checks
+    return [(name, checks[name]) for name in positional], {name: one for name, one in checks.items() if one is not None}
 
 
 def _call_mistake(
@@ -228,8 +227,11 @@ def _union_check(checks: Sequence[Check | None]) -> Check | None:
     known = [check for check in checks if check is not None]
     if len(known) < len(checks):
         return None
+    may_be_none = any(check(None) is None for check in known)
 
     def check(value: object) -> str | None:
+        if value is None and may_be_none:
+            return None
         expected = []
         for one in known:
             wrong = one(value)

@@ -13,11 +13,11 @@ from fogsim.offline.estimation import estimates_of
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source
 from fogsim.offline.video_source import VideoWriter, refuse_unfit_video
-from fogsim.restoration import METHODS, MOST_GAIN, restore_contrast
-from fogsim.restoration.picture import largest_value
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import respond
+from fogsim.vision.restoration import METHODS, MOST_GAIN, restore_contrast
+from fogsim.vision.restoration.picture import largest_value
 
 _ESTIMATOR = "joint_road"
 """Method that estimates the extinction if no visibility is given."""

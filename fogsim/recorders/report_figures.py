@@ -234,7 +234,12 @@ _MOST_MARGIN = 300.0
 """Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
 
 
-_WARNINGS = {DriverWarning.FOG_AHEAD: "#e39a1f", DriverWarning.CANNOT_SEE: _MUTED, DriverWarning.CAMERA_DEGRADED: ALARM}
+_WARNINGS = {
+    DriverWarning.FOG_AHEAD: "#e39a1f",
+    DriverWarning.CANNOT_SEE: _MUTED,
+    DriverWarning.CAMERA_DEGRADED: ALARM,
+    DriverWarning.COLLISION: SPEED,
+}
 
 
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:

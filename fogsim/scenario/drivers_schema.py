@@ -5,7 +5,7 @@ import itertools
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from fogsim.errors import UnknownNameError
 from fogsim.scenario.section import (
@@ -13,12 +13,14 @@ from fogsim.scenario.section import (
     Distance,
     Flag,
     Length,
+    Method,
     Number,
     RoadEnd,
     Section,
     Share,
     SpeedKmh,
     Time,
+    method_of,
 )
 from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES, Compliance
 from fogsim.values import Display
@@ -176,8 +178,8 @@ class DriversSection(Section):
     headlamp_reach_m: Annotated[Length, Field(ge=1, le=1000)] = 55.0
     """Distance at which an unlit vehicle is seen in the headlamps at night in clear air."""
 
-    speed_choice: str = "observed"
-    """How fast they drive in fog by themselves."""
+    speed_choice: Annotated[Method, method_of(SPEED_CHOICES)] = Method(method="observed")
+    """How fast they drive in fog by themselves: a method, with its constants as parameters, or your own class."""
 
     speed_spread: Annotated[Number, Field(ge=0, le=1)] = 0.1
     """Standard deviation of the logarithm of a driver's own factor on that speed, where sight limits it."""
@@ -236,13 +238,6 @@ class DriversSection(Section):
             for name, given in displays.items()
         }
         return {**written, "compliance_by_display": own}
-
-    @field_validator("speed_choice")
-    @classmethod
-    def _known_choice(cls, value: str) -> str:
-        if value not in SPEED_CHOICES:
-            raise ValueError(str(UnknownNameError("speed choice", value, SPEED_CHOICES)))
-        return value
 
     @model_validator(mode="after")
     def _stretch_is_advised(self) -> Self:

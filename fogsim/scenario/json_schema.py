@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.registry import Registry
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
@@ -14,6 +14,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.system_under_test import BLOCK, KEYS
 from fogsim.scenario.variation import VariationKeys
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -23,6 +24,7 @@ _METHODS: Mapping[str, Registry[Any]] = {
     "estimators": ESTIMATORS,
     "fusion": FUSIONS,
     "advice": ADVISERS,
+    "controller": CONTROLLERS,
     "lighting": LIGHTING_POLICIES,
 }
 
@@ -44,6 +46,8 @@ def scenario_json_schema() -> dict[str, Any]:
         written[key] = _methods(written[key], registry)
     beside_road = schema["$defs"]["RoadsideCamera"]["properties"]
     beside_road["estimator"] = _methods(beside_road["estimator"], ESTIMATORS)
+    drivers = schema["$defs"]["DriversSection"]["properties"]
+    drivers["speed_choice"] = _methods(drivers["speed_choice"], SPEED_CHOICES)
     written[BLOCK] = {
         "type": "object",
         "description": "What is under test: keys that may stand by themselves too.",

@@ -23,7 +23,7 @@ from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
-from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
+from fogsim.scenario.variation import KEYS, Case, Value, Variation, chosen_cases, read_variation, with_case
 from fogsim.scenario.written_form import resolved
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import check_configured_files, check_sumo_file
@@ -178,6 +178,39 @@ def load_cases(
         if watch is not None:
             watch(done, len(chosen))
     return ScenarioCases(document, variation, tuple(cases))
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceReader:
+    """A scenario file with a space, read once; `case` is the one whose values the space replaces."""
+
+    variation: Variation
+    case: Case
+    document: Document
+    context: Mapping[str, Any]
+
+    def load(self, drawn: Mapping[str, Value], seed: int) -> tuple[Case, Scenario]:
+        """Load and check the case with other values of the space; InputError if it does not fit."""
+        case = self.variation.drawn_case(self.case, drawn, seed)
+        return case, _checked_case(with_case(self.document, case), case, self.context)
+
+
+def read_space(
+    path: Path, overrides: Iterable[str], wanted: str, may_import: MayImport = import_anything
+) -> SpaceReader:
+    """Read a scenario file with a space; `wanted` selects one case of ``vary`` as in `load_cases`."""
+    document = _overridden(read_scenario_document(path), overrides)
+    variation = read_variation(document)
+    if not variation.space:
+        raise InputError(
+            f"{path}: space is missing; declare what is drawn, such as space: {{fog: {{loguniform: [20 m, 1 km]}}}}"
+        )
+    chosen = chosen_cases(variation, wanted, path)
+    if len(chosen) > 1:
+        raise InputError(
+            f"{path}: a campaign is of one case of vary, and {len(chosen)} are there; choose one with --case"
+        )
+    return SpaceReader(variation, chosen[0], document, _context(path.parent, may_import, is_test=True))
 
 
 def check_configuration(config: Path) -> None:

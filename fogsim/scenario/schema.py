@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.errors import RenamedWarning, UnknownNameError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
@@ -24,7 +24,7 @@ from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.expect.schema import Expectations
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
-from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
+from fogsim.scenario.section import Deceleration, Flag, Method, Number, Period, Section, Seed, Text, Time, method_of
 from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline, light_range
 from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
@@ -42,6 +42,22 @@ class InformedMethod(Method):
     """
 
     informed_by: Literal["belief", "truth", "sensors"] = "belief"
+
+
+class ControllerSection(Method):
+    """A controller in the ego, and what its actuators can do."""
+
+    delay_s: Time = 0.2
+    """From a request to the first change of the acceleration, in whole camera periods."""
+
+    lag_s: Time = 0.1
+    """Time constant of that change."""
+
+    braking_mps2: Deceleration = 9.0
+    """Greatest deceleration."""
+
+    accelerating_mps2: Deceleration = 2.5
+    """Greatest acceleration."""
 
 
 class Clocks(Section):
@@ -183,6 +199,13 @@ class ScenarioFile(Section):
     lighting: Annotated[InformedMethod, method_of(LIGHTING_POLICIES)] = InformedMethod(method="fog_lamp_rules")
     """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
 
+    controller: Annotated[ControllerSection, method_of(CONTROLLERS)] | None = None
+    """What drives the ego in its driver's place, by what the vehicle knows; none of SUMO's safety acts on it."""
+
+    driver: Literal["none", "human", "human_until_intervention"] | None = None
+    """Who drives the ego where its controller requests nothing: `none`, the default: the speed stays; `human`; or
+    `human_until_intervention`: a human until its first request, then the speed stays."""
+
     method_timeout_s: Period | None = None
     """Longest time that one call of a user's method may take; a longer one fails the run. By default any."""
 
@@ -276,6 +299,14 @@ class ScenarioFile(Section):
                     "advice.informed_by: sensors goes with drivers.advised: signs, equipped or law, which advise "
                     f"sections of road, and it is {self.drivers.advised}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _controller_in_ego(self) -> Self:
+        if self.controller is not None and not self.traffic.has_ego:
+            raise ValueError("controller drives the ego, and traffic.ego is none; name one, or leave it out")
+        if self.driver is not None and self.controller is None:
+            raise ValueError("driver goes with controller, which is missing")
         return self
 
     @model_validator(mode="after")

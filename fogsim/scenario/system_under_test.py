@@ -8,7 +8,7 @@ from fogsim.scenario.document import Document
 BLOCK = "sut"
 """Name of the block."""
 
-KEYS = ("estimators", "fusion", "advice", "lighting")
+KEYS = ("estimators", "fusion", "advice", "lighting", "controller", "driver")
 """Keys that may stand in it."""
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fogsim.obstruction import obstructions_of
 from fogsim.values import Leader, LeadMeasurement, Structure, StructureKind
+from fogsim.values.obstruction import obstructions_of
 
 _FREQUENCY = 77.0
 """Carrier of long-range automotive radars [GHz]."""

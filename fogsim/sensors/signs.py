@@ -24,15 +24,15 @@ def signs_ahead(
     Returns signs that face the vehicle. Takes `position` (3,) [m], `heading` [rad], `reach` [m], `corridor` [m],
     `grade` [rad].
     """
-    forward = (math.cos(heading), math.sin(heading))
+    forward, (x, y, z) = (math.cos(heading), math.sin(heading)), position.tolist()
     seen = []
     for sign in signs.signs:
-        dx, dy = sign.position[0] - float(position[0]), sign.position[1] - float(position[1])
+        dx, dy = sign.position[0] - x, sign.position[1] - y
         distance = dx * forward[0] + dy * forward[1]
         lateral = dy * forward[0] - dx * forward[1]
-        faces = math.cos(sign.heading - heading) > _FACING
-        if faces and 0.0 < distance <= reach and abs(lateral) <= corridor:
-            height = (sign.position[2] - float(position[2])) * math.cos(grade) - distance * math.sin(grade)
+        is_near = 0.0 < distance <= reach and -corridor <= lateral <= corridor
+        if is_near and math.cos(sign.heading - heading) > _FACING:
+            height = (sign.position[2] - z) * math.cos(grade) - distance * math.sin(grade)
             facing = math.remainder(sign.heading - heading, 2.0 * math.pi)
             what = (sign.sign_id, sign.kind, sign.value)
             seen.append(SignSighting(*what, distance, lateral, sign.diameter, height, facing))

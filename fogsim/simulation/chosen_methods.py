@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Iterable
 
-from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
+from fogsim.advice import ADVISERS, CONTROLLERS, Adviser, BeliefController, Controller, VehicleAdviser
 from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator, supply
@@ -22,6 +22,11 @@ def estimators(chosen: Iterable[MethodConfig], assumed: Camera) -> tuple[Estimat
 def adviser(chosen: MethodConfig) -> Adviser | VehicleAdviser:
     """A speed adviser."""
     return chosen.make(ADVISERS)
+
+
+def controller(chosen: MethodConfig) -> Controller | BeliefController:
+    """A controller."""
+    return chosen.make(CONTROLLERS)
 
 
 def road_adviser(chosen: MethodConfig) -> Adviser:

@@ -11,7 +11,7 @@ from fogsim.atmosphere import FogNow
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import SimulationError, UnplayedWarning
-from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.ego.view_rendering import Surrounding
 from fogsim.simulation.fleet import EquippedFleet, camera_messages
@@ -78,7 +78,7 @@ def run(
         either; `Step.unplayed` of the last step has all that was not played.
     """
     config = scenario.run_config()
-    policy = AdvisedDriving(config.advice, config.periods.decision_frames)
+    policy = own_policy(config)
     with ClosedLoop(config, traffic, sumo_outputs, camera_processes) as loop:
         step = loop.start(seed)
         yield step
@@ -287,7 +287,8 @@ class ClosedLoop:
         """
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
-        checked_command(command)
+        if command is not self._step.command:
+            checked_command(command)
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
             # In clear air no one else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)

@@ -9,7 +9,7 @@ from typing import Self
 from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import spawn_streams
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
-from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.loop import DriversFog
 from fogsim.simulation.run_config import RunConfig
@@ -35,7 +35,7 @@ class AttachedSession:
         self._drivers = drivers
         self._seed = seed
         self._equipment = EgoEquipment(config)
-        self._policy = AdvisedDriving(config.advice, config.periods.decision_frames)
+        self._policy = own_policy(config)
         self._timeline = Timeline(config.script)
         self._begun: tuple[Begun, ...] = ()
         self._last: Step | None = None

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError
 from fogsim.simulation.run_config import SectionsConfig
 from fogsim.values import Display, Stretch
 
@@ -16,11 +17,20 @@ EYES = (0.0, 0.0, 1.2)
 
 
 def road_sections(config: SectionsConfig | None, length: float) -> tuple[Stretch, ...]:
-    """Sections of the ego's route that are advised each by itself, in the direction of travel (`length` [m])."""
+    """Sections of the ego's route that are advised each by itself, in the direction of travel (`length` [m]).
+
+    InputError if there is none, or if a sign is not on the route.
+    """
     if config is None:
         return ()
     end = min(config.end, length)
     starts = list(config.at) or np.arange(config.first, end, config.spacing).tolist()
+    lost = [start for start in config.at if start > length - _SHORTEST] or ([] if starts else [config.first])
+    if lost:
+        raise InputError(
+            f"drivers.signs: {lost[0]:g} m is beyond the route, which is {length:.0f} m long and has its last sign at "
+            f"least {_SHORTEST:g} m before its end"
+        )
     starts = [start for start in starts if start < end and start <= length - _SHORTEST]
     # What ends with the route has no end of its own: whoever is there has not left it.
     last = math.inf if end >= length else end

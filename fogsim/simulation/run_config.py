@@ -219,6 +219,18 @@ class AdviceConfig:
     sections: SectionsConfig | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class ControllerConfig:
+    """A controller in the ego, and what its actuators can do."""
+
+    method: MethodConfig
+    driver: str = "none"  # Who drives where it requests nothing: "none", "human" or "human_until_intervention"
+    delay: float = 0.2  # From a request to the first change of the acceleration [s]
+    lag: float = 0.1  # Time constant of that change [s]
+    braking: float = 9.0  # Greatest deceleration [m/s²]
+    accelerating: float = 2.5  # Greatest acceleration [m/s²]
+
+
 class Situation(Protocol):
     """Where vehicles are when an entry of a script begins; None for what is not known of them now."""
 
@@ -303,6 +315,8 @@ class RunConfig(ScenarioLike):
         How estimates become a belief.
     advice : AdviceConfig
         How the belief becomes advice and lamps.
+    controller : ControllerConfig or None
+        What drives the ego in its driver's place; None for the driver.
     script : Script
         What happens in the run.
     periods : Periods
@@ -331,6 +345,7 @@ class RunConfig(ScenarioLike):
     estimators: tuple[MethodConfig, ...] = _ESTIMATORS
     fusion: MethodConfig = _FUSION
     advice: AdviceConfig = AdviceConfig()
+    controller: ControllerConfig | None = None
     script: Script = Script()
     periods: Periods = Periods()
     equipped_share: float = 0.0

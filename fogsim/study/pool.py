@@ -50,7 +50,7 @@ def _run_until_broken(
     """Execute runs from the end of a list, removing them; return those in progress when a process died."""
     under_way: dict[Future[str | None], StudyRun] = {}
     try:
-        with _pool(processes) as pool:
+        with _pool(processes, work.__module__) as pool:
             while waiting or under_way:
                 while waiting and len(under_way) < processes:
                     run = waiting[-1]
@@ -73,12 +73,12 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 
 
 @contextlib.contextmanager
-def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
     # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
     # imported what they need.
     open_standard_streams()
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["fogsim.study.execution"])
+    context.set_forkserver_preload(["fogsim.study.execution", module])
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_leave_signals_to_parent)
     try:
         yield pool

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fogsim.conditions import Condition
+from fogsim.conditions import Always, Condition, Eventually, Finding, Whenever
 from fogsim.core.files.atomic import write_json, write_text
-from fogsim.expectations import Always, Eventually, Finding, Whenever
 from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder
 from fogsim.scenario import Scenario, build

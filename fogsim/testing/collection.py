@@ -8,10 +8,10 @@ from pathlib import Path
 
 from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError
-from fogsim.scenario import build
+from fogsim.scenario import Scenario, build
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
-from fogsim.scenario.variation import NONE_FAILS, Verdict
+from fogsim.scenario.variation import NONE_FAILS, Case, Verdict
 from fogsim.scenario.written_form import deciding
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
@@ -139,11 +139,23 @@ def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
     for number, (case, scenario) in enumerate(loaded.cases):
         # Cases that differ in their seed share a scenario.
         if id(scenario) not in described:
-            told = [deciding(scenario), file_digests(scenario), build.own_methods(scenario)]
-            described[id(scenario)] = json.dumps(told, sort_keys=True)
-        text = f"{file.resolve()} {described[id(scenario)]} {case.label} {case.seed}"
-        key = hashlib.sha256(text.encode()).hexdigest()[:20]
-        yield StudyRun(number, case.levels, case.seed, scenario, key)
+            described[id(scenario)] = _description(scenario)
+        yield _run_of(file, number, case, scenario, described[id(scenario)])
+
+
+def run_of(file: Path, number: int, case: Case, scenario: Scenario) -> StudyRun:
+    """A case as a run, with the key of its result."""
+    return _run_of(file, number, case, scenario, _description(scenario))
+
+
+def _description(scenario: Scenario) -> str:
+    return json.dumps([deciding(scenario), file_digests(scenario), build.own_methods(scenario)], sort_keys=True)
+
+
+def _run_of(file: Path, number: int, case: Case, scenario: Scenario, description: str) -> StudyRun:
+    text = f"{file.resolve()} {description} {case.label} {case.seed}"
+    key = hashlib.sha256(text.encode()).hexdigest()[:20]
+    return StudyRun(number, case.levels, case.seed, scenario, key)
 
 
 def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -> list[FogTest]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fogsim.conditions import ExpectationWatch
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError, UnplayedWarning
-from fogsim.expectations import ExpectationWatch
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
@@ -50,11 +50,17 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
     return {"findings": findings, "metrics": summary.flat(), "ending": ending}
 
 
+def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+    """Check a case and return the content of its file, which also reports failures."""
+    begun = time.monotonic()
+    outcome = outcome_of(lambda: check_case(scenario, seed, sumo_outputs))
+    return {**outcome, "duration_s": round(time.monotonic() - begun, 3)}
+
+
 def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
     """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
-    begun = time.monotonic()
-    outcome = outcome_of(lambda: check_case(scenario, seed, result.with_suffix("")))
-    write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})
+    outcome = check_outcome(scenario, seed, result.with_suffix(""))
+    write_json(result, outcome)
     return outcome.get("message")
 
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from scipy.special import betaincinv
 
-from fogsim.expectations import Finding, FindingVerdict
+from fogsim.conditions import Finding, FindingVerdict
 from fogsim.scenario.variation import Verdict
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest

@@ -39,7 +39,7 @@ def _suite(outcome: FileOutcome, settings: Sequence[str], now: str) -> ET.Elemen
     outcomes = [one.outcome for one in outcome.judgements]
     suite = ET.Element(
         "testsuite",
-        name=_text(outcome.test.name),
+        name=xml_text(outcome.test.name),
         tests=str(len(outcomes) + bool(outcome.broken)),
         failures=str(sum(one is not Outcome.PASSED for one in outcomes)),
         errors=str(int(bool(outcome.broken))),
@@ -47,7 +47,7 @@ def _suite(outcome: FileOutcome, settings: Sequence[str], now: str) -> ET.Elemen
         time=_seconds(outcome.duration),
         timestamp=now,
         hostname=platform.node(),
-        file=_text(str(outcome.test.path)),
+        file=xml_text(str(outcome.test.path)),
     )
     suite.extend(_clause(outcome, one, settings) for one in outcome.judgements)
     if outcome.broken:
@@ -61,32 +61,33 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
     case = _case(outcome, judgement.title, share)
     told = judgement_text(judgement)
     if judgement.outcome is not Outcome.PASSED:
-        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=_text(told))
+        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(told))
         where = outcome.test.lines[judgement.name]
-        failure.text = _text(f"{where}\n{told}\n{command_text(outcome.test, judgement.run, settings)}\n")
+        failure.text = xml_text(f"{where}\n{told}\n{command_text(outcome.test, judgement.run, settings)}\n")
     lines = case_lines(outcome, judgement)
     if lines:
-        ET.SubElement(case, "system-out").text = _text("\n".join(lines) + "\n")
+        ET.SubElement(case, "system-out").text = xml_text("\n".join(lines) + "\n")
     return case
 
 
 def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequence[str]) -> ET.Element:
     case = _case(outcome, "run", outcome.duration / (len(outcome.judgements) + 1))
     told = broken_text(broken)
-    error = ET.SubElement(case, "error", type="error", message=_text(told))
-    error.text = _text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
+    error = ET.SubElement(case, "error", type="error", message=xml_text(told))
+    error.text = xml_text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
     if len(outcome.results) > 1:
         listed = "".join(f"{label_of(one.run)}: {one.message}\n" for one in broken)
-        ET.SubElement(case, "system-out").text = _text(listed)
+        ET.SubElement(case, "system-out").text = xml_text(listed)
     return case
 
 
 def _case(outcome: FileOutcome, name: str, seconds: float) -> ET.Element:
-    attributes = {"classname": _text(str(outcome.test.path)), "name": _text(name), "time": _seconds(seconds)}
+    attributes = {"classname": xml_text(str(outcome.test.path)), "name": xml_text(name), "time": _seconds(seconds)}
     return ET.Element("testcase", attributes)
 
 
-def _text(text: str) -> str:
+def xml_text(text: str) -> str:
+    """A text without characters that XML cannot hold."""
     return _NO_XML.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 

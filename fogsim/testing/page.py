@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from fogsim.conditions import Finding, FindingVerdict
 from fogsim.core.files.atomic import write_text
-from fogsim.expectations import Finding, FindingVerdict
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.templating import data_url, render
 from fogsim.study.plan import StudyRun

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from fogsim.expectations import Finding, FindingVerdict
+from fogsim.conditions import Finding, FindingVerdict
 from fogsim.study.execution import result_file
 from fogsim.study.plan import StudyRun
 from fogsim.study.run_file import FailedRun, Finite, Metrics, RunRecord, Word, read_run

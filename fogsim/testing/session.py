@@ -7,12 +7,12 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field, ValidationError
 
+from fogsim.conditions import FindingVerdict
 from fogsim.core.files.atomic import partial_path, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.readers import read_json
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
-from fogsim.expectations import FindingVerdict
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
@@ -109,7 +109,7 @@ def run_tests(
     KeyboardInterrupt
         On Ctrl-C: completed cases are kept, for `resume`.
     """
-    results = _begin(out, resume)
+    results = begin_session(out, resume)
     with WriterLock(out):
         names = {run.key: (*test.lines,) for test in tests for run in test.runs}
         found = {run.key: read_result(results, run, names[run.key]) for test in tests for run in test.runs}
@@ -137,7 +137,7 @@ def run_tests(
     return outcomes
 
 
-def _begin(out: Path, resume: bool) -> Path:
+def begin_session(out: Path, resume: bool) -> Path:
     """Create the directory, and keep only results that count."""
     refuse_unwritable_folder(out)
     session = out / _SESSION

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fogsim.conditions import FindingVerdict
 from fogsim.errors import InputError
-from fogsim.expectations import FindingVerdict
 from fogsim.scenario.loading import load_cases
 from fogsim.scenario.variation import Variation, number_with_unit, value_text
 from fogsim.study.execution import Engine

@@ -8,11 +8,11 @@ from typing import Protocol
 
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.drivers.speed_choice import DriverSetup
+from fogsim.traffic.drivers.speed_choice import DriverSetup, unaffected
 from fogsim.values import Collision, Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 from fogsim.values.script import TrafficAction
 
-UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
+UNTOUCHED = DriverSetup(unaffected, spread=0.0)
 """Drivers as the user's own simulation has them."""
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import SimulationError
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import ClearAir, FogAccess
 from fogsim.traffic.setup import ANY_EGO, CollisionLog, TrafficSetup
@@ -49,6 +48,7 @@ from fogsim.values import (
     TrafficState,
     Unplayed,
 )
+from fogsim.values.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
 from fogsim.values.script import Leave, TrafficAction
 
 _NO_ADVICE = Command()

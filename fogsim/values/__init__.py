@@ -4,6 +4,7 @@ from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import (
     Command,
+    Control,
     Display,
     DriverWarning,
     EgoControl,
@@ -42,7 +43,20 @@ from fogsim.values.road import (
 )
 from fogsim.values.scene import Batch, Mesh, Pavement, RoadSurface, Scene, Surface
 from fogsim.values.script import Begun
-from fogsim.values.step import Cohort, Ending, EquippedVehicle, LampEffects, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.step import (
+    NOTHING_UNPLAYED,
+    Cohort,
+    Ending,
+    EquippedVehicle,
+    LampEffects,
+    Reason,
+    RoadSection,
+    Step,
+    TrafficStep,
+    Truth,
+    Unplayed,
+    UnplayedEvent,
+)
 from fogsim.values.traffic import (
     Collision,
     Leader,
@@ -54,7 +68,6 @@ from fogsim.values.traffic import (
     TrafficSnapshot,
     TrafficState,
 )
-from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
 __all__ = [
     "NOTHING_UNPLAYED",
@@ -67,6 +80,7 @@ __all__ = [
     "Cohort",
     "Collision",
     "Command",
+    "Control",
     "DenserFog",
     "Display",
     "DriverWarning",

@@ -67,6 +67,8 @@ class DriverWarning(StrEnum):
     """The system knows too little about the fog: it decides nothing by it."""
     CAMERA_DEGRADED = "camera_degraded"
     """The camera is dirty, blinded, frozen or dark."""
+    COLLISION = "collision"
+    """A controller's: the vehicle ahead comes near."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,28 @@ class EgoControl:
 
     acceleration: float = 0.0
     lanes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """What a controller requests for the next camera period; None for what it leaves to the driver and the policies.
+
+    Attributes
+    ----------
+    acceleration : float or None
+        Acceleration along the road [m/s²], negative for braking.
+    speed : float or None
+        Speed to reach [m/s], in place of an acceleration.
+    lamps : Lamp or None
+        Lamps to light.
+    warning : DriverWarning or None
+        What the driver is warned of.
+    """
+
+    acceleration: float | None = None
+    speed: float | None = None
+    lamps: Lamp | None = None
+    warning: DriverWarning | None = None
 
 
 @dataclass(frozen=True, slots=True)

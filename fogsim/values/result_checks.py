@@ -13,6 +13,7 @@ from fogsim.errors import InputError, shown
 from fogsim.values import (
     Belief,
     Command,
+    Control,
     Display,
     DriverWarning,
     EgoControl,
@@ -93,6 +94,13 @@ def checked_advice(method: str, value: object) -> SpeedAdvice:
     return advice
 
 
+def checked_speed(choice: str, speed: float) -> float:
+    """A speed choice's result; InputError unless it is a speed of at least 0 [m/s], or `inf` for no limit."""
+    if not (_is_number(speed) and speed >= 0.0):
+        raise InputError(f"speed choice {choice!r} must return at least 0 [m/s], or inf; got {shown(speed)}")
+    return speed
+
+
 def checked_lamps(method: str, value: object) -> Lamp:
     """A lighting policy's result; InputError unless it is a valid `Lamp`."""
     who = f"lighting policy {method!r}: lamps()"
@@ -114,6 +122,23 @@ def _real_lamps(who: str, lamps: Lamp) -> Lamp:
             f"{who}: no lamp has the bits {unknown}; there are {', '.join(str(lamp.name) for lamp in Lamp)}"
         )
     return lamps
+
+
+def checked_control(controller: str, value: object) -> Control:
+    """A controller's request; InputError unless it is a `Control` with finite numbers, not both of them."""
+    who = f"controller {controller!r}"
+    control = _of_type(who, value, Control)
+    for name in ("acceleration", "speed"):
+        number = getattr(control, name)
+        if number is not None and not (_is_number(number) and math.isfinite(number)):
+            raise InputError(f"{who}: {name} must be finite or None, got {shown(number)}")
+    if control.acceleration is not None and control.speed is not None:
+        raise InputError(f"{who}: expected an acceleration or a speed, got both: {shown(control)}")
+    if control.lamps is not None:
+        _of_type(f"{who}: lamps", control.lamps, Lamp)
+    if control.warning is not None:
+        _of_type(f"{who}: warning", control.warning, DriverWarning)
+    return control
 
 
 def checked_command(value: object) -> Command:

@@ -24,7 +24,12 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
     ("name", "arguments", "keys"),
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
-        ("photograph_roads.py", ("--images", "1"), {"pool", "method", "visibility_m", "pictures", "valid_share"}),
+        pytest.param(
+            "photograph_roads.py",
+            ("--images", "1"),
+            {"pool", "method", "visibility_m", "pictures", "valid_share"},
+            marks=SLOW,
+        ),
         pytest.param(
             "environments.py",
             ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
@@ -58,17 +63,18 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
             marks=SLOW,
         ),
-        (
+        pytest.param(
             "told_calibration.py",
             ("--cameras", "1", "--scenes", "1", "--visibilities", "100", "--methods", "negru2013"),
             {"error", "method", "visibility", "marks", "valid_share", "median_pct", "median_size_pct", "p95_size_pct"},
+            marks=SLOW,
         ),
         (
             "lead_accuracy.py",
             ("--cameras", "1", "--vehicles", "1", "--step", "10", "--methods", "huang2015_lead"),
             {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
         ),
-        (
+        pytest.param(
             "restoration.py",
             ("--vehicles", "1", "--step", "1", "--visibilities", "100"),
             {
@@ -84,6 +90,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
                 "range_ratio",
                 "ms",
             },
+            marks=SLOW,
         ),
         (
             "frames.py",

@@ -33,6 +33,7 @@ def records(keep: Path) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.nightly
 def test_every_target_has_its_cells(records: list[dict[str, Any]]) -> None:
     cells = {(one["target"], one["cell"]) for one in records}
     assert len(cells) == len(records)
@@ -43,6 +44,7 @@ def test_every_target_has_its_cells(records: list[dict[str, Any]]) -> None:
     assert all(set(one) == FIELDS for one in records)
 
 
+@pytest.mark.nightly
 def test_met_follows_from_the_numbers(records: list[dict[str, Any]]) -> None:
     measured = [one for one in records if one["images"] is not None]
     assert len(measured) > 40
@@ -58,6 +60,7 @@ def test_met_follows_from_the_numbers(records: list[dict[str, Any]]) -> None:
             assert 0 <= one["coverage"] <= 1
 
 
+@pytest.mark.nightly
 def test_what_another_command_measures_is_not_copied(records: list[dict[str, Any]]) -> None:
     elsewhere = [one for one in records if one["images"] is None]
     assert elsewhere
@@ -67,6 +70,7 @@ def test_what_another_command_measures_is_not_copied(records: list[dict[str, Any
         assert (ROOT / name).exists() or one["command"].startswith("no such estimator")
 
 
+@pytest.mark.nightly
 def test_kept_rows_give_the_same_again_and_belong_to_their_seed(keep: Path, records: list[dict[str, Any]]) -> None:
     assert json.loads(run_script(PROGRAM, "--json", "--images", "1", "--keep", keep).stdout) == records
     other = run_script(PROGRAM, "--images", "1", "--keep", keep, "--seed", "1")

@@ -5,7 +5,6 @@ import functools
 import json
 import os
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -180,11 +179,6 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("none.png", "--camera", "camera.yaml"), "none.png: there is no such file"),
         (("drive", "--camera", "none.yaml"), "none.yaml: cannot be read"),
         (("drive", "--camera", "typo.yaml"), "typo.yaml:1: widht: unknown key; did you mean 'width'"),
-        (("drive", "--camera", "large.yaml"), "the image has 320 × 240 pixels, the camera 640 × 240"),
-        (("drive", "--camera", "camera.yaml", "--method", "negru2031"), "did you mean 'negru2013'"),
-        (("empty", "--camera", "camera.yaml"), "the folder contains no image"),
-        (("*.bmp", "--camera", "camera.yaml"), "no file fits this pattern"),
-        (("empty.mp4", "--camera", "camera.yaml"), "this is no video"),
         (("camera.yaml", "--camera", "camera.yaml"), "the only image cannot be read"),
         (("drive", "--camera", "camera.yaml", "--mount-height", "1.4"), "--mount-height is for a guess"),
         (("drive", "--guess-camera"), "--camera camera.yaml"),
@@ -192,7 +186,6 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("drive", "--camera", "camera.yaml", "--stills", "--plot", "v.png"), "--plot draws over time"),
         (("drive", "--camera", "camera.yaml", "--plot", "v.bmp"), "--plot must end in .png, .svg or .pdf"),
         (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "already exists"),
-        (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
         (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate"),
         (("drive", "--camera", "aside.yaml"), "aside.yaml:8: yaw_deg must lie within -29.0 … 28.9"),
         (
@@ -203,10 +196,7 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
 )
 def test_mistakes_end_with_exit_code_2(estimate, folder: Path, arguments: tuple[str, ...], told: str) -> None:
     (folder / "typo.yaml").write_text(CAMERA_YAML.replace("width", "widht"), encoding="utf-8")
-    (folder / "large.yaml").write_text(CAMERA_YAML.replace("320", "640"), encoding="utf-8")
     (folder / "aside.yaml").write_text(CAMERA_YAML + "yaw_deg: 55\n", encoding="utf-8")
-    (folder / "empty").mkdir()
-    (folder / "empty.mp4").write_bytes(b"")
     before = {path.name for path in folder.iterdir()}
     code, _, err = estimate(*arguments)
     assert code == 2
@@ -227,19 +217,6 @@ def test_a_video_without_frames_is_refused(estimate, folder: Path) -> None:
     code, out, err = estimate("none.mp4", "--camera", "camera.yaml", "--method", "negru2013", "--json")
     assert (code, out) == (2, "")
     assert "no frames" in err
-
-
-def test_black_images_are_not_valid(estimate, folder: Path) -> None:
-    shutil.rmtree(folder / "drive")
-    (folder / "drive").mkdir()
-    for index in range(2):
-        Image.fromarray(np.zeros((HEIGHT, WIDTH), np.uint8)).save(folder / "drive" / f"{index}.png")
-    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--json")
-    assert code == 0
-    for line in out.splitlines():
-        record = json.loads(line)
-        assert record["valid"] is False
-        assert [record[key] for key in sorted(KEYS - {"frame", "method", "valid"})] == [None] * 6
 
 
 def test_a_response_that_is_not_given_is_srgb_and_said(estimate, folder: Path) -> None:

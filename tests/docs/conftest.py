@@ -22,7 +22,9 @@ from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.scenario import catalogue
 
 CHECKOUT = Path(__file__).resolve().parents[2]
+TUTORIALS = sorted((CHECKOUT / "docs" / "tutorial").glob("*.md"))
 PLUGIN = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
+CONTROLLER = (CHECKOUT / "docs" / "how_to" / "own_controller.md").read_text(encoding="utf-8")
 SCENARIOS = (CHECKOUT / "docs" / "reference" / "scenarios.md").read_text(encoding="utf-8")
 VISIBILITY, SAMPLES = 80.0, 2
 
@@ -86,11 +88,7 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
             put_pictures(made, calibration)
         if "scenarios/studies/" in page:
             shutil.copytree(CHECKOUT / "scenarios", made / "scenarios")
-        if "# policies.yaml\n" in page:
-            (text,) = re.findall(r"```yaml\n(# policies\.yaml\n.*?)```", page, re.DOTALL)
-            (made / "policies.yaml").write_text(text, encoding="utf-8")
-        for text in re.findall(r"```yaml\n(# [\w/]*truck\.fog\.yaml\n.*?)```", page, re.DOTALL):
-            (made / text.split()[1]).write_text(text, encoding="utf-8")
+        put_printed(made, page)
         if "tests/data/openscenario" in page:
             shutil.copytree(CHECKOUT / "tests" / "data" / "openscenario", made / "tests" / "data" / "openscenario")
         if "network.onnx" in page:
@@ -100,6 +98,19 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
         return made
 
     return make
+
+
+def put_printed(folder: Path, page: str) -> None:
+    """Put files into a folder that a page prints; of those that it only names, the tutorials print one."""
+    tutorials = "".join(one.read_text(encoding="utf-8") for one in TUTORIALS)
+    for name in ("policies.yaml", "truck.fog.yaml", "own_brake.fog.yaml", "brakes.fog.yaml"):
+        blocks = rf"```yaml\n(# [\w/]*{re.escape(name)}\n.*?)```"
+        if name in page:
+            for text in re.findall(blocks, page, re.DOTALL) or re.findall(blocks, tutorials, re.DOTALL)[:1]:
+                (folder / text.split()[1]).write_text(text, encoding="utf-8")
+    if "mine:EmergencyBrake" in page:
+        (module,) = re.findall(r"```python\n(# mine.py\n.*?)```", CONTROLLER, re.DOTALL)
+        (folder / "mine.py").write_text(module, encoding="utf-8")
 
 
 def put_pictures(folder: Path, calibration: str) -> None:

@@ -93,6 +93,7 @@ def shortened(line: list[str]) -> list[str]:
         "dataset": ["fogsim", name, *SHORT, *rest, "--frames", "2", "--every", "1"],
         "estimate": [*line, "--overwrite"],
         "study": [*line, "--check"],
+        "campaign": ["fogsim", "validate", *rest[:1]],
         "view": [*line, *SHORT[:4]],
         # The README has one that fails, which the notebook shows.
         "test": [*line, *BLIND] if "my" in rest else ["fogsim", "validate", *rest[:1]],

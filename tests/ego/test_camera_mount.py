@@ -1,5 +1,6 @@
 """Where the camera is, by the ego's body, where the scenario does not say."""
 
+import contextlib
 import math
 from pathlib import Path
 
@@ -63,16 +64,13 @@ def test_what_the_scenario_says_holds_for_every_body(tmp_path: Path) -> None:
 
 def test_in_a_simulation_of_the_users_own_too(tmp_path: Path) -> None:
     scenario = load(tmp_path, 'vClass="bus"')
-    libsumo = load_libsumo()
-    libsumo.start(["sumo", "-n", str(tmp_path / "motorway.net.xml"), "-r", str(tmp_path / "ego.rou.xml")])
-    try:
+    with contextlib.closing(load_libsumo()) as libsumo:
+        libsumo.start(["sumo", "-n", str(tmp_path / "motorway.net.xml"), "-r", str(tmp_path / "ego.rou.xml")])
         with fogsim.attach(libsumo, scenario=scenario) as session:
             libsumo.simulationStep()
             step = session.observe()
             assert step is not None
             assert mounted(step)[:2] == pytest.approx((USUAL_MOUNTS["bus"].height,) * 2)
-    finally:
-        libsumo.close()
 
 
 def test_mounts_go_with_the_eyes_and_a_car_keeps_what_it_always_had() -> None:

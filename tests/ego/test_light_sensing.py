@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
@@ -10,6 +9,7 @@ from fogsim.simulation.run_config import LightSensor
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp, LightMeasurement, TrafficState
 from fogsim.values.eye import disability_glare
+from tests.helpers.vehicles import vehicles
 
 LOW, HIGH = int(Lamp.POSITION | Lamp.LOW_BEAM), int(Lamp.POSITION | Lamp.HIGH_BEAM)
 NIGHT = 0.05
@@ -23,22 +23,8 @@ def fog(visibility: float) -> FogField:
 def road(*others: tuple[float, float, float, int], own: int = LOW) -> TrafficState:
     """The ego at the origin, eastward, and others by east, north, heading and lamps."""
     rows = [(0.0, 0.0, 0.0, own), *others]
-    each = len(rows)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{n}" for n in range(each)),
-        types=("car",) * each,
-        position=np.array([(east, north, 0.0) for east, north, _, _ in rows]),
-        heading=np.array([heading for _, _, heading, _ in rows]),
-        speed=np.full(each, 20.0),
-        acceleration=np.zeros(each),
-        length=np.full(each, 4.6),
-        width=np.full(each, 1.8),
-        height=np.full(each, 1.5),
-        lane=("road_0",) * each,
-        lamps=np.array([lamps for *_, lamps in rows], dtype=np.int32),
-        paint=np.full((each, 3), 0.3),
-    )
+    places = [(east, north, 0.0) for east, north, _, _ in rows]
+    return vehicles(places, heading=[one[2] for one in rows], speed=20.0, lane="road_0", lamps=[one[3] for one in rows])
 
 
 def measured(state: TrafficState, visibility: float = math.inf, illuminance: float = NIGHT) -> LightMeasurement:

@@ -9,28 +9,14 @@ import fogsim
 from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor, Shutter
 from fogsim.simulation.ego.motion_blur import exposed, moved
 from fogsim.values import Camera, CameraPose, TrafficState, View
+from tests.helpers.vehicles import vehicles
 
 POSE = CameraPose((100.0, 50.0, 1.4), 0.0)
 
 
 def traffic(*speeds: float, heading: float = 0.0, grade: float = 0.0) -> TrafficState:
     count = len(speeds)
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"v{i}" for i in range(count)),
-        types=("passenger",) * count,
-        position=np.zeros((count, 3)),
-        heading=np.full(count, heading),
-        speed=np.array(speeds),
-        acceleration=np.zeros(count),
-        length=np.full(count, 4.6),
-        width=np.full(count, 1.8),
-        height=np.full(count, 1.5),
-        lane=("a",) * count,
-        lamps=np.zeros(count, np.int32),
-        paint=np.zeros(count, np.int64),
-        grade=np.full(count, grade),
-    )
+    return vehicles(np.zeros(count), heading=heading, speed=speeds, lane="a", grade=np.full(count, grade))
 
 
 def draw(state: TrafficState, pose: CameraPose) -> tuple[View, np.ndarray]:

@@ -9,6 +9,7 @@ from fogsim.scenario import build
 from fogsim.simulation.ego import view_rendering
 from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
+from tests.helpers.vehicles import vehicles
 
 SETTINGS = ("renderer=cpu", "camera.width=80", "camera.height=60", "fog={visibility_m: 200}")
 
@@ -19,21 +20,8 @@ def road(start: tuple[float, float], length: float, name: str) -> Lane:
 
 
 def two_cars(x: float, y: float) -> TrafficState:
-    return TrafficState(
-        time=0.0,
-        ids=("ego", "other"),
-        types=("car", "car"),
-        position=np.array([[x, y, 0.0], [x + 27.3, y + 0.4, 0.0]]),
-        heading=np.zeros(2),
-        speed=np.full(2, 20.0),
-        acceleration=np.zeros(2),
-        length=np.full(2, 4.5),
-        width=np.full(2, 1.8),
-        height=np.full(2, 1.5),
-        lane=("", ""),
-        lamps=np.zeros(2, np.int32),
-        paint=np.full((2, 3), 0.4),
-    )
+    places = [[x, y, 0.0], [x + 27.3, y + 0.4, 0.0]]
+    return vehicles(places, ids=("ego", "other"), speed=20.0, size=(4.5, 1.8, 1.5), paint=0.4)
 
 
 def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,6 @@
 """highway-env's environments in fog as Gymnasium and its users see them."""
 
+import contextlib
 import functools
 import math
 import warnings
@@ -152,14 +153,11 @@ def test_the_scenarios_events_happen_here_too() -> None:
 def test_vector_environments(make: Callable[..., Any]) -> None:
     """Gymnasium's, one after another in this process, and ours in processes of their own do the same."""
     one_step = functools.partial(TimeLimit, max_episode_steps=1)
-    envs = make(ID, num_envs=2, wrappers=[one_step], **SMALL)
-    try:
+    with contextlib.closing(make(ID, num_envs=2, wrappers=[one_step], **SMALL)) as envs:
         observation, _ = envs.reset(seed=[3, 3])
         assert np.array_equal(observation["camera"][0], observation["camera"][1])
         assert observation["state"][0, 0] > 0.0
         assert envs.step(np.array([[2, 0], [12, 0]]))[3].tolist() == [True, True]
-    finally:
-        envs.close()
 
 
 def test_bad_arguments() -> None:

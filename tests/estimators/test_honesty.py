@@ -34,8 +34,8 @@ from fogsim.values import (
     Truth,
 )
 
-HONEST = ("fogsim.estimators", "fogsim.vision")
-"""What estimators are made of."""
+HONEST = ("fogsim.estimators", "fogsim.vision", "fogsim.advice")
+"""What estimators, advisers and controllers are made of."""
 
 TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "simulation")
 """Modules of fogsim that know the truth."""
@@ -59,7 +59,8 @@ def drive(methods: list[str]) -> list[Step]:
     written = ", ".join(f"{{method: '{name}'}}" for name in methods)
     size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
     sensors = "sensors.scatterometer={}", "sensors.reports.roadside={camera: {}, every_m: 500, period_s: 1, delay_s: 0}"
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, f"estimators=[{written}]"])
+    methods_under_test = f"estimators=[{written}]", "controller=cruise_control"
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, *methods_under_test])
     return list(fogsim.run(scenario, seed=1))
 
 
@@ -260,7 +261,7 @@ def unseen_names(source: str) -> set[str]:
     } & UNSEEN
 
 
-@pytest.mark.parametrize("package", ["estimators", "vision", "fusion"])
+@pytest.mark.parametrize("package", ["advice", "estimators", "vision", "fusion"])
 def test_no_type_that_holds_the_truth_is_imported(package: str) -> None:
     """Import contracts see modules; `from fogsim.values import Truth` would pass them."""
     folder = Path(fogsim.__file__).parent / package

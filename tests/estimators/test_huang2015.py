@@ -1,13 +1,11 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.huang2015 import Measurement, decay, mixture
-from fogsim.values import Camera, Frame, Observation
+from fogsim.values import Frame, Observation
 from fogsim.vision.day.confirmation import Confirmation
 
 METHODS = ("huang2015", "huang2015_rough")
@@ -18,10 +16,11 @@ def estimate(name, image, camera, **options):
 
 
 @pytest.mark.parametrize("visibility", [30.0, 50.0, 100.0, 200.0, 400.0, 800.0])
-@pytest.mark.parametrize("name", METHODS)
-def test_corrected_recovers_visibility(render, road, name, visibility):
-    found = [estimate(name, render(road.but(visibility=visibility), seed), road.camera) for seed in range(2)]
-    assert np.mean([f.visibility for f in found]) == pytest.approx(visibility, rel=0.10)
+def test_corrected_recovers_visibility(render, road, visibility):
+    images = [render(road.but(visibility=visibility), seed) for seed in range(2)]
+    for name in METHODS:
+        found = [estimate(name, image, road.camera).visibility for image in images]
+        assert np.mean(found) == pytest.approx(visibility, rel=0.10), name
 
 
 def test_as_published_sees_dense_fog_only(render, road):
@@ -75,55 +74,3 @@ def test_as_published_averages_visibilities(render, road):
         for s, v in enumerate((40.0, 60.0))
     ]
     assert found.visibility == pytest.approx(np.mean(alone))
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_mirroring_changes_nothing(render, road, name):
-    image = render(road)
-    found = estimate(name, image, road.camera)
-    assert estimate(name, image[:, ::-1], road.camera).extinction == pytest.approx(found.extinction, rel=0.01)
-
-
-BAD = {
-    "black": np.zeros((480, 640), np.uint8),
-    "white": np.full((480, 640), 255, np.uint8),
-    "grey": np.full((480, 640), 128, np.uint8),
-    "noise": np.random.default_rng(6).integers(0, 256, (480, 640), dtype=np.uint8),
-}
-
-
-@pytest.mark.parametrize("as_published", [False, True])
-@pytest.mark.parametrize("image", BAD)
-@pytest.mark.parametrize("name", METHODS)
-def test_an_image_without_a_foggy_road_is_refused_with_a_reason(road, name, image, as_published):
-    found = estimate(name, BAD[image], road.camera, as_published=as_published)
-    assert not found.valid
-    assert found.diagnostics["reason"]
-
-
-@pytest.mark.parametrize("as_published", [False, True])
-def test_upside_down_and_outside_are_refused(render, road, as_published):
-    image = render(road)
-    assert not estimate("huang2015_rough", image[::-1], road.camera, as_published=as_published).valid
-    outside = replace(road.camera, pitch=np.radians(40.0))
-    assert not estimate("huang2015_rough", image, outside, as_published=as_published).valid
-
-
-@pytest.mark.parametrize("seed", range(1, 13, 2))
-def test_nothing_odd_gets_out_of_random_pictures(seed):
-    rng = np.random.default_rng(seed)
-    camera = Camera(96, 72, rng.uniform(30, 300), (48.0, rng.uniform(0, 72)), 1.4, rng.uniform(-0.3, 0.3))
-    rows = np.interp(np.arange(72), np.sort(rng.uniform(0, 72, 5)), rng.uniform(0, 300, 5))
-    image = np.clip(rows[:, None] + rng.normal(0, rng.choice([0, 1, 20]), (72, 96)), 0, 255).astype(np.uint8)
-    for name in METHODS:
-        found = estimate(name, image, camera, as_published=True)
-        assert np.isfinite(found.extinction)
-        assert found.extinction >= 0
-        assert found.valid == np.isfinite(found.standard_deviation)
-
-
-@pytest.mark.parametrize("option", ["time_scale", "way_scale"])
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
-def test_odd_scales_are_errors(road, option, value):
-    with pytest.raises(InputError, match=option):
-        make("huang2015", road.camera, **{option: value})

@@ -84,8 +84,7 @@ def test_fit_returns_what_was_put_in(extinction, airlight):
     assert fit.extinction == pytest.approx(extinction, rel=0.01 if airlight == 1.0 else 0.03)
 
 
-@pytest.mark.parametrize("extinction", [0.003, 0.02, 0.06, 0.2])
-@pytest.mark.parametrize("airlight", [1.0, 0.97])
+@pytest.mark.parametrize(("extinction", "airlight"), [(0.003, 1.0), (0.02, 0.97), (0.06, 1.0), (0.2, 0.97)])
 def test_interval_of_a_fit_holds_what_was_put_in(extinction, airlight):
     fit = fitted_extinction(exact(extinction, airlight))
     assert abs(fit.extinction - extinction) < NORMAL_90_PERCENT * fit.deviation

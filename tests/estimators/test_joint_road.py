@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
 
@@ -51,8 +50,10 @@ def test_a_verge_in_place_of_the_neighbouring_lane_is_left_out(render, road, vis
     assert np.array(found) * visibility / 3.0 == pytest.approx(1.0, abs=0.03)
 
 
-@pytest.mark.parametrize("response", list(Response))
-@pytest.mark.parametrize("visibility", [13.0, 16.0, 25.0])
+@pytest.mark.parametrize(
+    ("visibility", "response"),
+    [(13.0, Response.LINEAR), (13.0, Response.SRGB), (16.0, Response.GAMMA), (25.0, Response.SRGB)],
+)
 def test_the_densest_fog_is_not_taken_for_a_ramp(render, road, visibility, response):
     camera = replace(SMALL, response=response)
     found = estimate(render(road.but(visibility=visibility, camera=camera), 3), camera)
@@ -60,9 +61,17 @@ def test_the_densest_fog_is_not_taken_for_a_ramp(render, road, visibility, respo
     assert found.extinction * visibility / 3.0 == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize("told", [True, False])
-@pytest.mark.parametrize("paint", [30.0, 170.0])
-@pytest.mark.parametrize("visibility", [50, 150, 400])
+@pytest.mark.parametrize(
+    ("visibility", "paint", "told"),
+    [
+        (50, 30.0, True),
+        (50, 170.0, False),
+        (150, 170.0, True),
+        (150, 30.0, False),
+        (400, 30.0, True),
+        (400, 170.0, False),
+    ],
+)
 def test_a_lead_vehicle_is_left_out_tracked_or_not(render, road, visibility, paint, told):
     scene = road.but(visibility=visibility, camera=PAPER, lead_distance=25.0, lead_paint=paint)
     error, _ = errors(render, scene, range(3), lead=25.0 if told else None)
@@ -76,8 +85,10 @@ def test_works_with_other_cameras(render, road, camera, visibility):
     assert np.median(np.abs(error)) < 0.05
 
 
-@pytest.mark.parametrize("response", list(Response))
-@pytest.mark.parametrize("airlight", [120.0, 255.0])
+@pytest.mark.parametrize(
+    ("response", "airlight"),
+    [(Response.LINEAR, 120.0), (Response.LINEAR, 255.0), (Response.SRGB, 255.0), (Response.GAMMA, 120.0)],
+)
 def test_works_at_any_exposure_and_response(render, road, response, airlight):
     gain = airlight / 200.0
     scene = road.but(airlight=airlight, asphalt=60 * gain, mark=150 * gain, terrain=45 * gain)
@@ -130,24 +141,11 @@ def test_a_road_as_bright_as_the_airlight_is_refused(render, road):
     assert "bright" in str(found.diagnostics["reason"])
 
 
-@pytest.mark.parametrize("wall", [5, 90, 180])
-@pytest.mark.parametrize("foot", [300, 400])
+@pytest.mark.parametrize(("wall", "foot"), [(5, 300), (90, 400), (180, 300)])
 def test_a_wall_across_the_road_is_refused(render, road, wall, foot):
     image = render(road.but(visibility=1e9))
     image[200:foot] = wall
     assert not estimate(image, road.camera).valid
-
-
-def test_a_camera_upside_down_is_refused(render, road):
-    image = render(road)
-    assert not estimate(image, replace(road.camera, roll=np.pi)).valid
-    assert not estimate(image[::-1], road.camera).valid
-
-
-@pytest.mark.parametrize("options", [{"frames": 0}, {"frames": 1.5}, {"frames": True}, {"pitch_deviation": 0.0}])
-def test_parameters_out_of_range_are_errors(options):
-    with pytest.raises(InputError, match=next(iter(options))):
-        make("joint_road", SMALL, **options)
 
 
 def drive(render, road, densities, period=0.1):

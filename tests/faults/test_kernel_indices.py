@@ -9,7 +9,7 @@ import pytest
 from fogsim.atmosphere.lamps import halo_lamps, lobe_kernels
 from fogsim.render.cpu import occlusion
 from fogsim.render.shading import lines, pavement
-from fogsim.restoration import light_kernels
+from fogsim.vision.restoration import light_kernels
 from fogsim.vision.strips import joint_kernels
 
 LEVELS = 10

@@ -1,5 +1,6 @@
 """Wrong arguments to the Python API: every entry point answers with one line that names the argument and the value."""
 
+import contextlib
 import functools
 import math
 import pickle
@@ -167,12 +168,10 @@ def test_options_of_version_0() -> None:
 
 @pytest.mark.filterwarnings("ignore:.*ERROR")  # Gymnasium's own about its workers
 def test_an_error_from_another_process_is_the_same_error() -> None:
-    envs = make_vector("fogsim/FogAdvisoryFast-v1", num_envs=1, overrides=["duration_s=5"])
-    try:
-        with pytest.raises(UnknownNameError, match=r"unknown driver 'reckless'; known: "):
-            envs.reset(options={"driver": "reckless"})
-    finally:
-        envs.close()
+    made = make_vector("fogsim/FogAdvisoryFast-v1", num_envs=1, overrides=["duration_s=5"])
+    unknown = pytest.raises(UnknownNameError, match=r"unknown driver 'reckless'; known: ")
+    with contextlib.closing(made) as envs, unknown:
+        envs.reset(options={"driver": "reckless"})
     error = UnknownNameError("driver", "reckless", ("observed", "too_fast"))
     copied = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
     assert (type(copied), str(copied)) == (UnknownNameError, str(error))

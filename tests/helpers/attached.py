@@ -15,12 +15,9 @@ ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-ste
 
 @contextlib.contextmanager
 def libsumo_in_town() -> Iterator[Any]:
-    library = load_libsumo()
-    library.start(["sumo", *ARGUMENTS])
-    try:
+    with contextlib.closing(load_libsumo()) as library:
+        library.start(["sumo", *ARGUMENTS])
         yield library
-    finally:
-        library.close()
 
 
 @contextlib.contextmanager

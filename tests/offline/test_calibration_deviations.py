@@ -45,10 +45,10 @@ def test_a_camera_file_states_deviations_or_has_the_usual_ones(drive, tmp_path: 
 @pytest.mark.parametrize("factor", [0.87, 1.15])
 def test_intervals_of_a_wrong_height_contain_the_truth(drive, factor: float) -> None:
     camera = replace(drive.camera, mount_height=factor * drive.camera.mount_height)
-    held = []
+    images, held = sorted((drive.folder / "images").iterdir())[:4], []
     for deviations in (CalibrationDeviations(), CalibrationDeviations(mount_height=0.1)):
         calibration = Calibration(camera, deviations=deviations)
-        found = [one.estimates[0] for one in estimate_images(drive.folder / "images", calibration, "joint_road")]
+        found = [one.estimates[0] for one in estimate_images(images, calibration, "joint_road")]
         intervals = [one.visibility_interval for one in found if one.valid]
         assert intervals
         held.append(sum(low < 120.0 < high for low, high in intervals) / len(intervals))

@@ -18,7 +18,7 @@ height: 120
 focal_length_px: 144
 principal_point_px: [79.5, 59.5]
 mount_height_m: 1.38
-pitch_deg: 2.0054
+pitch_deg: 2.0053522829578814
 response: srgb
 """
 

@@ -114,12 +114,6 @@ def test_distortion_is_undone(draw: Draw, through_barrel: NDArray[np.uint8]) -> 
     check_registered(straightener(through_barrel), pinhole)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_visibility_through_a_lens_that_distorts(through_barrel: NDArray[np.uint8], method: str) -> None:
-    straightener = Straightener(Calibration(CAMERA, BARREL))
-    assert visibility(straightener(through_barrel), CAMERA, method) == pytest.approx(VISIBILITY, rel=0.05)
-
-
 def test_yaw_is_undone(draw: Draw) -> None:
     """Turned to the left, the camera sees the end of the road on its right; pitch and roll are its own."""
     for pitch, roll in [(2.0, 0.0), (6.0, -3.0)]:
@@ -129,14 +123,6 @@ def test_yaw_is_undone(draw: Draw) -> None:
             assert (straightener.camera.principal_point[0] > camera.principal_point[0]) == (yaw > 0)
             aside, along = draw(camera, math.radians(yaw)), draw(straightener.camera)
             check_registered(straightener(aside), along)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_visibility_of_a_camera_that_looks_aside(draw: Draw, method: str) -> None:
-    calibration = Calibration(CAMERA, yaw=math.radians(9.0))
-    aside = draw(CAMERA, calibration.yaw)
-    straightener = Straightener(calibration)
-    assert visibility(straightener(aside), straightener.camera, method) == pytest.approx(VISIBILITY, rel=0.05)
 
 
 def test_lens_and_yaw_together_from_files(drive, tmp_path: Path, draw: Draw) -> None:

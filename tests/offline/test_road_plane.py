@@ -160,16 +160,3 @@ def test_a_video_that_is_left_or_refused_leaves_no_file(clear_video: Path, tmp_p
     with pytest.raises(InputError, match="--visibility must be"):
         next(fog_video(VideoFile.open(clear_video), road, 0.0, out))
     assert [path.name for path in tmp_path.iterdir()] == ["clear.mp4"]
-
-
-def test_what_can_be_read_of_a_video_that_is_cut_off_is_written(tmp_path: Path) -> None:
-    whole, cut = tmp_path / "whole.mp4", tmp_path / "cut.mp4"
-    encoder, rng = Encoder(encoder_command(whole, 0.1, (64, 48))), np.random.default_rng(1)
-    for _ in range(40):
-        encoder.write(rng.integers(0, 256, (48, 64, 3), dtype=np.uint8).tobytes())
-    encoder.finish()
-    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 3])
-    with pytest.raises(InputError, match="the video is cut off or damaged"):
-        list(fog_video(VideoFile.open(cut), RoadPlane(Calibration(CAMERA)), 50.0, tmp_path / "fog.mp4"))
-    assert 2 < len(list(VideoFile.open(tmp_path / "fog.mp4").pictures())) < 40
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.mp4", "fog.mp4", "whole.mp4"]

@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from fogsim.core.files.row_log import read_rows
-from fogsim.errors import InputError
 from fogsim.metrics import step_metrics
 from fogsim.recorders import TableRecorder
 from fogsim.recorders.table import ROWS_PER_GROUP
@@ -163,33 +162,6 @@ def test_rows_are_in_the_log_half_a_second_after_they_were_recorded(tmp_path: Pa
         logged.append(len(read_rows(tmp_path / "steps.arrows")))
     assert logged == [1, 1, 1, 4, 4, 6]
     recorder.close(complete=True)
-
-
-@pytest.mark.parametrize("cut", [1, 7, 100])
-def test_a_log_that_was_cut_off_has_the_rows_before(tmp_path: Path, cut: int) -> None:
-    recorder = TableRecorder(tmp_path / "steps.parquet", METHODS, clock=itertools.count().__next__)
-    for index in range(4):
-        recorder.record(make_step(index), step_metrics(make_step(index)))
-    log = tmp_path / "steps.arrows"
-    log.write_bytes(log.read_bytes()[:-cut])
-    assert read_rows(log)["index"].to_pylist() == [0, 1, 2]
-
-
-def test_of_rows_that_are_there_twice_the_last_ones_count(tmp_path: Path) -> None:
-    recorder = TableRecorder(tmp_path / "steps.parquet", METHODS, clock=itertools.count().__next__)
-    for index, speed in ((0, 1.0), (1, 2.0), (2, 3.0), (1, 4.0), (2, 5.0), (3, 6.0)):
-        step = make_step(index, speed=speed)
-        recorder.record(step, step_metrics(step))
-    recorder.close(complete=True)
-    table = pq.read_table(tmp_path / "steps.parquet")
-    assert table["index"].to_pylist() == [0, 1, 2, 3]
-    assert table["speed_mps"].to_pylist() == [1.0, 4.0, 5.0, 6.0]
-
-
-def test_a_log_without_a_head_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "steps.arrows").write_bytes(b"\xff\xff")
-    with pytest.raises(InputError, match="holds no rows that can be read"):
-        read_rows(tmp_path / "steps.arrows")
 
 
 def test_equal_steps_give_equal_bytes(tmp_path: Path) -> None:

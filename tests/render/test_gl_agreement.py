@@ -107,8 +107,7 @@ def test_on_the_motorway(motorway: Pair, route: np.ndarray) -> None:
             assert {0, 1, 2, 3} <= set(np.unique(view.instance))
 
 
-@pytest.mark.parametrize("camera", [LARGE, SMALL], ids=["large", "small"])
-@pytest.mark.parametrize("gap", [4.0, 30.0])
+@pytest.mark.parametrize(("camera", "gap"), [(LARGE, 30.0), (SMALL, 4.0)])
 def test_with_a_truck_ahead_and_others_beside(motorway: Pair, route: np.ndarray, camera: Camera, gap: float) -> None:
     ahead = {100.0 + gap + 16.5: ("truck", 0.0), 120.0: ("car", 3.5), 140.0: ("van", -3.5), 200.0: ("bus", 3.5)}
     view = assert_same(motorway, vehicles_at(route, ahead), camera, pose_at(route, 100.0))

@@ -27,7 +27,7 @@ def run(*arguments: str, **environment: str) -> str:
 
 
 @pytest.mark.usefixtures("_opengl")
-# Fork with cpu and spawn with opengl draw below, where the parent drew first.
+# Fork with cpu draws below, where the parent drew first.
 @pytest.mark.parametrize(
     ("method", "renderer"),
     [
@@ -48,6 +48,7 @@ def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> N
     assert "parent draws on" in said
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("_opengl")
 def test_workers_that_are_spawned_after_the_parent_drew_draw() -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "opengl", "--draw-first")

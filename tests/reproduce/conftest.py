@@ -1,10 +1,8 @@
-"""Evaluations are nightly, except those that take seconds."""
+"""Evaluations are nightly."""
 
 import pytest
 
-QUICK = {"test_drivers", "test_huang2015"}
-
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    if "done" in getattr(item, "fixturenames", ()) and item.path.stem not in QUICK:
+    if "done" in getattr(item, "fixturenames", ()):
         item.add_marker(pytest.mark.nightly)

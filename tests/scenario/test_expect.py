@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.conditions import Always, Happened, MetricCheck, Whenever
 from fogsim.errors import InputError
-from fogsim.expectations import Always, Happened, MetricCheck, Whenever
 from fogsim.scenario import Scenario, load_scenario, override, resolved
 from fogsim.scenario.expect.schema import clauses_of
 

@@ -36,14 +36,6 @@ def test_by_name_file_and_folder(folder: Path) -> None:
     assert resolved(by_file) == resolved(load_scenario("motorway_fog_bank"))
 
 
-def test_an_unknown_key_names_file_line_key_and_the_nearest(folder: Path) -> None:
-    file = spoil(folder, "pitch_deg:", "pich_deg:")
-    line = 1 + file.read_text(encoding="utf-8").splitlines().index("  pich_deg: 2")
-    with pytest.raises(InputError) as error:
-        load_scenario(file)
-    assert str(error.value).startswith(f"{file}:{line}: camera.pich_deg: unknown key; did you mean 'pitch_deg'?")
-
-
 @pytest.mark.parametrize(
     ("settings", "nearest"),
     [
@@ -74,12 +66,6 @@ def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
     assert attached_scenario("ego", [*clocks, "fog.visibility_m=80"]).clocks.traffic_step_s == 1 / 15
 
 
-def test_an_unknown_key_inside_a_list(folder: Path) -> None:
-    file = spoil(folder, "edge_m:", "edges_m:")
-    with pytest.raises(InputError, match=r"fog\.banks\.0\.edges_m: unknown key; did you mean 'edge_m'\?"):
-        load_scenario(file)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -88,8 +74,6 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         ("duration_s: 200", "duration_s: -1", r"duration_s: input should be greater than or equal to 0\.001; got -1"),
         ("duration_s: 200", "duration_s: yes", r"duration_s: input should be a valid number; got True"),
         ("duration_s: 200", "duration_s: '200'", r"duration_s: input should be a valid number; got '200'"),
-        ("duration_s: 200", "duration_s: 1:30", r"duration_s: input should be a valid number; got '1:30'"),
-        ("duration_s: 200", "duration_s: 2026-11-22", r"duration_s: input should be a valid number; got '2026-11-22'"),
         (
             "duration_s: 200",
             "duration_s: 1e308",
@@ -168,43 +152,6 @@ def test_every_missing_file_is_told(folder: Path) -> None:
     assert "traffic.additional.0: there is no file 'signs.ad.xml'" in signs
 
 
-def test_no_second_message_follows_a_mistake(folder: Path) -> None:
-    with pytest.raises(InputError) as error:
-        load_scenario(spoil(folder, "[joint_road,", "[joint_rode,"))
-    assert len(str(error.value).splitlines()) == 1
-
-
-def test_every_mistake_is_told_at_once(folder: Path) -> None:
-    spoil(folder, "pitch_deg:", "pich_deg:")
-    file = spoil(folder, "duration_s: 200", "duration_s: -1")
-    with pytest.raises(InputError) as error:
-        load_scenario(file)
-    assert len(str(error.value).splitlines()) == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("a: [1, 2", "not valid YAML"),
-        ("just words", "expected a mapping of keys to values, got str"),
-        ("", "expected a mapping of keys to values, got NoneType"),
-        ("name: a\nname: b\n", "name: duplicate key, first on line 1"),
-    ],
-)
-def test_what_is_no_scenario_at_all(tmp_path: Path, text: str, message: str) -> None:
-    file = tmp_path / "scenario.yaml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=message):
-        load_scenario(file)
-
-
-def test_a_file_that_is_not_text(tmp_path: Path) -> None:
-    file = tmp_path / "scenario.yaml"
-    file.write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(InputError, match="expected UTF-8 text"):
-        load_scenario(file)
-
-
 def test_unknown_scenarios() -> None:
     with pytest.raises(
         UnknownNameError, match=r"unknown scenario 'motorway_fog_bnk'; did you mean 'motorway_fog_bank'"
@@ -232,30 +179,14 @@ def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
     assert scenario.camera.width == 320
 
 
-def test_an_unknown_override_is_told_like_an_unknown_key() -> None:
-    with pytest.raises(InputError) as error:
-        load_scenario("motorway_fog_bank", ["fog.visibilty_m=80"])
-    assert str(error.value).startswith(
-        "--set fog.visibilty_m=80: fog.visibilty_m: unknown key; did you mean 'visibility_m'?"
-    )
-    with pytest.raises(
-        InputError, match=r"^--set fog\.banks\.0\.edge_m=-1: fog\.banks\.0\.edge_m: .*greater than or equal"
-    ):
-        load_scenario("motorway_fog_bank", ["fog.banks.0.edge_m=-1"])
-
-
 @pytest.mark.parametrize("text", ["fog.visibility_m", "=3", "fog..x=1", "a=[1"])
 def test_overrides_that_are_none(text: str) -> None:
     with pytest.raises(InputError, match="--set"):
         parse_override(text)
 
 
-def test_overrides_that_lead_nowhere() -> None:
+def test_overrides_change_a_copy() -> None:
     data = {"name": "x", "list": [1, 2]}
-    with pytest.raises(InputError, match="list is a list of 2"):
-        apply_overrides(data, ["list.5=3"])
-    with pytest.raises(InputError, match="single value"):
-        apply_overrides(data, ["name.first.second=3"])
     assert apply_overrides(data, ["list.1=7"]) == {"name": "x", "list": [1, 7]}
     assert data == {"name": "x", "list": [1, 2]}
 
@@ -307,7 +238,7 @@ def test_a_kind_of_driver_stands_for_all_and_a_kind_of_advice_for_keys_that_are_
 
 def test_who_sees_through_fog_drives_as_in_clear_air_unless_told_otherwise() -> None:
     def choice(*overrides: str) -> str:
-        return load_scenario("motorway_fog_bank", overrides).drivers.speed_choice
+        return load_scenario("motorway_fog_bank", overrides).drivers.speed_choice.method
 
     assert choice() == "observed"
     assert choice("drivers.see_through_fog=true") == "unaffected"

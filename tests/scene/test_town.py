@@ -1,5 +1,6 @@
 """Traffic lights and persons as they are drawn."""
 
+import contextlib
 import dataclasses
 import math
 from pathlib import Path
@@ -183,12 +184,9 @@ def test_a_picture_of_a_crossing_shows_its_light_and_who_walks_there() -> None:
     )
     persons = dataclasses.replace(walking("anna"), position=np.array([[x - 2.0, y + 3.0, 0.0]]))
     pose = CameraPose((x - 25.0, y + 3.0, 1.4), 0.0)
-    renderer = make_renderer("cpu", scene, 1e4)
-    try:
+    with contextlib.closing(make_renderer("cpu", scene, 1e4)) as renderer:
         view = renderer.render((*signal_batches(signals, 0.0), *person_batches(persons)), CAMERA, pose)
         bare = renderer.render((), CAMERA, pose)
-    finally:
-        renderer.close()
     lit = (view.instance == Instance.TRAFFIC_LIGHT) & (view.radiance[..., 0] > 4.0 * view.radiance[..., 1])
     assert lit.sum() >= 3
     assert view.radiance[lit].max() == pytest.approx(lamp_radiance(Surface.LENS_RED)[0], rel=0.05)

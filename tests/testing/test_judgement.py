@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from scipy.stats import binomtest
 
-from fogsim.expectations import Finding, FindingVerdict
+from fogsim.conditions import Finding, FindingVerdict
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest

@@ -1,5 +1,6 @@
 """A SUMO configuration of somebody else's: junctions, traffic lights, and what can go wrong with an ego in it."""
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -107,12 +108,9 @@ def test_a_configuration_without_vehicles_is_told(tmp_path: Path) -> None:
 
 def test_a_teleport_takes_the_ego_off_the_road(tmp_path: Path) -> None:
     """It waits at a red light, longer than this configuration lets anybody wait."""
-    impatient = town(configuration(tmp_path, '<time-to-teleport value="3"/>'))
-    impatient.start(1)
-    try:
+    with contextlib.closing(town(configuration(tmp_path, '<time-to-teleport value="3"/>'))) as impatient:
+        impatient.start(1)
         last = seen_to_the_end(impatient)[-1]
-    finally:
-        impatient.close()
     assert last.state.speed[last.ego] == pytest.approx(0.0, abs=0.1)
     assert last.route_position < last.route_length - 100.0
 
@@ -121,11 +119,8 @@ def test_the_ego_may_appear_late_in_a_simulation_that_begins_late(tmp_path: Path
     """The time that is waited for it counts from the beginning, not from SUMO's zero."""
     routes = tmp_path / "late.rou.xml"
     routes.write_text('<routes><trip id="veh" depart="90010" from="C0B0" to="B0A0"/></routes>', encoding="utf-8")
-    late = town(configuration(tmp_path, '<begin value="90000"/>', routes=routes), "veh")
-    late.start(1)
-    try:
+    with contextlib.closing(town(configuration(tmp_path, '<begin value="90000"/>', routes=routes), "veh")) as late:
+        late.start(1)
         snapshot = late.observe()
-    finally:
-        late.close()
     assert snapshot is not None
     assert snapshot.state.time == pytest.approx(90010, abs=0.2)

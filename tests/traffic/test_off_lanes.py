@@ -1,5 +1,6 @@
 """Vehicles off the lanes: parked, waiting as taxis, or moved beside the road by another simulator."""
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -151,12 +152,9 @@ ARGUMENTS = ("-c", str(CASES / "two.sumocfg"), "--step-length", "0.1", "--no-ste
 
 
 def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
-    library = load_libsumo()
-    library.start(["sumo", *ARGUMENTS])
-    try:
+    with contextlib.closing(load_libsumo()) as library:
+        library.start(["sumo", *ARGUMENTS])
         check_moved(moved(library, library))
-    finally:
-        library.close()
 
 
 def test_it_is_read_over_a_connection_too(sumo_process: Callable[..., Any]) -> None:
@@ -185,28 +183,22 @@ def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_p
 
 def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
     command = Command(advice=SpeedAdvice(6.0), advised_speeds={"parked1": 6.0}, advice_reach=math.inf)
-    traffic = libsumo_traffic(build.traffic_setup(scenario("park", "ego")))
-    traffic.enter_fog(even(60.0))
-    traffic.start(0)
-    try:
+    with contextlib.closing(libsumo_traffic(build.traffic_setup(scenario("park", "ego")))) as traffic:
+        traffic.enter_fog(even(60.0))
+        traffic.start(0)
         speeds = [float(one.state.speed[one.ego]) for one in driven(traffic, 600, command)]
         get = load_libsumo().vehicle
         assert 0.0 < get.getMaxSpeed("parked1") <= get.getMaxSpeed("behind") <= 60.0
-    finally:
-        traffic.close()
     assert speeds[400] == pytest.approx(0.0)
     assert speeds[-1] == pytest.approx(6.0, abs=0.1)
 
 
 def test_a_script_changes_no_lane_and_departs_no_vehicle_beside_a_parked_one() -> None:
-    traffic = libsumo_traffic(build.traffic_setup(scenario("park", "ego")))
-    traffic.start(0)
-    try:
+    with contextlib.closing(libsumo_traffic(build.traffic_setup(scenario("park", "ego")))) as traffic:
+        traffic.start(0)
         change = ChangeLane("parked1", 1)
         joins = Depart("new", like="parked1", gap=30.0, speed=5.0)
         assert traffic.begin([change, joins]) == (change, joins)
-    finally:
-        traffic.close()
 
 
 def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
@@ -219,10 +211,7 @@ def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
         scenario_from_config(config, "ego", BLIND)
     with pytest.raises(InputError, match=told.removeprefix("mesosim: ")):
         scenario("two", "ego", 60.0, "traffic.sumo_options.mesosim=true")
-    library = load_libsumo()
-    library.start(["sumo", *ARGUMENTS, "--mesosim"])
-    try:
+    with contextlib.closing(load_libsumo()) as library:
+        library.start(["sumo", *ARGUMENTS, "--mesosim"])
         with pytest.raises(SimulationError, match=told):
             fogsim.attach(library, ego="ego", visibility=120.0)
-    finally:
-        library.close()

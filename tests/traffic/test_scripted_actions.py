@@ -1,5 +1,6 @@
 """Actions of a script in SUMO: what is asked for is driven, shown and given back."""
 
+import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -158,8 +159,7 @@ def lights(tmp_path: Path) -> SumoTraffic:
 
 
 def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:
-    traffic = lights(tmp_path)
-    try:
+    with contextlib.closing(lights(tmp_path)) as traffic:
         traffic.start(1)
         get = load_libsumo().trafficlight
         program, state = get.getProgram("C"), get.getRedYellowGreenState("C")
@@ -182,8 +182,6 @@ def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:
             action: TrafficAction = wrong
             with pytest.raises(InputError, match=told):
                 traffic.begin([action])
-    finally:
-        traffic.close()
 
 
 def test_without_actions_a_run_is_as_before(motorway: SumoTraffic) -> None:

@@ -99,11 +99,8 @@ def test_sumo_gui_runs_the_same_traffic_begins_anew_and_closes_at_the_end(
     again = drive(traffic)
     traffic.close()
     assert process.wait(60) == 0
-    here = libsumo_traffic(SETUP)
-    try:
+    with contextlib.closing(libsumo_traffic(SETUP)) as here:
         here.start(1)
         expected = drive(here)
-    finally:
-        here.close()
     assert alike(first, expected)
     assert alike(again, expected)

@@ -1,5 +1,6 @@
 """What SUMO's own outputs say of a run is what FogSim's metrics of everybody say: SSM device, trips, collisions."""
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -22,6 +23,7 @@ from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.traffic import DriverSetup
+from fogsim.traffic.drivers.speed_choice import unaffected
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import SumoTraffic
@@ -138,13 +140,12 @@ def play(
     folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None], additional: tuple[Path, ...] = ()
 ) -> Run:
     """The vehicles of ``road.rou.xml`` on a network, for so many steps before each of which something may happen."""
-    drivers = DriverSetup(speed_choice="unaffected")
+    drivers = DriverSetup(unaffected)
     changes = {"routes": (folder / "road.rou.xml",), "additional": additional, "keep_lane": (), "drivers": drivers}
     setup = replace(SETUP, net=net, reading_radius=LENGTH, **changes)
     link = WithOutputs(folder)
-    traffic = SumoTraffic(setup, link)
-    states, collisions, emitted = [], [], []
-    try:
+    with contextlib.closing(SumoTraffic(setup, link)) as traffic:
+        states, collisions, emitted = [], [], []
         traffic.start(1)
         for number in range(steps):
             disturb(link.api, number)
@@ -154,8 +155,6 @@ def play(
             states.append(snapshot.state)
             collisions += snapshot.collisions
             emitted.append(emissions(link.api, snapshot.state))
-    finally:
-        traffic.close()
     return Run(states, collisions, emitted, folder)
 
 

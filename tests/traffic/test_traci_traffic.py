@@ -14,6 +14,7 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, libsumo_traffic, traci_traffic
+from fogsim.traffic.drivers.speed_choice import too_fast
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
@@ -40,11 +41,8 @@ def drive(traffic: Traffic, seed: int, steps: int = 40) -> list[TrafficSnapshot]
 
 @pytest.fixture(scope="module")
 def in_process() -> list[TrafficSnapshot]:
-    traffic = libsumo_traffic(SETUP)
-    try:
+    with contextlib.closing(libsumo_traffic(SETUP)) as traffic:
         return drive(traffic, 1)
-    finally:
-        traffic.close()
 
 
 @pytest.fixture
@@ -59,18 +57,15 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
     link: TraciLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What drivers see comes with the steps: far less than a message a vehicle and step."""
-    setup = replace(SETUP, sight=DriverSight(10_000.0), drivers=DriverSetup("too_fast"))
+    setup = replace(SETUP, sight=DriverSight(10_000.0), drivers=DriverSetup(too_fast))
     fog = FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0)))
 
     def in_fog(traffic: Traffic) -> list[TrafficSnapshot]:
         traffic.enter_fog(fog)
         return drive(traffic, 1, steps=120)
 
-    here = libsumo_traffic(setup)
-    try:
+    with contextlib.closing(libsumo_traffic(setup)) as here:
         expected = in_fog(here)
-    finally:
-        here.close()
     messages = 0
     send = traci.connection.Connection._sendExact
 

@@ -1,5 +1,6 @@
 """What of a script was not played, and why."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +33,12 @@ def test_sumo_tells_what_came_of_a_script() -> None:
         "{kind: brake, vehicle: veh0, at_position_m: 5000}",
         "{kind: break_down, vehicle: veh99, at_time_s: 1, lamps: false}",
     )
-    traffic = town(f"traffic.events=[{', '.join(events)}]", "traffic.keep_lane=[veh0, veh99, veh98]")
-    try:
+    with contextlib.closing(
+        town(f"traffic.events=[{', '.join(events)}]", "traffic.keep_lane=[veh0, veh99, veh98]")
+    ) as traffic:
         for _ in range(10):
             traffic.advance(Command())
         told = traffic.unplayed()
-    finally:
-        traffic.close()
     assert [(event.name, event.reason) for event in told.events] == [
         (f"traffic.events.1 (change_lane of {EGO} at_time_s=0.5)", Reason.NO_LANE),
         (f"traffic.events.2 (change_lane of {EGO} at_time_s=0.5)", Reason.NO_LANE),
@@ -55,14 +55,13 @@ def test_sumo_changes_to_a_lane_that_is_there() -> None:
     assert snapshot is not None
     lane = int(snapshot.state.lane[snapshot.ego][-1])
     to_the_other = 1 if lane == 0 else -1
-    traffic = town(f"traffic.events=[{{kind: change_lane, vehicle: {EGO}, lanes: {to_the_other}, at_time_s: 0}}]")
-    try:
+    with contextlib.closing(
+        town(f"traffic.events=[{{kind: change_lane, vehicle: {EGO}, lanes: {to_the_other}, at_time_s: 0}}]")
+    ) as traffic:
         for _ in range(5):
             traffic.advance(Command())
         assert not traffic.unplayed()
         moved = traffic.observe()
-    finally:
-        traffic.close()
     assert moved is not None
     assert int(moved.state.lane[moved.ego][-1]) == lane + to_the_other
 

@@ -1,5 +1,6 @@
 """What a user's own SUMO configuration says: who could be the ego, when it ends, what SUMO warns of; odd networks."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -120,13 +121,10 @@ def test_where_nobody_suits_any_ego_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_ego_of_an_outer_simulation_must_be_named() -> None:
-    library = load_libsumo()
-    library.start(["sumo", "-c", str(DATA / "two.sumocfg"), "--no-step-log"])
-    try:
+    with contextlib.closing(load_libsumo()) as library:
+        library.start(["sumo", "-c", str(DATA / "two.sumocfg"), "--no-step-log"])
         with pytest.raises(InputError, match="ego: any: FogSim can choose only in its own simulation; name a vehicle"):
             fogsim.attach(library, ego="any", visibility=120.0)
-    finally:
-        library.close()
 
 
 def test_a_lane_of_no_length_before_a_light_is_read_and_driven_on(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ class OwnDriver:
     """A driver who goes by the advice, or by an own choice of speed where that is lower."""
 
     def __init__(self, choice: str) -> None:
-        self._choice = SPEED_CHOICES[choice]
+        self._choice = SPEED_CHOICES[choice]()
 
     def follow(self, command: Command, step: Step) -> Command:
         """Command that the vehicle gets."""

@@ -13,8 +13,8 @@ from fogsim.atmosphere.fog.koschmieder_kernels import BankedFog, fog_rows
 from fogsim.atmosphere.fog.layer_airlight import LayeredFog, layered_fog_rows, slant_airlight
 from fogsim.atmosphere.fog.medium import find_pixels_within, has_closed_form
 from fogsim.core.jit import Bands, kernel
-from fogsim.obstruction import Obstructions, Tunnel
 from fogsim.values import Camera, CameraPose, FogBank, FogField, FogShelter, View
+from fogsim.values.obstruction import Obstructions, Tunnel
 from fogsim.values.pinhole import ray_from_pixel
 
 _COARSEST = 2.0

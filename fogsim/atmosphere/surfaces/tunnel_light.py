@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.medium import FARTHEST, ray
 from fogsim.core.jit import kernel
-from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, View
+from fogsim.values.obstruction import Tunnel
 from fogsim.values.pinhole import ray_from_pixel
 
 _Array = NDArray[np.float64]

@@ -47,7 +47,7 @@ def restore_command(
     from fogsim.offline import find_source, load_calibration, straightened
     from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
     from fogsim.offline.source import ImageFiles
-    from fogsim.restoration import MOST_GAIN
+    from fogsim.vision.restoration import MOST_GAIN
 
     light = None if airlight is None else pixel_values(airlight)
     gain = MOST_GAIN if most_gain is None else most_gain

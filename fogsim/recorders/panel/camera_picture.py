@@ -9,10 +9,10 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders.sign_marks import draw_signs, sign_looks
 from fogsim.recorders.style import AMBER, BELIEF, GROUND, Colour, font
-from fogsim.restoration import restore_contrast
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate, Frame, Observation, Step
 from fogsim.values.camera_response import eight_bit
+from fogsim.vision.restoration import restore_contrast
 
 WIDTH, HEIGHT = 640, 480
 _ROWS: dict[str, tuple[str, Colour]] = {

@@ -110,6 +110,9 @@ _BANNER_TIME = 3.0
 _NEWS = 30.0
 """Age up to which a report is drawn [s]."""
 
+_CHART_HEIGHT = 92
+"""Of visibilities [px]."""
+
 _MOST_METHODS = 4
 """Estimators for which there is a line."""
 
@@ -135,15 +138,9 @@ class FramePanel:
 
     def __init__(self, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture) -> None:
         self._draw_picture = draw_picture
-        width = _RIGHT - _LEFT
-        self._visibility = StripChart(
-            (width, 92),
-            _VISIBILITY_AXIS,
-            (Curve(BELIEF_BAND, (1, 2)), Curve(BELIEF, (0,)), Curve(TRUTH, (3,), dashed=True)),
-            "visibility, last 60 s [m]",
-        )
+        self._visibility: StripChart | None = None
         self._speed = StripChart(
-            (width, 70), _SPEED_AXIS, (Curve(ADVICE, (1,)), Curve(TEXT, (0,))), "speed and advice [km/h]"
+            (_RIGHT - _LEFT, 70), _SPEED_AXIS, (Curve(ADVICE, (1,)), Curve(TEXT, (0,))), "speed and advice [km/h]"
         )
         self._collision: Collision | None = None
         self._reports: list[FogReport] = []
@@ -168,18 +165,19 @@ class FramePanel:
 
     def _draw_charts(self, frame: Image.Image, step: Step) -> None:
         low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
+        profile = step.belief.profile
+        # Next to a chart of the road ahead there is room for half a chart of the last minute.
+        left = _LEFT if profile is None else (_LEFT + _RIGHT) // 2
+        if self._visibility is None:
+            self._visibility = _visibility_chart(_RIGHT - left)
         self._visibility.add(step.time, (middle, low, high, step.truth.visibility_ahead))
         advised = step.command.advice.speed
         self._speed.add(step.time, (_kmh(_speed(step)), _kmh(advised) if math.isfinite(advised) else None))
-        chart = self._visibility.draw()
-        if step.belief.profile is not None:
-            # The road ahead takes the place of the older half of the last minute.
-            half = chart.width // 2
-            chart = chart.copy()
-            size = (half - 8, chart.height)
-            believed, true = step.belief.profile, step.truth.profile
-            chart.paste(_draw_profile(size, _VISIBILITY_AXIS, believed, true, self._reported(step)), (0, 0))
-        frame.paste(chart, (_LEFT, 300))
+        frame.paste(self._visibility.draw(), (left, 300))
+        if profile is not None:
+            size = (left - _LEFT - 8, _CHART_HEIGHT)
+            ahead = _draw_profile(size, _VISIBILITY_AXIS, profile, step.truth.profile, self._reported(step))
+            frame.paste(ahead, (_LEFT, 300))
         frame.paste(self._speed.draw(), (_LEFT, 398))
 
     def _reported(self, step: Step) -> list[tuple[float, float]]:
@@ -201,6 +199,11 @@ class FramePanel:
             _draw_banner(draw, 0, f"denser fog ahead: {step.belief.denser.distance:.0f} m", WELL)
         if step.ending is not None:
             _draw_banner(draw, FRAME_HEIGHT - 34, f"end of the run: {step.ending.value}", WELL)
+
+
+def _visibility_chart(width: int) -> StripChart:
+    curves = (Curve(BELIEF_BAND, (1, 2)), Curve(BELIEF, (0,)), Curve(TRUTH, (3,), dashed=True))
+    return StripChart((width, _CHART_HEIGHT), _VISIBILITY_AXIS, curves, "visibility, last 60 s [m]")
 
 
 def _warning_text(step: Step, warning: DriverWarning) -> str:
@@ -273,12 +276,13 @@ def _draw_limit(draw: ImageDraw.ImageDraw, limit: float) -> None:
 def _draw_visibilities(draw: ImageDraw.ImageDraw, step: Step) -> None:
     low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
     _draw_visibility(draw, 150, "belief", BELIEF, (_metres(middle), f"{_metres(low)} – {_metres(high)}"), 15)
-    y = 168
+    y = 170
     shown = step.estimates if len(step.estimates) <= _MOST_METHODS else step.estimates[: _MOST_METHODS - 1]
+    spacing = 17 if len(step.estimates) < _MOST_METHODS else 13
     colours = method_colours([estimate.method for estimate in step.estimates])
     for estimate in shown:
         _draw_visibility(draw, y, estimate.method, colours[estimate.method], _say_estimate(estimate), 12)
-        y += 14
+        y += spacing
     if len(shown) < len(step.estimates):
         draw.text((_LEFT, y), f"and {len(step.estimates) - len(shown)} more", fill=MUTED, font=font(11), anchor="ls")
     _draw_visibility(

@@ -140,6 +140,7 @@ def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row,
 
 
 _UNUSED = 2  # references to an array that only its list and the question itself hold
+_COUNTS_REFERENCES = hasattr(sys, "getrefcount")
 _MOST = 8  # arrays of a size that are kept
 
 
@@ -160,8 +161,8 @@ class Memory:
             if len(self._arrays) > _MOST:
                 self._arrays.clear()
             arrays = self._arrays[shape] = []
-        for number in range(len(arrays)):
-            if hasattr(sys, "getrefcount") and sys.getrefcount(arrays[number]) == _UNUSED:
+        for number in range(len(arrays)) if _COUNTS_REFERENCES else ():
+            if sys.getrefcount(arrays[number]) == _UNUSED:
                 return arrays[number].view(kind)
         array = np.empty(shape, np.int32)
         if len(arrays) < _MOST:

@@ -7,11 +7,23 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from fogsim.conditions import EGO, Condition, Limits, mended, outcomes, pointless_parts
+from fogsim.conditions import (
+    EGO,
+    Always,
+    Clause,
+    Condition,
+    Eventually,
+    Happened,
+    Limits,
+    MetricCheck,
+    Whenever,
+    mended,
+    outcomes,
+    pointless_parts,
+)
 from fogsim.conditions.logic import compared
 from fogsim.conditions.parsing import OPERATORS
 from fogsim.errors import shown
-from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Flag, Id, Section, Time, Whole

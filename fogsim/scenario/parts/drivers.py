@@ -3,8 +3,10 @@
 import dataclasses
 
 from fogsim.scenario.drivers_schema import ComplianceSection
+from fogsim.scenario.parts.methods import method
 from fogsim.scenario.schema import ScenarioFile
-from fogsim.traffic import Compliance, DriverSetup, DriverSight
+from fogsim.traffic import SPEED_CHOICES, Compliance, DriverSetup, DriverSight
+from fogsim.traffic.drivers.speed_choice import CheckedChoice, SpeedChoice
 from fogsim.values import Display
 
 
@@ -33,13 +35,20 @@ def driver_setup(scenario: ScenarioFile) -> DriverSetup:
         reached = drivers.equipped_share * in_car.reached_share
         by_display[Display.IN_CAR] = dataclasses.replace(in_car, reached_share=reached)
     return DriverSetup(
-        speed_choice=drivers.speed_choice,
+        speed_choice=_speed_choice(scenario),
         spread=drivers.speed_spread,
         compliance=compliance,
         misjudgement=drivers.distance_misjudgement,
         following=drivers.following,
         compliance_by_display=by_display,
     )
+
+
+def _speed_choice(scenario: ScenarioFile) -> SpeedChoice:
+    """How fast drivers drive in fog; results of a user's class are checked."""
+    written = scenario.drivers.speed_choice
+    made = method(scenario, written).make(SPEED_CHOICES)
+    return made if type(made) in SPEED_CHOICES.values() else CheckedChoice(written.method, made)
 
 
 def _compliance(written: ComplianceSection) -> Compliance:

@@ -2,7 +2,7 @@
 
 import math
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
@@ -13,7 +13,15 @@ from fogsim.scenario.drivers_schema import Harmonisation as WrittenHarmonisation
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import Method
 from fogsim.simulation import chosen_methods
-from fogsim.simulation.run_config import NO_RENDERER, AdviceConfig, Harmonisation, SectionsConfig, check_ego
+from fogsim.simulation.run_config import (
+    NO_RENDERER,
+    AdviceConfig,
+    ControllerConfig,
+    Harmonisation,
+    SectionsConfig,
+    check_ego,
+)
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Display, Stretch, StretchAdvice
 
@@ -41,8 +49,11 @@ def own_methods(scenario: ScenarioFile) -> dict[str, str]:
         **{one.method: ESTIMATORS.version(one.method, folder) for one in (*scenario.estimators, *beside_road)},
         scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
         scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
+        scenario.drivers.speed_choice.method: SPEED_CHOICES.version(scenario.drivers.speed_choice.method, folder),
         scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),
     }
+    if scenario.controller is not None:
+        found[scenario.controller.method] = CONTROLLERS.version(scenario.controller.method, folder)
     return {name: version for name, version in found.items() if version is not None}
 
 
@@ -63,6 +74,21 @@ def advice_config(scenario: ScenarioFile) -> AdviceConfig:
         reach=scenario.traffic.reading_radius_m if drivers.advised == "all" else 0.0,
         stretch=StretchAdvice(math.inf, on_stretch, stretch.display) if drivers.advised == "stretch" else None,
         sections=sections_config(scenario),
+    )
+
+
+def controller_config(scenario: ScenarioFile) -> ControllerConfig | None:
+    """The controller in the ego, and what its actuators can do; None without one."""
+    written = scenario.controller
+    if written is None:
+        return None
+    return ControllerConfig(
+        method(scenario, written),
+        scenario.driver or "none",
+        written.delay_s,
+        written.lag_s,
+        written.braking_mps2,
+        written.accelerating_mps2,
     )
 
 

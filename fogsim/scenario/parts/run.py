@@ -1,7 +1,7 @@
 """From a scenario to the plain values that a run is made of; units of files become SI and radians in these parts."""
 
 from fogsim.scenario.parts.clocks import periods
-from fogsim.scenario.parts.methods import advice_config, method
+from fogsim.scenario.parts.methods import advice_config, controller_config, method
 from fogsim.scenario.parts.script import script
 from fogsim.scenario.parts.sensors import camera_config, reports_config, sensors_config
 from fogsim.scenario.parts.traffic import traffic_setup
@@ -22,6 +22,7 @@ def run_config(scenario: ScenarioFile) -> RunConfig:
         estimators=tuple(method(scenario, one) for one in scenario.estimators),
         fusion=method(scenario, scenario.fusion),
         advice=advice_config(scenario),
+        controller=controller_config(scenario),
         script=script(scenario),
         periods=periods(scenario),
         equipped_share=traffic.equipped,

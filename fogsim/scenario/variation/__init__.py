@@ -13,13 +13,16 @@ from fogsim.scenario.variation.cases import (
     with_case,
 )
 from fogsim.scenario.variation.grid import MOST_RUNS, grid_mistake
-from fogsim.scenario.variation.levels import number_with_unit
+from fogsim.scenario.variation.levels import Draws, SeedLevels, Value, number_with_unit
 
 __all__ = [
     "KEYS",
     "MOST_RUNS",
     "NONE_FAILS",
     "Case",
+    "Draws",
+    "SeedLevels",
+    "Value",
     "Variation",
     "VariationKeys",
     "Verdict",

@@ -17,7 +17,18 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
 from fogsim.scenario.variation.grid import grid_mistake
-from fogsim.scenario.variation.levels import FileLevels, LevelsError, SeedLevels, Value, Values, parse_levels
+from fogsim.scenario.variation.levels import (
+    Draws,
+    FileLevels,
+    Levels,
+    LevelsError,
+    SeedLevels,
+    Value,
+    Values,
+    number_with_unit,
+    parse_levels,
+    parse_space,
+)
 from fogsim.units.quantities import split_quantity
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
@@ -53,6 +64,9 @@ class VariationKeys(Section):
 
     vary: dict[str, Any] = Field(default_factory=dict)
     """What differs between the cases of the file: a name and its values; ``$name`` stands for them elsewhere."""
+
+    space: dict[str, Any] = Field(default_factory=dict)
+    """What `fogsim campaign` draws: a name and its distribution, or `seeds`; elsewhere the median stands for it."""
 
     verdict: Verdict = NONE_FAILS
     """When all cases together pass; without it, when none fails."""
@@ -97,6 +111,12 @@ class Variation:
     cases: tuple[Case, ...]
     varied: Mapping[str, Values] = field(default_factory=dict)
     verdict: Verdict = NONE_FAILS
+    space: Mapping[str, Draws | SeedLevels] = field(default_factory=dict)
+
+    def drawn_case(self, case: Case, drawn: Mapping[str, Value], seed: int) -> Case:
+        """A case with other values of the space, and a seed where the space has one."""
+        names = [name for name, values in self.space.items() if isinstance(values, SeedLevels)]
+        return Case({**case.values, **drawn, **dict.fromkeys(names, seed)}, seed if names else case.seed)
 
 
 def read_variation(document: Document) -> Variation:
@@ -108,13 +128,20 @@ def read_variation(document: Document) -> Variation:
         raise InputError(mistake_lines(document, VariationKeys, error)) from error
     if document.cases:
         return _of_file(document, keys)
-    if not keys.vary:
+    if not keys.vary and not keys.space:
         if "verdict" in written:
             where = document.where(("verdict",))
             raise InputError(f"{where}: verdict: goes with vary, since it is about several cases")
         return Variation((Case({}),))
     varied, mistakes = _parsed(document, keys.vary)
-    mistakes += _misplaced(document, keys.vary, varied)
+    space, further = _parsed_space(document, keys)
+    # Without a campaign the median stands for a distribution.
+    for name, values in space.items():
+        if isinstance(values, Draws):
+            varied[name] = Levels((number_with_unit(values.quantile(0.5), values.unit),))
+        else:
+            varied[name] = values
+    mistakes += further + _misplaced(document, {**keys.vary, **keys.space}, varied)
     if mistakes:
         raise InputError("\n".join(mistakes))
     try:
@@ -122,14 +149,14 @@ def read_variation(document: Document) -> Variation:
     except LevelsError as error:
         raise InputError(f"{document.where(('vary',))}: vary: {error}") from error
     _check_reachable(document, keys.verdict, len(cases))
-    return Variation(cases, varied, keys.verdict)
+    return Variation(cases, varied, keys.verdict, space)
 
 
 def _of_file(document: Document, keys: VariationKeys) -> Variation:
     """Cases of an OpenSCENARIO file that varies the parameters of another; random test runs have their numbers."""
-    if keys.vary:
-        where = document.where(("vary",))
-        raise InputError(f"{where}: vary: the OpenSCENARIO file varies parameters itself; leave this out")
+    for key in [name for name in ("vary", "space") if getattr(keys, name)]:
+        where = document.where((key,))
+        raise InputError(f"{where}: {key}: the OpenSCENARIO file varies parameters itself; leave this out")
     run = next(name for name in ("run", "test_run", "number") if name not in document.cases[0])
     cases = tuple(
         Case({run: seed, **values} if document.are_runs else values, seed if document.are_runs else 0)
@@ -161,6 +188,22 @@ def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, V
             for name in drawn
         ]
     return varied, mistakes
+
+
+def _parsed_space(document: Document, keys: VariationKeys) -> tuple[dict[str, Draws | SeedLevels], list[str]]:
+    space: dict[str, Draws | SeedLevels] = {}
+    mistakes = []
+    for name, value in keys.space.items():
+        at: KeyPath = ("space", name)
+        if name in keys.vary:
+            mistakes.append(f"{document.where(at)}: {dotted(at)}: vary has {name} already")
+            continue
+        try:
+            space[name] = parse_space(name, value)
+        except LevelsError as mistake:
+            at = (*at, *mistake.below)
+            mistakes.append(f"{document.where(at)}: {dotted(at)}: {mistake}")
+    return space, mistakes
 
 
 def _misplaced(document: Document, named: Mapping[str, object], varied: Mapping[str, Values]) -> list[str]:

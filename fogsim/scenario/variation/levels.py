@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from scipy.special import ndtr, ndtri
+
 from fogsim.core.randomness import named_generator
 from fogsim.errors import shown, suggest
 from fogsim.units.quantities import split_quantity
@@ -17,6 +19,7 @@ _SEEDS = re.compile(r"\s*([0-9]{1,9})\s+seeds?\s*\Z")
 _RANGE = ("from", "to", "step")
 _DISTRIBUTIONS = {
     "uniform": "its lower and upper end",
+    "loguniform": "its lower and upper end, above 0",
     "normal": "mean and standard deviation",
     "lognormal": "median and standard deviation of the logarithm",
 }
@@ -106,7 +109,50 @@ class Draws:
         first, second = self.parameters
         if self.distribution == "uniform":
             return first + (second - first) * uniform
+        if self.distribution == "loguniform":
+            return float(first * (second / first) ** uniform)
         return first + second * normal if self.distribution == "normal" else first * math.exp(second * normal)
+
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether its axis is logarithmic."""
+        return self.distribution in ("loguniform", "lognormal")
+
+    def quantile(self, share: float) -> float:
+        """Value below which a share of the distribution between the limits lies, in `unit`."""
+        low, high = (self._share_below(limit) for limit in self.limits)
+        inner = min(max(low + share * (high - low), 0.0), 1.0)
+        return self._shaped(inner, float(ndtri(inner)))
+
+    def _share_below(self, value: float) -> float:
+        first, second = self.parameters
+        if self.distribution == "normal":
+            return float(ndtr((value - first) / second))
+        if self.is_logarithmic and value <= 0.0:
+            return 0.0
+        if self.distribution == "lognormal":
+            return float(ndtr(math.log(value / first) / second))
+        if self.distribution == "loguniform":
+            first, second, value = math.log(first), math.log(second), math.log(value)
+        return min(max((value - first) / (second - first), 0.0), 1.0)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of its axis in `unit`: those of the distribution, or its outermost thousandths where it has none."""
+        tail = 0.001 if self.distribution in ("normal", "lognormal") else 0.0
+        return self.quantile(tail), self.quantile(1.0 - tail)
+
+    def on_axis(self, place: float) -> float:
+        """Value at a place 0 … 1 on the axis, in `unit`."""
+        low, high = self.ends
+        return low * (high / low) ** place if self.is_logarithmic else low + (high - low) * place
+
+    def place(self, value: float) -> float:
+        """Place of a value on the axis, 0 … 1."""
+        low, high = self.ends
+        if self.is_logarithmic:
+            low, high, value = math.log(low), math.log(high), math.log(value)
+        return (value - low) / (high - low)
 
 
 Values = Levels | Draws
@@ -140,6 +186,16 @@ def parse_levels(name: str, written: object) -> Values:
         return _range(written)
     _refuse_others(written, (kind, *_LIMITS))
     return _draws(name, kind, written)
+
+
+def parse_space(name: str, written: object) -> Draws | SeedLevels:
+    """Declared distribution of a name of ``space``, or ``seeds`` for a seed of its own in each case."""
+    if written == "seeds":
+        return SeedLevels((0,))
+    values = parse_levels(name, written)
+    if not isinstance(values, Draws):
+        raise LevelsError(f"expected seeds or a distribution ({', '.join(_DISTRIBUTIONS)}), got {shown(written)}")
+    return values
 
 
 def _refuse_others(written: dict[str, object], allowed: tuple[str, ...]) -> None:
@@ -208,7 +264,10 @@ def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
         numbers, unit = _numbers({**parameters, **limits})
         found = dict(zip(limits, numbers[2:], strict=True))
     first, second = numbers[:2]
-    wrong = second <= first if kind == "uniform" else second <= 0 or (kind == "lognormal" and first <= 0)
+    if kind == "loguniform" and first <= 0:
+        raise LevelsError(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
+    has_ends = kind in ("uniform", "loguniform")
+    wrong = second <= first if has_ends else second <= 0 or (kind == "lognormal" and first <= 0)
     if wrong:
         raise LevelsError(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
     draws = Draws(name, kind, (first, second), (found.get("at_least", -math.inf), found.get("at_most", math.inf)), unit)

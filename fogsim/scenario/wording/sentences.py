@@ -186,8 +186,9 @@ def _advice_words(scenario: ScenarioFile) -> str:
 
 
 def _driver_words(scenario: ScenarioFile) -> str:
-    drivers = scenario.drivers
-    kinds = drivers.following or (OBSERVED_MIXTURE if drivers.speed_choice == "observed" else {"unaffected": 1.0})
+    drivers, choice = scenario.drivers, scenario.drivers.speed_choice
+    kinds = drivers.following or (OBSERVED_MIXTURE if choice.method == "observed" else {"unaffected": 1.0})
+    constants = f" with {shown_value(choice.parameters)}" if choice.parameters else ""
     sight = (
         "SUMO's drivers, who see through fog"
         if drivers.see_through_fog
@@ -196,8 +197,8 @@ def _driver_words(scenario: ScenarioFile) -> str:
     )
     obeyed = ", ".join(f"{key} {shown_value(value)}" for key, value in drivers.compliance if key != "like")
     return (
-        f"{sight}. Speed choice: {drivers.speed_choice}{_cited(SPEED_CHOICES, [drivers.speed_choice])}, with a factor "
-        f"for each driver (log-standard deviation {drivers.speed_spread:g}). Car following: {_shares(kinds)}"
+        f"{sight}. Speed choice: {choice.method}{constants}{_cited(SPEED_CHOICES, [choice.method])}, with a "
+        f"factor for each driver (log-standard deviation {drivers.speed_spread:g}). Car following: {_shares(kinds)}"
         f"{_cited(FOLLOWING_MODELS, kinds)}. Compliance with advice: {obeyed}. FogSim's docs/explanation/drivers.md "
         "describes the models."
     )

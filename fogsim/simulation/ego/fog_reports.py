@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
 from fogsim.core.randomness import named_generator
+from fogsim.errors import InputError
 from fogsim.simulation.ego.route_places import RoutePlaces
 from fogsim.simulation.run_config import RadioSender, ReportsConfig, ReportSender, RoadsideSender
 from fogsim.units import extinction_from_visibility
@@ -37,7 +38,11 @@ def is_of_sensor(report: FogReport) -> bool:
 
 
 def sensor_places(sensors: RoadsideSender, length: float) -> Floats:
-    """Places of sensors next to a route of a length [m] along it [m]."""
+    """Places of sensors next to a route of a length [m] along it [m]; InputError if there is none."""
+    if sensors.first >= length:
+        raise InputError(
+            f"sensors.reports.roadside.first_m: {sensors.first:g} m is beyond the route, which is {length:.0f} m long"
+        )
     return np.arange(sensors.first, length, sensors.spacing)
 
 
@@ -73,6 +78,8 @@ class FogReports:
     def __init__(self, senders: ReportsConfig, route: Floats) -> None:
         self._roadside, self._vehicles, self._cameras = senders.roadside, senders.vehicles, senders.cameras
         self._route, self._places = route, RoutePlaces(route)
+        if senders.roadside is not None:
+            sensor_places(senders.roadside, float(self._places.stations[-1]))
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:

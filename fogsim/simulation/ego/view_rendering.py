@@ -11,7 +11,6 @@ from fogsim.atmosphere import Air, TunnelLight, side_light
 from fogsim.camera import CAR, CameraConfig, averaged, middle_samples, supersampled
 from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
-from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.render.bonnet import Bonnet, with_bonnet
 from fogsim.scene import (
@@ -42,6 +41,7 @@ from fogsim.values import (
     View,
 )
 from fogsim.values.fog import EVEN_LIGHT
+from fogsim.values.obstruction import tunnels_of
 from fogsim.values.scene import Instance
 
 DARKEST_SKY = 1e-4

@@ -57,8 +57,6 @@ class Closing(NamedTuple):
 @kernel
 def face_leaders(
     vehicles: NDArray[np.float64],
-    behind: NDArray[np.int64],
-    ahead: NDArray[np.int64],
     gaps: NDArray[np.float64],
     closing: Closing,
     facing: NDArray[np.float64],
@@ -66,10 +64,11 @@ def face_leaders(
 ) -> None:
     """Put down where leaders are, how fast that changes, and the lines on which drivers look at them.
 
-    Takes `vehicles` (m, 7), `behind`, `ahead` (n,) int64, `gaps` (n,) [m], `facing` (10, n), `lines` (2, n, 3) [m].
+    Takes `vehicles` (2n, 7), all followers before their leaders, `gaps` (n,) [m], `facing` (10, n), `lines` (2, n, 3)
+    [m].
     """
     for i in range(gaps.size):
-        own, other = vehicles[behind[i]], vehicles[ahead[i]]
+        own, other = vehicles[i], vehicles[gaps.size + i]
         facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], NEAREST)
         facing[CONTRAST, i] = other[_BODY_CONTRAST]
         facing[_CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed

@@ -10,14 +10,17 @@ import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.registry import Registry
+from fogsim.errors import InputError
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.values import Display
+from fogsim.values.result_checks import checked_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +91,20 @@ UNAFFECTED_ABOVE = 200.0
 CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
-_Choice = Callable[[float], float]
-"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter.
 
-One with a method `share` also slows drivers relative to the speed that they would drive in clear air, on any road.
-"""
+class SpeedChoice(Protocol):
+    """How fast drivers drive in fog by themselves.
+
+    One with a method ``share(visibility)`` [-] also slows drivers relative to the speed that they would drive in clear
+    air, on any road.
+    """
+
+    def __call__(self, visibility: float) -> float:
+        """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter (`visibility` [m])."""
+        ...
 
 
-def speed_share(choice: _Choice, visibility: float) -> float:
+def speed_share(choice: SpeedChoice, visibility: float) -> float:
     """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
 
     Takes `visibility` [m].
@@ -104,39 +113,55 @@ def speed_share(choice: _Choice, visibility: float) -> float:
     return 1.0 if share is None else share(visibility)
 
 
-def unaffected(visibility: float) -> float:  # noqa: ARG001 - every choice is asked with the visibility
-    """Drive as in clear air, whatever the fog: the worst case.
+@dataclass(frozen=True, slots=True)
+class Unaffected:
+    """Drive as in clear air, whatever the fog: the worst case."""
 
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m].
-    """
-    return math.inf
+    def __call__(self, visibility: float) -> float:  # noqa: ARG002 - every choice is asked with the visibility
+        """No limit [m/s]."""
+        return math.inf
 
 
-def within_sight(visibility: float) -> float:
+@checked_parameters
+@dataclass(frozen=True, slots=True)
+class WithinSight:
     """Drive so that one can stop within the visibility: the careful case.
 
-    Parameters
+    Attributes
     ----------
-    visibility : float
-        Meteorological visibility [m].
+    reaction_time : float
+        Time before braking [s].
+    deceleration : float
+        Deceleration of the stop [m/s²].
     """
-    return safe_speed(visibility, REACTION_TIME, DECELERATION)
+
+    reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = REACTION_TIME
+    deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = DECELERATION
+
+    def __call__(self, visibility: float) -> float:
+        """Safe speed [m/s] (`visibility` [m])."""
+        return safe_speed(visibility, self.reaction_time, self.deceleration)
 
 
-def too_fast(visibility: float) -> float:
+@checked_parameters
+@dataclass(frozen=True, slots=True)
+class TooFast:
     """Slow down below 200 m, but to 1.4 times what would be safe: a factor of FogSim's own, from no field study.
 
-    Parameters
+    Attributes
     ----------
-    visibility : float
-        Meteorological visibility [m].
+    factor : float
+        Speed over the safe one [-].
     """
-    return math.inf if visibility >= UNAFFECTED_ABOVE else 1.4 * within_sight(visibility)
+
+    factor: Annotated[float, Range(0.1, 10.0)] = 1.4
+
+    def __call__(self, visibility: float) -> float:
+        """Limit below 200 m [m/s] (`visibility` [m])."""
+        return math.inf if visibility >= UNAFFECTED_ABOVE else self.factor * within_sight(visibility)
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class ObservedSpeed:
     """Slow down as drivers were seen to: a little on any road, and to what sight allows only in the densest fog.
@@ -151,15 +176,42 @@ class ObservedSpeed:
 
     How the share bends, and the ratio of 2.1, were calibrated to these sizes in motorway traffic (`fogsim reproduce
     drivers` with its calibration seeds): vehicles behind slower ones drive slower than they would by themselves.
+
+    Attributes
+    ----------
+    unaffected_above : float
+        Visibility from which drivers do not slow down [m], above `severe` and `overdriving_from`.
+    slowest_share : float
+        Share of the speed in clear air that is still wanted in severe fog [-].
+    severe : float
+        Visibility up to which fog is severe [m].
+    overdriving : float
+        Speed over the safe one that drivers do not exceed [-].
+    overdriving_from : float
+        Visibility from which they drive so much faster than is safe [m], above `safe_up_to`.
+    safe_up_to : float
+        Visibility up to which they drive no faster than is safe [m].
+    curvature : float
+        Power of the density with which that share falls [-]; 1 is linear.
     """
 
-    unaffected_above: float = UNAFFECTED_ABOVE  # Visibility from which drivers do not slow down [m]
-    slowest_share: float = 0.82  # Share of the speed in clear air that is still wanted in severe fog [-]
-    severe: float = 30.0  # Visibility up to which fog is severe [m]
-    overdriving: float = 2.1  # Speed over the safe one that drivers do not exceed [-]
-    overdriving_from: float = 50.0  # Visibility from which they drive so much faster than is safe [m]
-    safe_up_to: float = 30.0  # Visibility up to which they drive no faster than is safe [m]
-    curvature: float = 1.5  # Power of the density with which that share falls [-]; 1 is linear
+    unaffected_above: Annotated[float, Range(10.0, 2000.0, "m")] = UNAFFECTED_ABOVE
+    slowest_share: Annotated[float, Range(0.1, 1.0)] = 0.82
+    severe: Annotated[float, Range(1.0, 1000.0, "m")] = 30.0
+    overdriving: Annotated[float, Range(0.5, 10.0)] = 2.1
+    overdriving_from: Annotated[float, Range(1.0, 1000.0, "m")] = 50.0
+    safe_up_to: Annotated[float, Range(0.0, 1000.0, "m")] = 30.0
+    curvature: Annotated[float, Range(0.1, 10.0)] = 1.5
+
+    def __post_init__(self) -> None:
+        for lower, upper in (
+            ("severe", "unaffected_above"),
+            ("overdriving_from", "unaffected_above"),
+            ("safe_up_to", "overdriving_from"),
+        ):
+            low, high = getattr(self, lower), getattr(self, upper)
+            if not low < high:
+                raise InputError(f"ObservedSpeed: {lower} must be less than {upper}, got {low:g} and {high:g} m")
 
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter (`visibility` [m])."""
@@ -174,16 +226,30 @@ class ObservedSpeed:
         return 1.0 - (1.0 - self.slowest_share) * math.pow(density, self.curvature)
 
 
-observed = ObservedSpeed()
+unaffected, within_sight, too_fast, observed = Unaffected(), WithinSight(), TooFast(), ObservedSpeed()
 
 
 def _clipped(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-SPEED_CHOICES: Registry[_Choice] = Registry(
+@dataclass(frozen=True, slots=True)
+class CheckedChoice:
+    """A user's choice of speed, whose results are checked."""
+
+    name: str
+    choice: SpeedChoice
+
+    def __call__(self, visibility: float) -> float:
+        """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
+        return checked_speed(self.name, self.choice(visibility))
+
+
+SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(
     "speed choice",
-    {"observed": observed, "unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight},
+    {"observed": ObservedSpeed, "unaffected": Unaffected, "too_fast": TooFast, "within_sight": WithinSight},
+    group="fogsim.speed_choices",
+    methods=("__call__",),
 )
 
 
@@ -191,7 +257,7 @@ SPEED_CHOICES: Registry[_Choice] = Registry(
 class DriverSetup:
     """What drivers are like."""
 
-    speed_choice: str = "observed"  # Name in `SPEED_CHOICES`
+    speed_choice: SpeedChoice = observed
     spread: float = 0.1  # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
     compliance: Compliance = _FULL  # How they follow advice
     # By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
@@ -212,7 +278,7 @@ class DriverSetup:
         """Shares of the kinds of drivers, by name [-]."""
         if self.following is not None:
             return self.following
-        return OBSERVED_MIXTURE if self.speed_choice == "observed" else {"unaffected": 1.0}
+        return OBSERVED_MIXTURE if isinstance(self.speed_choice, ObservedSpeed) else {"unaffected": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +333,7 @@ def _drawn_kind(shares: Mapping[str, float], draw: float) -> str:
     return next(reversed(list(shares)))
 
 
-def chosen_speed(choice: _Choice, factor: float, own: float, visibility: float) -> float:
+def chosen_speed(choice: SpeedChoice, factor: float, own: float, visibility: float) -> float:
     """Speed that a driver chooses in fog [m/s] (`own` [m/s], `visibility` [m])."""
     return min(factor * choice(visibility), speed_share(choice, visibility) * own)
 
@@ -285,7 +351,7 @@ def desired_speed(
 
     Takes `own` [m/s], `visibility` [m], `room` [m/s], `kept` [m/s].
     """
-    chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
+    chosen = chosen_speed(setup.speed_choice, driver.speed_factor, own, visibility)
     chosen = min(max(min(chosen, room), kept), own)
     wanted = []
     for advice in heard:

@@ -113,7 +113,8 @@ def _lane_changed(last: TrafficState, state: TrafficState) -> list[str]:
     if state.lane == last.lane and state.ids == last.ids:
         return []
     before = dict(zip(last.ids, last.lane, strict=True))
-    return [v for v, lane in zip(state.ids, state.lane, strict=True) if lane and (before.get(v) or lane) != lane]
+    both = zip(state.ids, state.lane, strict=True)
+    return [v for v, lane in both if lane and v in before and before[v] not in ("", lane)]
 
 
 def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[str]) -> NDArray[np.float64]:

@@ -86,7 +86,7 @@ class NearbyVehicles:
             is_near = distance <= self._radius
             self._set_near(self._schedule_far(self._near, distance))
             position, distance = position[is_near], distance[is_near]
-        wait = float(np.min((self._radius - distance) / self._max_rates(self._near)))
+        wait = (self._radius - float(distance.max())) / self._highest_rate()
         self._all_near_until = self._roster.time + min(wait, _MAX_WAIT)
         return position
 
@@ -95,7 +95,7 @@ class NearbyVehicles:
 
     def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
         """Those near; the others wait until they could have come near."""
-        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), _MAX_WAIT)
+        waits = np.minimum((distance - self._radius) / self._highest_rate(), _MAX_WAIT)
         near: list[str] = []
         if float(waits.min()) <= 0.0:
             is_far = waits > 0.0
@@ -104,10 +104,10 @@ class NearbyVehicles:
         self._far.add_each(vehicles, (self._roster.time + waits).tolist())
         return near
 
-    def _max_rates(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        """How fast their distances from the ego change at most, within the longest wait (n,) [m/s]."""
-        speeds = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        return np.asarray(speeds + (float(self._speed(self._ego)) + MAX_RELATIVE_ACCELERATION * _MAX_WAIT))
+    def _highest_rate(self) -> float:
+        """How fast a distance from the ego changes at most, within the longest wait [m/s]."""
+        # To read the speeds of the vehicles would cost more than to look again sooner.
+        return _TOP_SPEED + float(self._speed(self._ego)) + MAX_RELATIVE_ACCELERATION * _MAX_WAIT
 
     def _has_jumped(self, here: Sequence[float]) -> bool:
         """True after a jump of the ego or of time, and at the first look."""

@@ -171,19 +171,22 @@ class UpdateSchedule:
     def add(self, vehicles: Sequence[str], time: float) -> None:
         """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
         if vehicles:
-            self.add_each(vehicles, itertools.repeat(time, len(vehicles)))
+            self._due[self._slots([time])[0]] += vehicles
 
     def add_each(self, vehicles: Sequence[str], times: Iterable[float]) -> None:
         """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
-        due, step, batch, current = self._due, self._step, self._batch, self._current
-        for vehicle, time in zip(vehicles, times, strict=True):
-            # As in `_number`, without a call for each vehicle.
-            number = (time / step + _ROUNDING) // 1.0
-            if number <= current:
-                number = current + 1
-            if number - current >= batch:
-                number -= number % batch
-            due[number].append(vehicle)
+        due = self._due
+        for vehicle, slot in zip(vehicles, self._slots(times), strict=True):
+            due[slot] += (vehicle,)
+
+    def _slots(self, times: Iterable[float]) -> list[float]:
+        """Numbers of the steps in which who waits until a time is due."""
+        step, batch, following = self._step, self._batch, self._current + 1
+        # As in `_number`, without a call for each vehicle.
+        numbers = [
+            number if number > following else following for number in [(t / step + _ROUNDING) // 1.0 for t in times]
+        ]
+        return [number - number % batch if number - following >= batch - 1 else number for number in numbers]
 
     def bring_forward(self, vehicle: str) -> None:
         """Make a vehicle that waits due in the next step; one that waits for nothing stays so."""

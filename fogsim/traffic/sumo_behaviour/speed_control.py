@@ -15,12 +15,11 @@ from fogsim.traffic.drivers.following import FollowingModel
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, LeaderReach, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
-    SPEED_CHOICES,
     Compliance,
     DriverSetup,
+    Unaffected,
     speed_by_compliance,
     speed_share,
-    unaffected,
 )
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
@@ -39,8 +38,8 @@ class _FogChoices:
 
     def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
         self._table = table
-        self._choice = SPEED_CHOICES[setup.speed_choice]
-        plain = self._choice is unaffected and set(table.kinds) == {FollowingModel()}
+        self._choice = setup.speed_choice
+        plain = isinstance(self._choice, Unaffected) and set(table.kinds) == {FollowingModel()}
         self._sight = None if plain and setup.misjudgement == 0.0 else sight
 
     def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:

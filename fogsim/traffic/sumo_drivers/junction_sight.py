@@ -141,27 +141,23 @@ class JunctionSight:
         due = self._due.take()
         if due.gone:
             self._unseen.forget(due.gone, due.new)
-        doubts: dict[str, dict[str, float]] = {}
-        certain: dict[float, list[str]] = {_MAX_PAUSE: [], _ALONG_A_LANE: []}
-        for driver in due.vehicles:
-            pause, foes = self._foes_in_doubt(driver)
-            if foes:
-                doubts[driver] = foes
-            else:
-                certain[pause].append(driver)
-        for pause, drivers in certain.items():
-            self._due.schedule(drivers, pause)
+        vehicles, unseen = due.vehicles, self._unseen.drivers
+        speeds = dict(zip(vehicles, map(self._speed, vehicles), strict=True))
+        places = zip(vehicles, map(self._lane, vehicles), map(self._lane_position, vehicles), strict=True)
+        # A dictionary, whose order is the same in every run.
+        far = dict.fromkeys(
+            v for v, lane, place in places if v not in unseen and self._is_far(v, lane, place, speeds[v])
+        )
+        near = {v: self._foes_in_doubt(v, speeds[v]) for v in vehicles if v not in far}
+        self._due.schedule(list(far), _ALONG_A_LANE)
+        self._due.schedule([driver for driver, foes in near.items() if not foes], _MAX_PAUSE)
+        doubts = {driver: foes for driver, foes in near.items() if foes}
         if doubts:
             self._decide(doubts, own_lamps)
 
-    def _foes_in_doubt(self, driver: str) -> tuple[float, dict[str, float]]:
-        """When to look again if there are none [s]; and foes that matter to a driver and may be out of sight.
-
-        With each, when to look for it again [s].
-        """
-        speed, unseen = self._speed(driver), self._unseen.of(driver)
-        if not unseen and self._is_far(driver, speed):
-            return _ALONG_A_LANE, {}
+    def _foes_in_doubt(self, driver: str, speed: float) -> dict[str, float]:
+        """Foes that matter to a driver and may be out of sight, and when to look for each again [s] (`speed` [m/s])."""
+        unseen = self._unseen.of(driver)
         yielding = _STANDING_REACH + speed * (self._reaction_time + 2.0 * _MAX_PAUSE)
         doubtful: dict[str, float] = {}
         near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * _BRAKING))
@@ -174,11 +170,10 @@ class JunctionSight:
                 doubtful[foe] = 0.0 if is_there else _PAUSE_IN_DOUBT
         if unseen and not doubtful:
             self._unseen.decide(driver, {}, self._roster.time)
-        return _MAX_PAUSE, doubtful
+        return doubtful
 
-    def _is_far(self, driver: str, speed: float) -> bool:
-        """Whether no junction can come near a driver for `_ALONG_A_LANE`."""
-        lane = self._lane(driver)
+    def _is_far(self, driver: str, lane: str, place: float, speed: float) -> bool:
+        """Whether no junction can come near a driver for `_ALONG_A_LANE` (`place` [m], `speed` [m/s])."""
         if lane not in self._lanes:
             length = float(self._lane_length(lane)) if lane else 0.0
             self._lanes[lane] = length, self._directions.is_two_way(lane)
@@ -187,7 +182,7 @@ class JunctionSight:
             return False
         fastest = speed + _FASTEST_GAIN
         reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)
-        return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * _BRAKING))
+        return length - place > reach + fastest * fastest / (2.0 * _BRAKING)
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)

@@ -3,7 +3,7 @@
 import itertools
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -71,10 +71,10 @@ class Neighbours:
         self._neighbours = vehicle_getter(view.api, "getNeighbors")
         self._state = vehicle_getter(view.api, "getLaneChangeState")
 
-    def left_leaders(self, vehicles: Iterable[str]) -> Iterator[tuple[str, float]]:
+    def left_leaders(self, vehicles: Iterable[str]) -> list[tuple[str, float]]:
         """Next vehicle ahead of each in the lane to the left, and the gap to it [m]; ``inf`` if there is none."""
-        for found in map(self._left_leaders, vehicles, itertools.repeat(_LEFT_LEADERS)):
-            yield (found[0] if len(found) == 1 else _nearest(found)) if found else _NO_ONE
+        found = map(self._left_leaders, vehicles, itertools.repeat(_LEFT_LEADERS))
+        return [(_nearest(those) if those[1:] else those[0]) if those else _NO_ONE for those in found]
 
     def wanted_changes(
         self, vehicles: Sequence[str], wishing: Iterable[str], is_held_back: Callable[[str, _Others], bool]

@@ -93,21 +93,15 @@ class LeaderSight:
     def _facing(self, pairs: Sequence[_Pair]) -> NDArray[np.float64]:
         """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
         followers, leaders, gaps = zip(*pairs, strict=True)
-        both = followers + leaders
-        # Mostly who leads one follows another.
-        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
-        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
         facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
-        face_leaders(
-            self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), self._closing, facing, lines
-        )
+        face_leaders(self._read(followers + leaders), np.array(gaps, np.float64), self._closing, facing, lines)
         known = self._extinction
         facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
         facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
         facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
         return facing
 
-    def _read(self, vehicles: Collection[str]) -> NDArray[np.float64]:
+    def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         """What is known of vehicles (n, 7), where they are and how fast first."""
         read = np.empty((len(vehicles), EYE_HEIGHT + 1))
         flat = itertools.chain.from_iterable(map(self._position, vehicles))
@@ -176,7 +170,6 @@ _FASTEST_APPROACH = 70.0
 MAX_PAUSE = 0.5
 """Every driver's sight is computed at least this often [s], for leaders change."""
 
-_NO_LEADER = ("", 0.0)
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
 
@@ -271,45 +264,36 @@ class Perception:
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
-        ignored, emerging = self._ignored, self._emerging
+        ignored, seen, hidden = self._ignored, self._certainly_seen, self._certainly_hidden
+        ahead = zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=True)
+        pairs = [(follower, *found) for follower, found in ahead if found and found[0]]
+        behind = self._obstructed(pairs)
+        doubtful = [p for p in pairs if p[2] <= hidden and (p[2] > seen or p[0] in ignored) and p[0] not in behind]
+        out_of_sight = [pair for pair in pairs if pair[2] > hidden or pair[0] in behind]
+        near_edge = [
+            (follower, leader, 0.0 if follower in behind else abs(gap - (hidden if gap > hidden else seen)))
+            for follower, leader, gap in pairs
+            if follower in behind
+            or hidden < gap <= self._hidden_for_long
+            or (self._seen_for_long < gap <= seen and follower not in ignored)
+        ]
         # Most vehicles are far from any doubt, and pause for the longest time.
-        certain: list[str] = []
-        near_edge: list[_Pair] = []
-        doubtful: list[_Pair] = []
-        ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
-        obstructed = self._obstructed(due, ahead)
-        for follower, (leader, gap) in zip(due, ahead, strict=True):
-            if follower in obstructed:
-                self._hide(follower, leader)
-                near_edge.append((follower, leader, 0.0))
-                continue
-            if not leader:
-                if follower in ignored:
-                    self._reveal(follower)
-            elif gap > self._certainly_hidden:
-                if follower not in ignored or ignored[follower] != leader or follower in emerging:
-                    self._hide(follower, leader)
-                if gap <= self._hidden_for_long:
-                    near_edge.append((follower, leader, gap - self._certainly_hidden))
-                    continue
-            elif gap > self._certainly_seen or follower in ignored:
-                doubtful.append((follower, leader, gap))
-                continue
-            elif gap > self._seen_for_long:
-                near_edge.append((follower, leader, self._certainly_seen - gap))
-                continue
-            certain.append(follower)
+        waiting = {pair[0] for pair in (*near_edge, *doubtful)}
+        self._due.schedule([follower for follower in due if follower not in waiting], MAX_PAUSE)
         self._pause_near_edge(near_edge)
-        self._due.schedule(certain, MAX_PAUSE)
+        with_leaders = {pair[0] for pair in pairs}
+        for follower in [v for v in due if v in ignored and v not in with_leaders]:
+            self._reveal(follower)
+        for follower, leader, _ in out_of_sight:
+            self._hide(follower, leader)
         return doubtful
 
-    def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
+    def _obstructed(self, pairs: Sequence[_Pair]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""
         if self._hidden_vehicles is None:
             return ()
-        pairs = [(follower, leader) for follower, (leader, _) in zip(followers, ahead, strict=True) if leader]
-        hidden = self._hidden_vehicles.are_hidden(pairs)
-        return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
+        hidden = self._hidden_vehicles.are_hidden([pair[:2] for pair in pairs])
+        return {pair[0] for pair, is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
     def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
         """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
@@ -323,15 +307,15 @@ class Perception:
     def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
         ignored, emerging = self._ignored, self._emerging
-        waits: list[float] = []
-        for (follower, leader, _), is_seen, pause in zip(pairs, seen, pauses, strict=True):
+        for (follower, leader, _), is_seen in zip(pairs, seen, strict=True):
             if not is_seen:
-                if follower in emerging or follower not in ignored or ignored[follower] != leader:
+                if follower not in ignored or ignored[follower] != leader or follower in emerging:
                     self._hide(follower, leader)
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-            waits.append(0.0 if follower in emerging else pause)
-        self._due.schedule_each([follower for follower, _, _ in pairs], waits)
+        followers = [pair[0] for pair in pairs]
+        waits = [0.0 if follower in emerging else pause for follower, pause in zip(followers, pauses, strict=True)]
+        self._due.schedule_each(followers, waits)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

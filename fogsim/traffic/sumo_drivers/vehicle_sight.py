@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, eye_height, lamps_from_signals, paint
 from fogsim.traffic.drivers.lamp_intensity import (
     head_lamp_light,
@@ -24,6 +23,7 @@ from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, Part
 from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
+from fogsim.values.obstruction import CLEAR_SIGHT, Obstructions
 
 OwnLamps = dict[str, int]
 """Lamps, as `TrafficState.lamps` has them, of vehicles whose lamps are not SUMO's; with the sides that have failed."""
@@ -50,6 +50,10 @@ class _SeenBody(NamedTuple):
     missing: int  # Bits of sides on which there is no lamp
 
 
+_CONTRAST, _EYES_TO_WIDTH = 1, slice(2, 5)
+"""Columns of bodies in an array."""
+
+
 class _SeenVehicles:
     """Bodies, each read once, and lit lamps of vehicles."""
 
@@ -61,11 +65,13 @@ class _SeenVehicles:
         self._bodies: dict[str, _SeenBody] = {}
         self._rows: dict[str, int] = {}
         self._traits = np.empty((64, len(_SeenBody._fields)))
+        self._count = 0
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._bodies.pop(vehicle, None)
+            self._rows.pop(vehicle, None)
 
     def body(self, vehicle: str) -> _SeenBody:
         """Body of a vehicle."""
@@ -74,10 +80,12 @@ class _SeenVehicles:
     def traits(self, vehicles: Collection[str]) -> NDArray[np.float64]:
         """Bodies of vehicles (n, 7), in the order of the fields of `_SeenBody`."""
         rows = self._rows
-        if not self._bodies.keys() >= set(vehicles):
-            for vehicle in vehicles:
-                self.body(vehicle)
-        return self._traits[[rows[vehicle] for vehicle in vehicles]]
+        try:
+            return self._traits[[rows[vehicle] for vehicle in vehicles]]
+        except KeyError:
+            for vehicle in set(vehicles).difference(rows):
+                self._read(vehicle)
+            return self._traits[[rows[vehicle] for vehicle in vehicles]]
 
     def _read(self, vehicle: str) -> _SeenBody:
         colour, gap, length, width, height, vehicle_class, shape = (get(vehicle) for get in self._getters)
@@ -86,7 +94,8 @@ class _SeenVehicles:
         missing = dark_on(int(MIDDLE_LAMPS), Side.MIDDLE) if kind in _NO_THIRD_STOP_LAMP else 0
         eyes = eye_height(vehicle_class, shape, length)
         body = _SeenBody(gap, contrast, eyes, length, width, height, missing)
-        row = self._rows.setdefault(vehicle, len(self._rows))
+        row = self._rows[vehicle] = self._count
+        self._count += 1
         if row == len(self._traits):
             self._traits = np.concatenate((self._traits, np.empty_like(self._traits)))
         self._traits[row] = self._bodies[vehicle] = body
@@ -209,9 +218,9 @@ class VehicleSight:
         lines = self.lines_of_sight(pairs)
         distance = lines[:, LINE]
         seen = distance <= self._seen_through_fog
-        doubtful = np.flatnonzero(~seen & (distance <= _FARTHEST))
-        if len(doubtful):
-            seen[doubtful] = self._are_seen([pairs[n] for n in doubtful.tolist()], lines[doubtful], own_lamps)
+        doubtful = ~seen & (distance <= _FARTHEST)
+        if doubtful.any():
+            seen[doubtful] = self._are_seen(list(itertools.compress(pairs, doubtful)), lines[doubtful], own_lamps)
         if self._hidden_vehicles is not None:
             seen &= ~np.array(self._hidden_vehicles.are_hidden(pairs))
         answer: list[bool] = seen.tolist()
@@ -220,37 +229,34 @@ class VehicleSight:
     def lines_of_sight(self, pairs: _Pairs) -> NDArray[np.float64]:
         """Straight lines (n, 10) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
         observers, targets = zip(*pairs, strict=True)
-        both = observers + targets
-        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys(both))}
-        read, count = np.empty((len(place), 7)), len(place)
-        flat = itertools.chain.from_iterable(map(self._position, place))
-        read[:, :3] = np.fromiter(flat, np.float64, 3 * count).reshape(-1, 3)
-        read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, place), np.float64, count))
-        _, _, eyes, length, width, _, _ = self._vehicles.traits(place).T
-        read[:, 4], read[:, 5], read[:, 6] = eyes, length, width
-        rows = np.array([place[v] for v in both], dtype=np.int64).reshape(2, -1)
-        bodies, ends = read[rows[1]], np.arange(1, len(pairs) + 1)
+        both, count = observers + targets, len(pairs)
+        read = np.empty((2 * count, 7))
+        flat = itertools.chain.from_iterable(map(self._position, both))
+        read[:, :3] = np.fromiter(flat, np.float64, 6 * count).reshape(-1, 3)
+        read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, both), np.float64, 2 * count))
+        read[:, 4:] = self._vehicles.traits(both)[:, _EYES_TO_WIDTH]
+        bodies, ends = read[count:], np.arange(1, count + 1)
         bodies[:, 4] = 0.0
-        if length.max() > LONGEST_RIGID:
+        if (bodies[:, 5] > LONGEST_RIGID).any():
             bodies, ends = self._bend(targets, bodies)
-        lines = np.empty((len(pairs), 10))
-        draw_lines_of_sight(read[rows[0], :5], bodies, ends, lines)
+        lines = np.empty((count, 10))
+        draw_lines_of_sight(read[:count, :5].copy(), bodies, ends, lines)
         return lines
 
     def _bend(
         self, targets: Sequence[str], bodies: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Straight parts (m, 7) of bodies, and where those of each end (n,)."""
-        parts, ends = list[Sequence[float]](), list[int]()
-        for target, body in zip(targets, bodies.tolist(), strict=True):
-            x, y, z, heading, _, length, width = body
-            if length > LONGEST_RIGID:
-                bent = self._bodies.parts(target, length, (x, y, z), heading)
-                parts += [(*one.front, one.heading, one.behind, one.length, width) for one in bent]
-            else:
-                parts.append(body)
-            ends.append(len(parts))
-        return np.array(parts), np.array(ends)
+        counts, bent = np.ones(len(targets), np.int64), dict[int, list[Part]]()
+        for n in np.flatnonzero(bodies[:, 5] > LONGEST_RIGID).tolist():
+            x, y, z, heading, _, length, _ = bodies[n].tolist()
+            bent[n] = self._bodies.parts(targets[n], length, (x, y, z), heading)
+            counts[n] = len(bent[n])
+        parts, ends = bodies.repeat(counts, axis=0), counts.cumsum()
+        for n, own in bent.items():
+            first = ends[n] - counts[n]
+            parts[first : ends[n], :6] = [(*one.front, one.heading, one.behind, one.length) for one in own]
+        return parts, ends
 
     def length(self, vehicle: str) -> float:
         """Length of a vehicle [m]; no part of it is farther from its front."""
@@ -258,20 +264,28 @@ class VehicleSight:
 
     def _are_seen(self, pairs: _Pairs, lines: NDArray[np.float64], own_lamps: OwnLamps) -> NDArray[np.bool_]:
         """Whether targets are seen through the fog (n,)."""
-        vehicles, looks = self._vehicles, np.empty((4, len(pairs)))
-        looks[0] = lines[:, LINE]
-        for n, ((observer, target), line) in enumerate(zip(pairs, lines.tolist(), strict=True)):
-            body = vehicles.body(target)
-            looks[1, n] = body.contrast
-            looks[2, n] = intensity_toward(vehicles.lamps(target, own_lamps), body.length, line[AHEAD], line[ASIDE])
-            looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
-        limits = self._sight.depth_limits(looks)
-        eyes, known = np.ascontiguousarray(lines[:, EYES:END]), self._extinction
-        for n, (observer, _) in enumerate(pairs) if own_lamps else ():
-            if uses_high_beam(own_lamps.get(observer, 0)):
-                glare = high_beam_veil(float(self._fog.extinction(eyes[n])) if known is None else known)
-                distance, contrast, intensity, own = looks[:, n].tolist()
-                limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
+        eyes, looks, known = np.ascontiguousarray(lines[:, EYES:END]), np.zeros((4, len(pairs))), self._extinction
+        looks[0], looks[1] = lines[:, LINE], self._vehicles.traits([target for _, target in pairs])[:, _CONTRAST]
         ends = np.ascontiguousarray(lines[:, END:LINE])
         depths = self._fog.optical_depth(eyes, ends) if known is None else known * looks[0]
-        return np.asarray(depths <= limits)
+        # Mostly the body is seen, whatever lamps are lit.
+        seen = np.asarray(depths <= self._sight.depth_limits(looks))
+        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)}
+        if dazzling:
+            seen &= [observer not in dazzling for observer, _ in pairs]
+        doubtful = np.flatnonzero(~seen)
+        if len(doubtful):
+            looks, vehicles, rows = np.take(looks, doubtful, axis=1), self._vehicles, doubtful.tolist()
+            for n, (row, line) in enumerate(zip(rows, lines[doubtful].tolist(), strict=True)):
+                (observer, target), toward = pairs[row], (line[AHEAD], line[ASIDE])
+                lit = vehicles.lamps(target, own_lamps)
+                looks[2, n] = intensity_toward(lit, vehicles.body(target).length, *toward)
+                looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
+            limits = self._sight.depth_limits(looks)
+            for n, row in enumerate(rows) if dazzling else ():
+                if pairs[row][0] in dazzling:
+                    glare = high_beam_veil(float(self._fog.extinction(eyes[row])) if known is None else known)
+                    distance, contrast, intensity, own = looks[:, n].tolist()
+                    limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
+            seen[doubtful] = depths[doubtful] <= limits
+        return seen

@@ -66,6 +66,7 @@ class SignalReader:
         self._asked = np.full(2, np.inf)
         self._near: list[SignalHead] = []
         self._last = NO_SIGNALS
+        self._shown: dict[str, str] = {}
 
     def state(self, here: NDArray[np.float64]) -> SignalState:
         """Heads nearer than `_SIGNAL_REACH` to a place, and what they show (`here` (3,) [m])."""
@@ -74,8 +75,9 @@ class SignalReader:
         if not np.hypot(*(here[:2] - self._asked)) < _MOVED:
             self._find_near(here[:2])
         shown = {signal: self._letters(signal) for signal in dict.fromkeys(self._last.ids)}
-        colours = tuple(SIGNAL_COLOURS[_letter(shown[head.signal_id], head.links)] for head in self._near)
-        if colours != self._last.colour:
+        if shown != self._shown or len(self._last.colour) < len(self._near):
+            self._shown = shown
+            colours = tuple(SIGNAL_COLOURS[_letter(shown[head.signal_id], head.links)] for head in self._near)
             self._last = replace(self._last, colour=colours)
         return self._last
 

@@ -30,13 +30,6 @@ def test_a_black_target_at_the_visibility_shows_five_percent_contrast(visibility
     assert np.allclose(contrast, CONTRAST_THRESHOLD, atol=1e-6)
 
 
-def test_closed_form_of_homogeneous_fog() -> None:
-    field = FogField(0.02, AIRLIGHT)
-    seen = fogged_radiance(view(500.0, 70.0), field, POSE.position, ray_from_pixel(CAMERA, POSE))
-    transmittance = math.exp(-0.02 * 70.0)
-    assert np.allclose(seen, 500.0 * transmittance + np.array(AIRLIGHT) * (1 - transmittance), rtol=1e-6)
-
-
 def test_clear_air_changes_nothing() -> None:
     clear = FogField(0.0, AIRLIGHT)
     for distance in (5.0, math.inf):
@@ -79,9 +72,3 @@ def test_airlight_of_an_overcast_day() -> None:
     # physics: L∞ ≈ E_h / π · (0.8 … 1.0); 10 klx give 2500 … 3200 cd/m²
     assert airlight_from_illuminance(10_000.0)[1] == pytest.approx(0.406 * 10_000.0 / math.pi)
     assert airlight_from_illuminance(0.0) == (0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("illuminance", [-1.0, math.nan, math.inf])
-def test_impossible_light_is_refused(illuminance: float) -> None:
-    with pytest.raises(ValueError, match="illuminance"):
-        airlight_from_illuminance(illuminance)

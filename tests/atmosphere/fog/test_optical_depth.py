@@ -1,12 +1,9 @@
 """The exact optical depth against brute-force integration of the extinction coefficient."""
 
-import math
-
 import numpy as np
 import pytest
 
 from fogsim.atmosphere import extinction, optical_depth
-from fogsim.units import extinction_from_visibility
 from fogsim.values import FogBank, FogField
 
 AIRLIGHT = (3000.0, 3000.0, 3000.0)
@@ -32,11 +29,6 @@ def test_across_the_bank_where_the_station_does_not_change() -> None:
     start = np.array([100.0, 50.0, 1.0]) + 30.0 * np.array([0.8, 0.6, 0.0])
     end = start + 80.0 * np.array([-0.6, 0.8, 0.0])
     assert optical_depth(FIELD, start, end) == pytest.approx(80.0 * extinction(FIELD, start), rel=1e-9)
-
-
-def test_homogeneous_fog_is_k_times_distance() -> None:
-    field = FogField(extinction_from_visibility(100.0), AIRLIGHT)
-    assert math.exp(-optical_depth(field, (0, 0, 1), (60, 80, 1))) == pytest.approx(0.05)
 
 
 def test_no_path_and_both_directions() -> None:

@@ -5,8 +5,8 @@ import pytest
 
 from fogsim.atmosphere import TunnelLight
 from fogsim.atmosphere.surfaces.tunnel_light import LAMPS_ON_ROAD, daylight_share, sky_share
-from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, View
+from fogsim.values.obstruction import Tunnel
 
 HALF_WIDTH, HEIGHT, SKY = 5.0, 5.0, 20_000.0
 TUNNEL = Tunnel(np.array([[100.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), HALF_WIDTH, HEIGHT)

@@ -52,8 +52,15 @@ def test_age_factor_jumps_as_published():
     assert age_factor(64.0001) == pytest.approx(1.90098, rel=1e-4)
 
 
-@pytest.mark.parametrize(("function", "mismatch"), [(flux_root, 0.011), (luminance_root, 0.007)])
-@pytest.mark.parametrize("join", [0.6, 0.00418])
+@pytest.mark.parametrize(
+    ("function", "mismatch", "join"),
+    [
+        (flux_root, 0.011, 0.6),
+        (luminance_root, 0.007, 0.6),
+        (flux_root, 0.011, 0.00418),
+        (luminance_root, 0.007, 0.00418),
+    ],
+)
 def test_branches_meet_within_their_own_mismatch(function, mismatch, join):
     assert function(join * 1.0001) == pytest.approx(float(function(join * 0.9999)), rel=mismatch)
 

@@ -46,8 +46,7 @@ def test_what_is_drawn_is_found_whatever_the_exposure(visibility: float) -> None
         assert holds(found, visibility)
 
 
-@pytest.mark.parametrize("head_lamps", ["usual", "unknown"])
-@pytest.mark.parametrize("light", [DARK, None])
+@pytest.mark.parametrize(("head_lamps", "light"), [("usual", DARK), ("unknown", None)])
 def test_a_clear_night_has_a_lower_bound_alone(head_lamps: str, light: LightMeasurement | None) -> None:
     found = estimate(night_picture(np.inf), head_lamps=head_lamps, light=light)
     low, high = found.visibility_interval
@@ -126,9 +125,9 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
 
 
-@pytest.mark.parametrize("flatness", [1.0, 2.0])
-@pytest.mark.parametrize("power", [1.3, 1.8])
-@pytest.mark.parametrize("visibility", [60.0, 150.0])
+@pytest.mark.parametrize(
+    ("flatness", "power", "visibility"), [(1.0, 1.3, 60.0), (2.0, 1.8, 60.0), (1.0, 1.8, 150.0), (2.0, 1.3, 150.0)]
+)
 def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float, flatness: float) -> None:
     picture = night_picture(visibility)
     rows, cols = np.indices(picture.shape[:2])

@@ -15,7 +15,7 @@ from fogsim.traffic.drivers.following import (
     misjudged_headway,
 )
 from fogsim.traffic.drivers.sight import CLEAR, LeaderReach, drivers_visibility, leader_reach
-from fogsim.traffic.drivers.speed_choice import driver_traits
+from fogsim.traffic.drivers.speed_choice import driver_traits, too_fast
 
 DAY = DriverSight(10_000.0)
 NIGHT = DriverSight(0.1)
@@ -99,6 +99,6 @@ def test_a_population_is_a_mixture_with_the_shares_that_are_asked_for() -> None:
     assert driver_traits(setup, "vehicle 7", 1).following == drawn[7]
     assert sum(OBSERVED_MIXTURE.values()) == pytest.approx(1.0)
     assert DriverSetup().following_shares == OBSERVED_MIXTURE
-    assert DriverSetup("too_fast").following_shares == {"unaffected": 1.0}
+    assert DriverSetup(too_fast).following_shares == {"unaffected": 1.0}
     thirds = DriverSetup(following=dict.fromkeys(("in_sight", "careful", "out_of_sight"), 1 / 3))
     assert {driver_traits(thirds, str(i), 3).following for i in range(100)} == set(thirds.following_shares)

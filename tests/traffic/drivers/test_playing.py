@@ -9,6 +9,7 @@ from fogsim.traffic.drivers.playing import Lamps, Motion, Playing, speed_on_the_
 from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import ALL_LAMPS, Side, burning, dark_on
 from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop
+from tests.helpers.vehicles import vehicles
 
 STEP = 0.1
 
@@ -95,12 +96,7 @@ def test_a_follower_comes_to_its_headway_and_keeps_it() -> None:
 
 
 def state_of(*lamps: Lamp) -> TrafficState:
-    ids = tuple("abc"[: len(lamps)])
-    zeros = np.zeros(len(ids))
-    lit = np.array([int(lamp) for lamp in lamps], dtype=np.int32)
-    lanes, kinds = ("e_0",) * len(ids), ("car",) * len(ids)
-    place = np.zeros((len(ids), 3))
-    return TrafficState(0.0, ids, kinds, place, zeros, zeros, zeros, zeros, zeros, zeros, lanes, lit, place)
+    return vehicles(np.zeros(len(lamps)), ids=tuple("abc"[: len(lamps)]), lamps=[int(lamp) for lamp in lamps])
 
 
 def test_lamps_are_lit_dark_failed_and_the_vehicles_own_again() -> None:

@@ -93,7 +93,7 @@ def test_measured_compliances_give_what_was_measured() -> None:
     """Means over a population, in kinds of advice of `COMPLIANCES`; sources there."""
 
     def mean(kind: str, own: float, advised: float, visibility: float) -> float:
-        setup = DriverSetup("unaffected", compliance=COMPLIANCES[kind])
+        setup = DriverSetup(unaffected, compliance=COMPLIANCES[kind])
         drivers = [driver_traits(setup, f"vehicle {i}", 1) for i in range(4000)]
         return float(np.mean([desired_speed(setup, d, own, visibility, told(advised)) for d in drivers]))
 
@@ -121,13 +121,13 @@ def test_who_trusts_a_sign_takes_its_speed_for_safe() -> None:
 
 
 def test_advice_may_be_believed_less_before_the_fog_is_seen() -> None:
-    setup, driver = DriverSetup("unaffected", compliance=Compliance(foreseen=0.25)), DriverTraits(1.0)
+    setup, driver = DriverSetup(unaffected, compliance=Compliance(foreseen=0.25)), DriverTraits(1.0)
     assert desired_speed(setup, driver, 30.0, math.inf, told(20.0)) == pytest.approx(27.5)
     assert desired_speed(setup, driver, 30.0, 100.0, told(20.0)) == pytest.approx(20.0)
 
 
 def test_a_driver_desires_the_least_of_own_speed_choice_and_advice() -> None:
-    setup, driver = DriverSetup("within_sight", spread=0.0), DriverTraits(1.2)
+    setup, driver = DriverSetup(within_sight, spread=0.0), DriverTraits(1.2)
     chosen = 1.2 * within_sight(60.0)
     assert desired_speed(setup, driver, 40.0, math.inf) == 40.0
     assert desired_speed(setup, driver, 40.0, 60.0) == pytest.approx(chosen)
@@ -148,7 +148,7 @@ def test_traits_depend_on_nothing_but_seed_and_id_and_have_the_spread_that_is_as
 
 def test_who_follows_depends_on_where_it_is_heard_and_the_drivers_stay_the_same() -> None:
     by_display = {Display.MESSAGE_SIGN: Compliance(rate=0.3), Display.IN_CAR: Compliance(rate=0.9, strength=0.5)}
-    setup = DriverSetup("unaffected", compliance_by_display=by_display)
+    setup = DriverSetup(unaffected, compliance_by_display=by_display)
     heard = {display: (HeardAdvice(display, 20.0, 10.0),) for display in Display}
     slow = {display: set[int]() for display in Display}
     for i in range(1000):

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
+from highway_env.road.lane import CircularLane, LineType, SineLane
 from highway_env.road.road import Road
 from highway_env.road.road import RoadNetwork as HighwayRoads
 from highway_env.vehicle.behavior import IDMVehicle
@@ -19,8 +19,8 @@ from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, Lamp, LaneMarking, SpeedAdvice, TrafficSnapshot
-from tests.traffic.common import even
+from fogsim.values import Collision, Command, Lamp, LaneMarking, SpeedAdvice
+from tests.traffic.common import even, seen
 
 DAY = 10_000.0
 EMPTY = {"vehicles_count": 0, "initial_lane_id": 2}
@@ -29,12 +29,6 @@ EMPTY = {"vehicles_count": 0, "initial_lane_id": 2}
 def traffic_on(config: dict[str, Any], environment: str = "highway-v0") -> tuple[HighwayTraffic, Any]:
     made = gymnasium.make(f"highway_env:{environment}", config=config).unwrapped
     return HighwayTraffic(made, DriverSight(DAY)), made
-
-
-def seen(traffic: HighwayTraffic) -> TrafficSnapshot:
-    snapshot = traffic.observe()
-    assert snapshot is not None
-    return snapshot
 
 
 def network_of(*lanes: tuple[str, str, Any]) -> Any:
@@ -105,12 +99,6 @@ def test_curves_keep_their_shape() -> None:
     wave = SineLane((0.0, 0.0), (100.0, 0.0), amplitude=3.0, pulsation=2 * math.pi / 100.0, phase=0.0)
     line = network_of(("a", "b", wave)).lanes[0].centreline
     assert line[:, 1] == pytest.approx(-3.0 * np.sin(2 * math.pi * line[:, 0] / 100.0))
-
-
-def test_the_route_leads_across_joints() -> None:
-    first, second = StraightLane((0.0, 0.0), (100.0, 0.0)), StraightLane((100.0, 0.0), (100.0, 80.0))
-    route = network_of(("a", "b", first), ("b", "c", second)).route
-    assert route == pytest.approx(np.array([(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, -80.0, 0.0)]))
 
 
 def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
@@ -263,36 +251,6 @@ def test_advice_to_drive_faster_changes_nothing() -> None:
         speeds.append(seen(traffic).state.speed[0])
         traffic.close()
     assert speeds == pytest.approx([20.0, 20.0], abs=0.2)
-
-
-def test_others_follow_advice_of_their_own() -> None:
-    traffic, environment = traffic_on({"vehicles_count": 1})
-    traffic.start(1)
-    other = next(v for v in seen(traffic).state.ids if v != "ego")
-    for _ in range(300):
-        traffic.advance(Command(advised_speeds={other: 10.0}))
-    vehicle = environment.road.vehicles[1]
-    traffic.close()
-    assert vehicle.speed == pytest.approx(10.0, abs=0.3)
-
-
-def test_the_same_seed_replays_exactly() -> None:
-    traffic, _ = traffic_on({"vehicles_count": 12})
-    traffic.enter_fog(even(80.0))
-
-    def run(seed: int) -> TrafficSnapshot:
-        traffic.start(seed)
-        for _ in range(45):
-            traffic.advance(Command())
-        return seen(traffic)
-
-    one, again, other = run(7), run(7), run(8)
-    traffic.close()
-    assert one.state.time == pytest.approx(3.0)
-    assert one.state.ids == again.state.ids
-    assert np.array_equal(one.state.position, again.state.position)
-    assert np.array_equal(one.state.speed, again.state.speed)
-    assert not np.array_equal(one.state.position, other.state.position)
 
 
 def test_an_ego_that_is_removed_is_gone() -> None:

@@ -1,7 +1,6 @@
 """SUMO's vehicles change lane in one step; the camera sees them glide."""
 
 import itertools
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.traffic import AttachedTraffic, TraciLink
+from fogsim.traffic import AttachedTraffic
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState
+from tests.helpers.vehicles import vehicles
 from tests.traffic.common import MOTORWAY, SETUP, seen
 
 BUSY = replace(SETUP, routes=(MOTORWAY / "motorway.rou.xml",), additional=(), keep_lane=())
@@ -84,13 +84,6 @@ def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> Non
     assert arrived >= 10
 
 
-def test_nobody_jumps_over_a_connection(sumo_process: Callable) -> None:
-    with sumo_process(command_line(BUSY, 1)) as (port, _):
-        distant = TraciLink("127.0.0.1", port)
-        assert_smooth(attached_run(distant.begin(()), 250))
-        distant.end()
-
-
 def test_without_changes_of_lane_states_are_untouched(link: LibsumoLink) -> None:
     api = link.begin(command_line(BUSY, 1))
     while "ego" not in api.vehicle.getIDList():
@@ -113,22 +106,7 @@ def step_without_changes(api: Any) -> None:
 
 
 def ego_at(time: float, x: float, y: float, lane: str, heading: float = 0.0) -> TrafficState:
-    one = np.ones(1)
-    return TrafficState(
-        time=time,
-        ids=("ego",),
-        types=("car",),
-        position=np.array([[x, y, 0.0]]),
-        heading=heading * one,
-        speed=20.0 * one,
-        acceleration=0.0 * one,
-        length=4.5 * one,
-        width=1.8 * one,
-        height=1.5 * one,
-        lane=(lane,),
-        lamps=np.zeros(1, dtype=np.int32),
-        paint=np.full((1, 3), 0.5),
-    )
+    return vehicles([[x, y, 0.0]], time=time, ids=("ego",), heading=heading, speed=20.0, lane=lane)
 
 
 def test_the_egos_pose_follows_a_smoothstep() -> None:

@@ -1,5 +1,6 @@
 """Kinds of drivers behind a leader in SUMO: who stays in sight, who falls back, and what is given back."""
 
+import contextlib
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -41,13 +42,10 @@ def gap_after(traffic: Traffic, seconds: float) -> float:
 
 
 def gap_of(kind: str, setup: TrafficSetup) -> float:
-    traffic = libsumo_traffic(setup)
-    traffic.enter_fog(even(VISIBILITY))
-    try:
+    with contextlib.closing(libsumo_traffic(setup)) as traffic:
+        traffic.enter_fog(even(VISIBILITY))
         traffic.start(1)
         return gap_after(traffic, 60.0)
-    finally:
-        traffic.close()
 
 
 @pytest.mark.parametrize("kind", ["in_sight", "unaffected", "careful", "out_of_sight"])
@@ -105,14 +103,11 @@ def test_over_a_connection_kinds_of_drivers_do_the_same(tmp_path: Path, sumo_pro
 
 def test_in_clear_air_nothing_is_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drivers = DriverSetup(misjudgement=0.5, following={"in_sight": 0.5, "out_of_sight": 0.5})
-    traffic = libsumo_traffic(pair(tmp_path, FAST, drivers))
-    traffic.enter_fog(even(math.inf))
-    vehicles = load_libsumo().vehicle
-    try:
+    with contextlib.closing(libsumo_traffic(pair(tmp_path, FAST, drivers))) as traffic:
+        traffic.enter_fog(even(math.inf))
+        vehicles = load_libsumo().vehicle
         traffic.start(1)
         for name in ("setTau", "setSpeedFactor", "setMaxSpeed", "setPreviousSpeed"):
             monkeypatch.setattr(vehicles, name, lambda *_: pytest.fail("a vehicle was changed"))
         gap_after(traffic, 5.0)
         assert conduct() == (1.2, 1.0, pytest.approx(55.56, abs=0.01))
-    finally:
-        traffic.close()

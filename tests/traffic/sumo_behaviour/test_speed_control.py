@@ -1,5 +1,6 @@
 """What advice and scripts leave to the drivers whose speed they set."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -23,10 +24,9 @@ def brake(folder: Path, advised: float | None) -> tuple[float, bool]:
     """Hardest braking [m/s²] for a wreck that is seen from 50 m, when advice comes too; and whether it is hit."""
     routes = folder / "wreck.rou.xml"
     routes.write_text(ROUTES, encoding="utf-8")
-    api = load_libsumo()
-    options = ["-n", str(NET), "-r", str(routes), "--step-length", str(STEP), "--no-step-log", "--no-warnings"]
-    api.start(["sumo", *options, "--collision.action", "warn", "--collision.mingap-factor", "0"])
-    try:
+    with contextlib.closing(load_libsumo()) as api:
+        options = ["-n", str(NET), "-r", str(routes), "--step-length", str(STEP), "--no-step-log", "--no-warnings"]
+        api.start(["sumo", *options, "--collision.action", "warn", "--collision.mingap-factor", "0"])
         api.simulationStep()
         speeds, hardest, hit = SpeedControl(api, STEP), 0.0, False
         api.vehicle.setMaxSpeed("driver", FAST)
@@ -42,8 +42,6 @@ def brake(folder: Path, advised: float | None) -> tuple[float, bool]:
             hardest = max(hardest, -api.vehicle.getAcceleration("driver"))
             hit = hit or bool(api.simulation.getCollidingVehiclesNumber())
         return hardest, hit
-    finally:
-        api.close()
 
 
 @pytest.mark.parametrize("advised", [11.0, FAST])

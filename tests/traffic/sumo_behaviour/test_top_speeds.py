@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fogsim.traffic import Compliance, DriverSetup, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.drivers.speed_choice import within_sight
+from fogsim.traffic.drivers.speed_choice import too_fast, unaffected, within_sight
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command
@@ -32,7 +32,7 @@ def free_road(folder: Path, drivers: DriverSetup, model: str = "Krauss") -> Traf
     return replace(setup_of(folder, ROUTES.format(model=model), ("ego", "first", "late")), drivers=drivers)
 
 
-UNAFFECTED = DriverSetup("unaffected", spread=0.0, compliance=Compliance(delay=0.0))
+UNAFFECTED = DriverSetup(unaffected, spread=0.0, compliance=Compliance(delay=0.0))
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_who_follows_advice_half_way_goes_no_farther(drive: Any) -> None:
 
 
 def test_fog_that_thickens_slows_down_as_gently(drive: Any) -> None:
-    traffic, _ = drive(DriverSetup("within_sight", spread=0.0), 5.0)
+    traffic, _ = drive(DriverSetup(within_sight, spread=0.0), 5.0)
     traffic.enter_fog(even(30.0))
     first = np.array(speeds(traffic, 10.0)["first"])
     assert first[-1] == pytest.approx(within_sight(30.0), abs=0.3)
@@ -98,14 +98,14 @@ def test_fog_that_thickens_slows_down_as_gently(drive: Any) -> None:
 
 
 def test_who_is_slower_than_advised_is_left_alone(drive: Any) -> None:
-    traffic, _ = drive(DriverSetup("within_sight", spread=0.0), 5.0)
+    traffic, _ = drive(DriverSetup(within_sight, spread=0.0), 5.0)
     first = np.array(speeds(traffic, 10.0, within_sight(60.0) + 5.0)["first"])
     assert np.ptp(first) < 0.3
 
 
 def test_who_enters_has_been_in_that_fog_before(drive: Any) -> None:
     """Nobody comes along at 30 m/s and brakes for the fog at the edge of the network."""
-    _, told = drive(DriverSetup("within_sight", spread=0.0), 20.0)
+    _, told = drive(DriverSetup(within_sight, spread=0.0), 20.0)
     # In SUMO's own departure step it is still as fast as its demand says.
     assert told["late"][0] == FAST
     assert max(told["late"][1:]) <= within_sight(60.0) + 0.05
@@ -123,14 +123,14 @@ def test_who_enters_has_passed_the_sign_upstream_if_one_who_follows_it(
 
 def test_who_was_on_the_road_when_the_fog_came_does_not_jump(drive: Any) -> None:
     traffic, _ = drive(UNAFFECTED, 20.0)
-    traffic._setup = replace(traffic._setup, drivers=DriverSetup("within_sight", spread=0.0))
+    traffic._setup = replace(traffic._setup, drivers=DriverSetup(within_sight, spread=0.0))
     traffic.enter_fog(even(60.0))
     for slowed in speeds(traffic, 4.0).values():
         assert (-np.diff(slowed) / STEP).max() <= 2.1
 
 
 def test_over_a_connection_they_drive_the_same(drive: Any, sumo_process: Callable, tmp_path: Path) -> None:
-    drivers = DriverSetup("too_fast", spread=0.1, compliance=Compliance(delay=0.0))
+    drivers = DriverSetup(too_fast, spread=0.1, compliance=Compliance(delay=0.0))
     _, here = drive(drivers, 18.0, advised=ADVISED)
     with sumo_process(command_line(free_road(tmp_path, drivers), 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)

@@ -11,6 +11,7 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.drivers.sight import DriverSight
+from fogsim.traffic.drivers.speed_choice import unaffected
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Display, SpeedAdvice, Stretch, StretchAdvice
 from tests.traffic.common import driven, even, heard, seen, setup_of, speeds_of
@@ -53,7 +54,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Traffic]]:
 
 
 def obedient(folder: Path, routes: str = ROUTES) -> TrafficSetup:
-    drivers = DriverSetup("unaffected", spread=0.0, compliance=Compliance(delay=0.0))
+    drivers = DriverSetup(unaffected, spread=0.0, compliance=Compliance(delay=0.0))
     return replace(setup_of(folder, routes, ("ego", "on", "coming", "late")), drivers=drivers)
 
 
@@ -82,7 +83,7 @@ def test_drivers_hear_advice_on_the_stretch_and_drive_by_themselves_behind_it(st
     ("compliance", "others"), [({"rate": 0.0}, {"on": ADVISED, "coming": ADVISED}), ({"reached_share": 0.0}, {})]
 )
 def test_who_has_heard_advice_is_told_whether_they_follow_it(start: Any, compliance: Any, others: Any) -> None:
-    traffic = start(drivers=DriverSetup("unaffected", spread=0.0, compliance=Compliance(**compliance)))
+    traffic = start(drivers=DriverSetup(unaffected, spread=0.0, compliance=Compliance(**compliance)))
     assert heard(seen(traffic).state) == {}
     advice = StretchAdvice(ADVISED, Stretch(), Display.LAW), StretchAdvice(20.0, Stretch(), Display.IN_CAR)
     drive(traffic, 2.0, Command(SpeedAdvice(25.0), stretches=advice))

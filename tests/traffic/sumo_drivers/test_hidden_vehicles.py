@@ -9,11 +9,11 @@ import pytest
 
 import fogsim
 from fogsim.atmosphere import FieldAccess
-from fogsim.obstruction import Obstructions, obstructions_of
 from fogsim.traffic import DriverSight
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.values import FogField, Structure, StructureKind
+from fogsim.values.obstruction import Obstructions, obstructions_of
 
 PAIRS = [("me", "other"), ("other", "me")]
 BEND = """

@@ -1,5 +1,6 @@
 """Foes at junctions: SUMO's own answer, and none where nobody has the right of way, for there SUMO would crash."""
 
+import contextlib
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,12 +23,9 @@ def crossing(folder: Path, kind: str) -> Iterator[Any]:
     subprocess.run([Path(sumo.SUMO_HOME, "bin", "netgenerate"), *grid], check=True, capture_output=True)
     cars = (f'<vehicle id="{a}" depart="0"><route edges="{a} {b}"/></vehicle>' for a, b in CROSSING_WAYS)
     routes.write_text(f"<routes>{''.join(cars)}</routes>", encoding="utf-8")
-    libsumo = load_libsumo()
-    libsumo.start(["sumo", "-n", str(net), "-r", str(routes), "--no-step-log", "--no-warnings"])
-    try:
+    with contextlib.closing(load_libsumo()) as libsumo:
+        libsumo.start(["sumo", "-n", str(net), "-r", str(routes), "--no-step-log", "--no-warnings"])
         yield libsumo
-    finally:
-        libsumo.close()
 
 
 def foes_met(libsumo: Any) -> set[str]:

@@ -122,11 +122,6 @@ def test_drivers_who_see_too_late_meet_on_the_crossing(cars: Cars) -> None:
     assert drive(crossing(cars, 140.0), CLEAR).hits == []
 
 
-def test_who_sees_through_fog_yields_in_it(cars: Cars) -> None:
-    setup = replace(crossing(cars, 125.0), sight=None)
-    assert drive(setup, 12.0).entered == drive(setup, CLEAR).entered
-
-
 @pytest.mark.parametrize("visibility", [17.0, 20.0, 22.0])
 def test_a_driver_with_priority_hits_who_stands_on_the_crossing_as_physics_says(cars: Cars, visibility: float) -> None:
     """v² = v₀² − 2 a (d − v₀ t), with the distance d at which a black side is seen, and SUMO's emergency braking."""

@@ -1,5 +1,6 @@
 """Drivers in a real SUMO: who sees late hits, who sees early stops."""
 
+import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from fogsim.traffic import (
 )
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
-from fogsim.traffic.drivers.speed_choice import within_sight
+from fogsim.traffic.drivers.speed_choice import unaffected, within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import LeaderSight
@@ -108,13 +109,10 @@ def setup(tmp_path: Path) -> TrafficSetup:
 
 def collisions(setup: TrafficSetup, k: float = 0.05, steps: int = 800) -> tuple[list[Collision], float]:
     """Collisions of a drive towards the wreck, and the ego's speed at the end [m/s]."""
-    traffic = libsumo_traffic(setup)
-    traffic.enter_fog(Fog(k))
-    try:
+    with contextlib.closing(libsumo_traffic(setup)) as traffic:
+        traffic.enter_fog(Fog(k))
         traffic.start(1)
         snapshots = driven(traffic, steps)
-    finally:
-        traffic.close()
     last = snapshots[-1]
     return [hit for one in snapshots for hit in one.collisions], float(last.state.speed[last.ego])
 
@@ -124,16 +122,11 @@ def test_who_sees_too_late_hits_at_the_speed_that_physics_gives(
     setup: TrafficSetup, sight: float, reaction: float
 ) -> None:
     """v² = v₀² − 2 a (d − v₀ t), with SUMO's emergency deceleration."""
-    ((hit,), _) = collisions(replace(setup, sight=SeesFrom(sight, reaction)), steps=800)
+    ((hit,), last_speed) = collisions(replace(setup, sight=SeesFrom(sight, reaction)), steps=800)
+    assert last_speed == pytest.approx(0.0, abs=0.01)
     expected = np.sqrt(33.8**2 - 2 * EMERGENCY_DECELERATION * (sight - 33.8 * reaction))
     assert hit.impact_speed == pytest.approx(expected, abs=1.0)
     assert {hit.collider, hit.victim} == {"ego", "wreck"}
-
-
-def test_who_sees_in_time_stops(setup: TrafficSetup) -> None:
-    hits, speed = collisions(replace(setup, sight=SeesFrom(100.0)))
-    assert hits == []
-    assert speed == pytest.approx(0.0, abs=0.01)
 
 
 def test_stock_drivers_see_through_any_fog(setup: TrafficSetup) -> None:
@@ -150,9 +143,10 @@ def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) ->
 
 def first_braking(setup: TrafficSetup, illuminance: float) -> float:
     """Gap to the wreck when the ego first brakes in fog of 60 m [m]."""
-    traffic = libsumo_traffic(replace(setup, sight=DriverSight(illuminance, reaction_time=0.0), step_length=0.02))
-    traffic.enter_fog(Fog(3.0 / 60.0))
-    try:
+    with contextlib.closing(
+        libsumo_traffic(replace(setup, sight=DriverSight(illuminance, reaction_time=0.0), step_length=0.02))
+    ) as traffic:
+        traffic.enter_fog(Fog(3.0 / 60.0))
         traffic.start(1)
         speed = 0.0
         while True:
@@ -160,8 +154,6 @@ def first_braking(setup: TrafficSetup, illuminance: float) -> float:
             before, speed = speed, float(snapshot.state.speed[snapshot.ego])
             if snapshot.leader is not None and speed < before - 0.05:
                 return snapshot.leader.gap
-    finally:
-        traffic.close()
 
 
 @pytest.mark.parametrize("are_lit", [True, False])
@@ -207,9 +199,8 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(
 def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, model: str = "LC2013") -> bool:
     """Whether the ego, free to overtake, leaves the rightmost lane before it is 45 m from a slow vehicle there."""
     setup.routes[0].write_text(SLOW_LEADER.replace("<vType", f'<vType laneChangeModel="{model}"'), encoding="utf-8")
-    traffic = libsumo_traffic(replace(setup, sight=sight, keep_lane=("slow",)))
-    traffic.enter_fog(Fog(0.05))
-    try:
+    with contextlib.closing(libsumo_traffic(replace(setup, sight=sight, keep_lane=("slow",)))) as traffic:
+        traffic.enter_fog(Fog(0.05))
         traffic.start(1)
         while True:
             (snapshot,) = driven(traffic, 1)
@@ -217,8 +208,6 @@ def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, m
                 return True
             if snapshot.leader is not None and snapshot.leader.gap < 45.0:
                 return False
-    finally:
-        traffic.close()
 
 
 def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> None:
@@ -232,13 +221,6 @@ def test_a_lane_change_model_that_cannot_be_told_keeps_seeing(setup: TrafficSetu
     assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")
 
 
-def test_after_a_collision_both_stand_and_block_the_lane_or_vanish(setup: TrafficSetup) -> None:
-    blind = replace(setup, sight=SeesFrom(20.0))
-    hits, speed = collisions(blind)
-    assert len(hits) == 1
-    assert speed == pytest.approx(0.0, abs=0.01)
-
-
 @pytest.fixture
 def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
     """The motorway's own traffic in fog of 60 m, drivers as the test sets them."""
@@ -247,7 +229,7 @@ def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
         setup,
         routes=(folder / "motorway.rou.xml",),
         warm_up_limit=600.0,
-        drivers=DriverSetup("within_sight", spread=0.0, compliance=Compliance(rate=0.5)),
+        drivers=DriverSetup(within_sight, spread=0.0, compliance=Compliance(rate=0.5)),
     )
     traffic = libsumo_traffic(busy)
     traffic.enter_fog(Fog(3.0 / 60.0))
@@ -272,19 +254,18 @@ def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(c
 
 def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
     """Mean time headway that drivers want in fog of 30 m by night, when they see a leader's lamps [s]."""
-    drivers = DriverSetup("unaffected", spread=0.0, misjudgement=misjudgement)
+    drivers = DriverSetup(unaffected, spread=0.0, misjudgement=misjudgement)
     routes = (NET.parent / "motorway.rou.xml",)
     sight = DriverSight(0.1)
-    traffic = libsumo_traffic(
-        replace(setup, routes=routes, warm_up_limit=600.0, drivers=drivers, step_length=0.1, sight=sight)
-    )
-    traffic.enter_fog(Fog(0.1))
-    try:
+    with contextlib.closing(
+        libsumo_traffic(
+            replace(setup, routes=routes, warm_up_limit=600.0, drivers=drivers, step_length=0.1, sight=sight)
+        )
+    ) as traffic:
+        traffic.enter_fog(Fog(0.1))
         traffic.start(1)
         vehicles = load_libsumo().vehicle
         return float(np.mean([vehicles.getTau(v) for v in seen(traffic).state.ids if v != "ego"]))
-    finally:
-        traffic.close()
 
 
 def test_who_misjudges_distances_follows_closer(setup: TrafficSetup) -> None:

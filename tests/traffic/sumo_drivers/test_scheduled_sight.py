@@ -42,8 +42,7 @@ def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str
     return bool(depth <= sight.depth_limit(distance, contrast, rear_intensity(lit), head_lamps))
 
 
-@pytest.mark.parametrize("field", [EVEN, BANKS], ids=["even", "banks"])
-@pytest.mark.parametrize("illuminance", [10_000.0, 3.0, 0.1], ids=["day", "dusk", "night"])
+@pytest.mark.parametrize(("field", "illuminance"), [(EVEN, 10_000.0), (BANKS, 3.0), (EVEN, 0.1)])
 def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
     """For every leader that has been the leader for as long as a look may wait."""
     api, fog = link.begin(CROWD), FieldAccess(field)

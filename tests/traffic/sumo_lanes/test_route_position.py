@@ -1,5 +1,6 @@
 """Gaps to the ego from bumper to bumper, and the events that wait for them."""
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -39,8 +40,7 @@ def test_gaps_are_those_that_sumo_keeps_to_its_leaders_on_roads_and_junctions() 
 def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:
     slow = BrakeEvent("lead", Trigger(at_time=0.0), to_speed=15.0)
     event = LampFailureEvent("lead", Trigger(at_gap_to_ego=60.0))
-    traffic = libsumo_traffic(replace(SETUP, events=(slow, event)))
-    try:
+    with contextlib.closing(libsumo_traffic(replace(SETUP, events=(slow, event)))) as traffic:
         traffic.start(1)
         gaps = [math.inf]
         for _ in range(150):
@@ -52,8 +52,6 @@ def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:
             gaps.append(math.dist(state.position[lead], state.position[snapshot.ego]) - state.length[lead])
         else:
             pytest.fail("the lamps never failed")
-    finally:
-        traffic.close()
     assert gaps[-1] == pytest.approx(60.0, abs=1.5)
 
 

@@ -1,5 +1,6 @@
 """Traffic lights and persons of a real SUMO at a crossing, and where the heads stand."""
 
+import contextlib
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -26,9 +27,8 @@ DEMAND = """<routes>
 
 def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
     setup = replace(setup_of(folder, DEMAND, step=0.5), net=NET)
-    traffic = libsumo_traffic(setup)
-    seen = []
-    try:
+    with contextlib.closing(libsumo_traffic(setup)) as traffic:
+        seen = []
         traffic.start(0)
         for _ in range(steps):
             traffic.advance(Command())
@@ -36,8 +36,6 @@ def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
             if snapshot is None:
                 break
             seen.append(snapshot)
-    finally:
-        traffic.close()
     return seen
 
 

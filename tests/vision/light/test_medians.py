@@ -6,8 +6,18 @@ import pytest
 from fogsim.vision.light.medians import median, quantile, row_medians
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 11, 100, 1001])
-@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    [
+        (np.float32, 1),
+        (np.float64, 2),
+        (np.float32, 3),
+        (np.float64, 4),
+        (np.float32, 11),
+        (np.float64, 100),
+        (np.float32, 1001),
+    ],
+)
 def test_medians_are_those_of_numpy(count: int, kind: type[np.float32] | type[np.float64]) -> None:
     """Of odd and even numbers of values, in one dimension and row by row; what is given is left as it is."""
     values = np.random.default_rng(count).normal(size=(5, count)).astype(kind)

@@ -28,18 +28,6 @@ def test_a_step_is_an_edge_where_it_is():
     assert edges.threshold == MIN_GRADIENT
 
 
-def test_edges_of_a_mirrored_image_are_mirrored():
-    image, rng = np.full((60, 80), 90.0, np.float32), np.random.default_rng(1)
-    for row, col in rng.integers(0, (30, 70), (6, 2)):
-        image[row : row + 12, col : col + 9] = rng.uniform(60.0, 200.0)
-    image = cv2.GaussianBlur(image, (0, 0), 1.5)
-    slope = np.full(60, 1.0, np.float32)
-    found = edge_map(image, slope).pixels
-    assert found.any()
-    mirrored = edge_map(np.ascontiguousarray(image[:, ::-1]), slope).pixels
-    np.testing.assert_array_equal(mirrored[:, ::-1], found)
-
-
 @pytest.mark.parametrize("fall", [3.0, 6.0])
 def test_fog_may_take_off_so_much_of_a_row_and_no_more(fall):
     """A brightening upward by `fall` a row: what fog can make is taken off, the rest stays."""

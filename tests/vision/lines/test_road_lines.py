@@ -37,13 +37,6 @@ def test_clutter_is_outvoted():
     assert point.row == pytest.approx(ROW, abs=1.5)
 
 
-def test_mirrored_lines_meet_in_the_mirrored_point():
-    image = road_lines()
-    point, mirrored = found(image), found(np.ascontiguousarray(image[:, ::-1]), guess=(639 - 325.0, 64.0))
-    assert mirrored.row == pytest.approx(point.row, abs=0.1)
-    assert mirrored.column == pytest.approx(639 - point.column, abs=0.1)
-
-
 @pytest.mark.parametrize("offsets", [(1.75, 1.76)])
 def test_one_faint_line_is_no_point(offsets):
     assert found(road_lines(offsets=offsets, contrast=3.0)) is None

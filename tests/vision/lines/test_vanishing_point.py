@@ -84,14 +84,6 @@ def test_deviation_of_the_point_is_that_of_many_trials():
     assert np.cov(found.T) == pytest.approx(expected, abs=0.1 * expected[1, 1])
 
 
-def test_mirrored_lines_meet_in_the_mirrored_point():
-    slope, offset = np.array([-2.0, -0.5, 0.8, 3.0]), np.array([430.0, 340.0, 261.0, 140.0])
-    point, covariance = nearest_point(sloped_lines(offset, slope), np.ones(4))
-    mirrored, other = nearest_point(sloped_lines(639.0 - offset, -slope), np.ones(4))
-    assert mirrored == pytest.approx((639.0 - point[0], point[1]), abs=1e-9)
-    assert other[1, 1] == pytest.approx(covariance[1, 1])
-
-
 def test_residuals_widen_a_deviation_and_never_narrow_it():
     assert residual_scale(np.array([0.1, -0.1, 0.0])) == 1.0
     assert residual_scale(np.array([3.0, 0.0, 0.0, 4.0])) == pytest.approx(math.sqrt(25.0 / 2.0))

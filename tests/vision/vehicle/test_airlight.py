@@ -43,8 +43,7 @@ def test_nothing_of_that_light_leaves_what_it_was_thought_to_be():
     assert neighbouring_airlight(sky(90.0), 180.0, NOISE, 300.0, 30.0) == 180.0
 
 
-@pytest.mark.parametrize("extinction", [0.003, 0.03, 0.1])
-@pytest.mark.parametrize("reflectance", [0.05, 0.5])
+@pytest.mark.parametrize(("extinction", "reflectance"), [(0.003, 0.05), (0.03, 0.5), (0.1, 0.05)])
 def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
     camera = CAMERA
 

@@ -34,9 +34,18 @@ def found(image, depth, noise=1.0, camera=CAMERA):
     return localise_rear(image[rows, cols], (cols.start, rows.start), camera, depth, noise)
 
 
-@pytest.mark.parametrize("rear", [0.65, 0.9, 1.6, 1.9, 2.5], ids=str)
 @pytest.mark.parametrize(
-    ("depth", "visibility"), [(12, 30), (12, 300), (25, 60), (50, 60), (50, 300), (80, 120), (80, 300)]
+    ("rear", "depth", "visibility"),
+    [
+        (0.65, 12, 30),
+        (0.9, 12, 300),
+        (1.6, 25, 60),
+        (1.9, 50, 60),
+        (2.5, 50, 300),
+        (1.6, 80, 120),
+        (0.65, 80, 300),
+        (2.5, 12, 30),
+    ],
 )
 def test_rears_from_motorcycles_to_lorries_are_found_within_a_pixel(rear, depth, visibility):
     image, left, right = road(depth, rear, visibility, 1.0, 1, aside=0.4)

@@ -16,8 +16,7 @@ def crop(depth: float, light: float = 120.0, road: float = 120.0, least_noise: f
     return vehicle_crop(CAMERA, depth, lambda rows, cols: image[rows, cols], lambda: SKY, least_noise)
 
 
-@pytest.mark.parametrize("depth", [8.0, 25.0, 90.0])
-@pytest.mark.parametrize("aside", [-0.8, 0.0, 0.5])
+@pytest.mark.parametrize(("depth", "aside"), [(8.0, -0.8), (25.0, 0.0), (90.0, 0.5)])
 def test_places_in_metres_and_in_pixels_are_the_same(depth, aside):
     found = crop(depth)
     picture = found.expected(aside, 1.8)

@@ -1,0 +1,236 @@
+"""Fits drivers' speeds and headways in fog to measured passages of vehicles, from loops or trajectories.
+
+In fog a driver without a slower vehicle ahead drives the smaller of f·c(V) and s(V)·v₀: v₀ is the speed in clear air
+and f the driver's own factor, both log-normal; c and s are `ObservedSpeed`'s limits (docs/explanation/drivers.md). The
+likelihood of the smaller of two independent values gives c's ratio, s's lowest value and the spreads; intervals are
+from the sandwich covariance, over sessions where the data have them. Shares of the kinds of drivers are those of a
+mixture: each kind turns the headways measured in clear air into headways in fog.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from fogsim.core.files.readers import number_in_text, read_text
+from fogsim.errors import InputError
+from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE, Surroundings
+from fogsim.traffic.drivers.sight import DriverSight, leader_reach
+from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE, ObservedSpeed
+from fogsim.units import DAY_ILLUMINANCE, KMH_PER_MPS
+
+Floats = NDArray[np.float64]
+
+FOLLOWING_BELOW = 4.0
+"""Headway up to which a vehicle follows the one ahead; above, its speed is the driver's own choice [s]."""
+
+LEAST = 30
+"""Fewest vehicles in fog, and in clear air, that a fit needs."""
+
+_SPEEDS = {"speed_mps": 1.0, "speed_kmh": KMH_PER_MPS}
+_FITTED = ("slowest_share", "overdriving", "speed_spread")
+_NORMAL_90 = 1.6448536
+_STEP = 1e-4
+"""Step of numerical derivatives, in logarithms [-]."""
+
+_RESAMPLES, _ITERATIONS = 200, 300
+_MINIMUM_GAP = 2.5
+"""Gap at a standstill of SUMO's vehicles [m]."""
+
+_CLEAR_HEADWAYS, _KERNEL = 100, 0.05
+"""Quantiles that stand for the headways in clear air, and the width of each in fog [log s]."""
+
+
+class Interval(NamedTuple):
+    """A fitted value and the ends of its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Passages:
+    """Vehicles that passed, each array (n,)."""
+
+    visibility: Floats  # [m]
+    speed: Floats  # [m/s]
+    headway: Floats  # [s]; NaN where unknown
+    session: NDArray[np.intp]  # Number of the day or site whose vehicles are not independent; -1 for none
+
+
+@dataclass(frozen=True, slots=True)
+class FittedDrivers:
+    """Constants of drivers, each with its 90 % interval, and the number of vehicles behind them."""
+
+    constants: Mapping[str, Interval]  # By name
+    following: Mapping[str, Interval]  # Shares of kinds with intervals; empty without headways
+    clear: int
+    fog: int
+
+    def as_yaml(self, source: str) -> str:
+        """The block ``drivers`` of a scenario."""
+        share, ratio, spread = (self.constants[name][0] for name in _FITTED)
+        lines = [
+            f"# fogsim calibrate drivers {source}: {self.fog} vehicles in fog, {self.clear} in clear air",
+            "drivers:",
+            "  speed_choice:",
+            "    method: observed",
+            f"    parameters: {{slowest_share: {share:.3f}, overdriving: {ratio:.3f}}}",
+            f"  speed_spread: {spread:.3f}",
+        ]
+        if self.following:
+            *first, last = ((name, round(value, 3)) for name, (value, _, _) in self.following.items())
+            shares = [*first, (last[0], round(1.0 - sum(value for _, value in first), 3))]
+            lines.append(f"  following: {{{', '.join(f'{name}: {value:g}' for name, value in shares)}}}")
+        return "\n".join(lines) + "\n"
+
+
+def read_passages(path: Path) -> Passages:
+    """Read a CSV of vehicles: visibility_m, speed_kmh or speed_mps, and if known headway_s and session."""
+    rows = csv.DictReader(io.StringIO(read_text(path), newline=""))
+    values, sessions = [], []
+    try:
+        names = rows.fieldnames or ()
+        speeds = [name for name in _SPEEDS if name in names]
+        if "visibility_m" not in names or len(speeds) != 1:
+            raise InputError(
+                f"{path}:1: expected columns visibility_m and either speed_kmh or speed_mps, and if known headway_s "
+                f"and session; got {', '.join(names) or 'none'}"
+            )
+        for row in rows:
+            where = f"{path}:{rows.line_num}"
+            speed = number_in_text(where, speeds[0], row[speeds[0]] or "", 0.1, 500.0) / _SPEEDS[speeds[0]]
+            visibility = number_in_text(where, "visibility_m", row["visibility_m"] or "", 1.0, 1e6)
+            headway = row.get("headway_s")
+            gap = number_in_text(where, "headway_s", headway, 0.01, 1e6) if headway else math.nan
+            values.append((visibility, speed, gap))
+            sessions.append(row.get("session") or "")
+    except csv.Error as error:
+        raise InputError(f"{path}:{rows.line_num + 1}: not valid CSV: {error}") from error
+    columns = np.array(values, dtype=float).reshape(-1, 3).T
+    if any(sessions) and not all(sessions):
+        raise InputError(f"{path}:{2 + sessions.index('')}: session is empty; give one for every vehicle, or for none")
+    _, number = np.unique(sessions, return_inverse=True)
+    return Passages(columns[0], columns[1], columns[2], number if any(sessions) else np.full(len(sessions), -1))
+
+
+def fit_drivers(passages: Passages) -> FittedDrivers:
+    """Fit speeds of vehicles that do not follow, and headways of those that do; InputError where there are too few."""
+    fog, follows = passages.visibility < UNAFFECTED_ABOVE, passages.headway <= FOLLOWING_BELOW
+    for words, chosen in (("in fog", fog & ~follows), ("in clear air", ~fog & ~follows)):
+        if np.count_nonzero(chosen) < LEAST:
+            raise InputError(
+                f"expected at least {LEAST} vehicles {words} (visibility below or above {UNAFFECTED_ABOVE:g} m) that "
+                f"do not follow another within {FOLLOWING_BELOW:g} s, got {np.count_nonzero(chosen)}"
+            )
+    constants = _fitted_speeds(passages, ~follows)
+    clear_headways = passages.headway[~fog & follows]
+    enough = min(int(np.count_nonzero(fog & follows)), len(clear_headways)) >= LEAST
+    following = _fitted_shares(passages, fog & follows, clear_headways) if enough else {}
+    return FittedDrivers(constants, following, int(np.count_nonzero(~fog)), int(np.count_nonzero(fog)))
+
+
+class _SpeedModel:
+    """Likelihood of the speeds of vehicles that do not follow.
+
+    Parameters are the mean and log-deviation of the logarithm of the speed in clear air, the logit of the share that is
+    lost in severe fog, and the logarithms of the ratio to the safe speed and of its spread.
+    """
+
+    def __init__(self, visibility: Floats, speed: Floats) -> None:
+        usual, least = ObservedSpeed(), ObservedSpeed(slowest_share=0.5, overdriving=1.0)
+        self._log_speed = np.log(speed)
+        self._log_safe = np.log([least(v) for v in visibility])
+        self._rise = np.clip((visibility - usual.safe_up_to) / (usual.overdriving_from - usual.safe_up_to), 0.0, 1.0)
+        self._density = np.array([1.0 - least.share(v) for v in visibility]) / 0.5
+        clear = self._log_speed[visibility >= UNAFFECTED_ABOVE]
+        lost = 1.0 - usual.slowest_share
+        self.begin = np.array(
+            [clear.mean(), math.log(clear.std()), math.log(lost / (1.0 - lost)), math.log(usual.overdriving), -2.3]
+        )
+
+    def losses(self, parameters: Floats) -> Floats:
+        """Negative logarithm of each vehicle's likelihood (n,)."""
+        centre, log_deviation, logit, log_ratio, log_spread = parameters
+        share = 1.0 - self._density / (1.0 + math.exp(-logit))
+        own = (self._log_speed - centre - np.log(share)) / math.exp(log_deviation)
+        limit = self._log_safe + np.log1p((math.exp(log_ratio) - 1.0) * self._rise)
+        seen = (self._log_speed - limit) / math.exp(log_spread)
+        by_own = stats.norm.logpdf(own) - log_deviation + stats.norm.logsf(seen)
+        by_sight = stats.norm.logpdf(seen) - log_spread + stats.norm.logsf(own)
+        return np.asarray(-np.logaddexp(by_own, by_sight))
+
+
+_BOUNDS = ((None, None), (-6.0, 2.0), (-8.0, 3.0), (-1.0, 2.3), (-5.0, 1.0))
+
+
+def _fitted_speeds(passages: Passages, free: NDArray[np.bool_]) -> dict[str, Interval]:
+    model = _SpeedModel(passages.visibility[free], passages.speed[free])
+    fit = optimize.minimize(lambda at: float(model.losses(at).mean()), model.begin, method="L-BFGS-B", bounds=_BOUNDS)
+    found = fit.x
+    reach = _NORMAL_90 * _deviations(model, found, passages.session[free])
+    low, high = found - reach, found + reach
+    kept = 1.0 / (1.0 + np.exp([found[2], high[2], low[2]]))
+    ratio, spread = (np.exp([found[i], low[i], high[i]]) for i in (3, 4))
+    return {name: Interval(*map(float, value)) for name, value in zip(_FITTED, (kept, ratio, spread), strict=True)}
+
+
+def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) -> Floats:
+    """Standard deviations of fitted parameters: the sandwich of the scores, summed over sessions."""
+    steps = _STEP * np.eye(len(found))
+
+    def scores(at: Floats) -> Floats:
+        return np.stack([(model.losses(at + step) - model.losses(at - step)) / (2.0 * _STEP) for step in steps])
+
+    curvature = np.stack([(scores(found + step) - scores(found - step)).sum(axis=1) / (2.0 * _STEP) for step in steps])
+    each = scores(found)
+    if int(session[0]) >= 0:
+        each = np.stack([np.bincount(session, weights=score) for score in each])
+    bread = np.linalg.pinv(curvature)
+    return np.asarray(np.sqrt(np.diag(bread @ (each @ each.T) @ bread)))
+
+
+def _fitted_shares(passages: Passages, following: NDArray[np.bool_], clear: Floats) -> dict[str, Interval]:
+    """Shares of the kinds of drivers among those who follow in fog, with intervals from resampled vehicles.
+
+    Headways cannot distinguish `careful` from `out_of_sight`: these keep their ratio in `OBSERVED_MIXTURE`.
+    """
+    kinds = ("in_sight", "unaffected", "careful")
+    own = np.quantile(clear, (np.arange(_CLEAR_HEADWAYS) + 0.5) / _CLEAR_HEADWAYS)
+    sight = DriverSight(DAY_ILLUMINANCE)
+    density = np.empty((np.count_nonzero(following), len(kinds)))
+    rows = zip(*(values[following] for values in (passages.visibility, passages.speed, passages.headway)), strict=True)
+    for i, (visibility, speed, headway) in enumerate(rows):
+        around = Surroundings(visibility, leader_reach(sight, visibility), speed, _MINIMUM_GAP)
+        for j, kind in enumerate(kinds):
+            expected = np.log([FOLLOWING_MODELS[kind].headway(one, around) for one in own])
+            density[i, j] = stats.norm.pdf(math.log(headway), expected, _KERNEL).mean()
+    session = passages.session[following]
+    blocks = np.arange(len(session)) if int(session[0]) < 0 else np.unique(session, return_inverse=True)[1]
+    rng, count = np.random.default_rng(0), int(blocks.max()) + 1
+    weights = [np.bincount(rng.integers(count, size=count), minlength=count)[blocks] for _ in range(_RESAMPLES)]
+    ends = np.quantile([_mixture(density, weight) for weight in weights], (0.05, 0.95), axis=0)
+    found = np.stack([_mixture(density, np.ones(len(blocks))), *ends], axis=1)
+    shares = {kind: Interval(*row) for kind, row in zip(kinds, found.tolist(), strict=True)}
+    careful, hidden = OBSERVED_MIXTURE["careful"], OBSERVED_MIXTURE["out_of_sight"]
+    both = shares.pop("careful")
+    for kind, part in (("careful", careful), ("out_of_sight", hidden)):
+        shares[kind] = Interval(*(part / (careful + hidden) * value for value in both))
+    return shares
+
+
+def _mixture(density: Floats, weight: NDArray[Any]) -> Floats:
+    """Shares of a mixture of known densities (n, kinds) with the greatest weighted likelihood (kinds,)."""
+    shares = np.full(density.shape[1], 1.0 / density.shape[1])
+    for _ in range(_ITERATIONS):
+        joint = shares * density + 1e-300
+        shares = (weight[:, None] * joint / joint.sum(axis=1, keepdims=True)).sum(axis=0) / weight.sum()
+    return shares

@@ -1,0 +1,220 @@
+"""Which cases a campaign draws: batches that depend only on the seed, the batch and earlier results."""
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+from scipy.stats import qmc
+
+from fogsim.conditions import FindingVerdict
+from fogsim.core.randomness import named_generator
+from fogsim.scenario.variation import Draws, SeedLevels, Value, number_with_unit
+from fogsim.testing.campaign.boundary import Boundary, fit_boundary
+from fogsim.testing.campaign.failure_rate import FailureRate, Proposal, failure_rate, first_proposal, next_proposal
+from fogsim.testing.results import CaseResult
+from fogsim.units.quantities import split_quantity
+
+Sequencing = Literal["sobol", "latin_hypercube"]
+"""How the first cases fill the space."""
+
+_FIRST_PER_PARAMETER = 8
+"""Cases that fill the space, for each parameter; a power of two of them."""
+
+_BATCH = 16
+"""Cases near the boundary between two fits."""
+
+_MOST_FOR_BOUNDARY = 200
+_CANDIDATES = 4096
+
+_LEAST_FOR_RATE = 200
+"""Cases below which a search for the rate is not begun."""
+
+_LEVELS = 8
+"""Share of the cases for the rate that each level has: one in so many."""
+
+_PASSING = 1e-9
+"""Margin of a case that passed, at the least [-]."""
+
+
+class Purpose(StrEnum):
+    """What a case was drawn for; only cases of `RATE` enter the failure rate."""
+
+    SPACE = "space"
+    BOUNDARY = "boundary"
+    LEVEL = "level"
+    RATE = "rate"
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A case to run: its values as text with units, and what it is for."""
+
+    purpose: Purpose
+    values: Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """The parameters of a space, those with a distribution, in the file's order."""
+
+    axes: Mapping[str, Draws]
+
+    @classmethod
+    def of(cls, declared: Mapping[str, Draws | SeedLevels]) -> "Space":
+        """Space of a file."""
+        return cls({name: one for name, one in declared.items() if isinstance(one, Draws)})
+
+    def by_quantiles(self, shares: NDArray[np.float64]) -> list[dict[str, Value]]:
+        """Values at quantiles (n, d)."""
+        return [self._values(row, [one.quantile for one in self.axes.values()]) for row in shares.tolist()]
+
+    def by_places(self, places: NDArray[np.float64]) -> list[dict[str, Value]]:
+        """Values at places on the axes (n, d)."""
+        return [self._values(row, [one.on_axis for one in self.axes.values()]) for row in places.tolist()]
+
+    def _values(self, row: Sequence[float], functions: Sequence[object]) -> dict[str, Value]:
+        values = [function(one) for function, one in zip(functions, row, strict=True)]  # type: ignore[operator]
+        return {
+            name: number_with_unit(value, axis.unit)
+            for value, (name, axis) in zip(values, self.axes.items(), strict=True)
+        }
+
+    def places(self, results: Sequence[CaseResult]) -> NDArray[np.float64]:
+        """Places of cases on the axes (n, d), 0 … 1 each."""
+        rows = [[axis.place(number_of(one.run.levels[name])) for name, axis in self.axes.items()] for one in results]
+        return np.array(rows, float).reshape(len(rows), len(self.axes))
+
+
+def number_of(level: str) -> float:
+    """Number in a value, without its unit."""
+    found = split_quantity(level)
+    return float(level) if found is None else found[0]
+
+
+@dataclass(slots=True)
+class Findings:
+    """What a campaign has found: its cases in order, the boundary, and the failure rate."""
+
+    drawn: list[Drawn] = field(default_factory=list)
+    results: list[CaseResult] = field(default_factory=list)
+    boundary: Boundary | None = None
+    rate: FailureRate | None = None
+    why_no_rate: str = ""
+
+
+def batches(
+    space: Space, seed: int, budget: int, sequencing: Sequencing, found: Findings
+) -> Generator[list[Drawn], list[CaseResult], None]:
+    """Batches of cases; each is sent its results, and `found` has what they show."""
+    yield from _fill(space, seed, budget, sequencing, found)
+    for_boundary = budget if budget < 2 * _LEAST_FOR_RATE else min(_MOST_FOR_BOUNDARY, budget // 2)
+    yield from _search_boundary(space, seed, for_boundary, found)
+    found.boundary = _fitted(space, found.results)
+    yield from _search_rate(space, seed, budget - len(found.drawn), found)
+
+
+_Batches = Generator[list[Drawn], list[CaseResult], None]
+
+
+def _run(
+    purpose: Purpose, values: Sequence[dict[str, Value]], found: Findings
+) -> Generator[list[Drawn], list[CaseResult], list[CaseResult]]:
+    drawn = [Drawn(purpose, one) for one in values]
+    results = yield drawn
+    found.drawn += drawn
+    found.results += results
+    return results
+
+
+def _fill(space: Space, seed: int, budget: int, sequencing: Sequencing, found: Findings) -> _Batches:
+    width, generator = len(space.axes), named_generator(seed, "space")
+    number = min(2 ** int(np.ceil(np.log2(_FIRST_PER_PARAMETER * width))), budget)
+    if sequencing == "sobol":
+        shares = qmc.Sobol(width, rng=generator).random_base2(int(np.ceil(np.log2(number))))[:number]
+    else:
+        shares = qmc.LatinHypercube(width, rng=generator).random(number)
+    yield from _run(Purpose.SPACE, space.by_quantiles(shares), found)
+
+
+def _search_boundary(space: Space, seed: int, until: int, found: Findings) -> _Batches:
+    while len(found.drawn) < until:
+        generator = named_generator(seed, f"boundary {len(found.drawn)}")
+        candidates = qmc.Sobol(len(space.axes), rng=generator).random_base2(int(np.log2(_CANDIDATES)))
+        number = min(_BATCH, until - len(found.drawn))
+        boundary = _fitted(space, found.results)
+        # While all cases have one outcome, others may be anywhere.
+        chosen = candidates[:number] if boundary is None else candidates[boundary.choose(candidates, number)]
+        yield from _run(Purpose.BOUNDARY, space.by_places(chosen), found)
+
+
+def _fitted(space: Space, results: Sequence[CaseResult]) -> Boundary | None:
+    """Boundary of cases with both outcomes; cases that are inconclusive or went wrong do not count."""
+    decided = [one for one in results if is_decided(one)]
+    failed = np.array([one.has_failed for one in decided])
+    return fit_boundary(space.places(decided), failed) if failed.any() and not failed.all() else None
+
+
+def is_decided(result: CaseResult) -> bool:
+    """Whether a case passed or failed."""
+    return result.is_passed or (result.message is None and result.has_failed)
+
+
+def verdict_of(result: CaseResult) -> str:
+    """Word for the outcome of a case."""
+    if result.message is not None:
+        return "error"
+    return str(
+        FindingVerdict.FAILED if result.has_failed else FindingVerdict.PASSED if result.is_passed else "inconclusive"
+    )
+
+
+def margin_of(result: CaseResult) -> float | None:
+    """Signed distance to failure as a share of the nearest limit; None if no number was compared."""
+    known = [one.margin for one in result.findings if one.margin is not None]
+    if result.message is not None or not known:
+        return None
+    return min(*known, 0.0) if result.has_failed else max(min(known), _PASSING)
+
+
+def _search_rate(space: Space, seed: int, left: int, found: Findings) -> _Batches:
+    if left < _LEAST_FOR_RATE:
+        found.why_no_rate = f"a failure rate needs a budget of {2 * _LEAST_FOR_RATE} cases"
+        return
+    proposal, size = first_proposal(len(space.axes)), max(left // _LEVELS, 50)
+    for level in range(_LEVELS // 2):
+        places, results = yield from _drawn_from(proposal, Purpose.LEVEL, size, f"level {level}", space, seed, found)
+        margins = _margins(results)
+        if margins is None:
+            found.why_no_rate = "no expectation compares a number, such as always: ego.ttc >= 0.5 s"
+            return
+        proposal = next_proposal(proposal, places, margins)
+        left -= size
+        if proposal.is_final:
+            break
+    places, results = yield from _drawn_from(proposal, Purpose.RATE, left, "rate", space, seed, found)
+    if wrong := sum(one.message is not None for one in results):
+        found.why_no_rate = f"{wrong} runs for the rate went wrong"
+        return
+    failed = np.array([one.has_failed for one in results])
+    found.rate = failure_rate(proposal, places, np.where(failed, -1.0, 1.0))
+    if not found.rate.is_known:
+        found.why_no_rate = f"too few cases failed: effectively {found.rate.effective:.0f} of {left}"
+
+
+def _drawn_from(
+    proposal: Proposal, purpose: Purpose, number: int, name: str, space: Space, seed: int, found: Findings
+) -> Generator[list[Drawn], list[CaseResult], tuple[NDArray[np.float64], list[CaseResult]]]:
+    places = proposal.draw(named_generator(seed, name), number)
+    results = yield from _run(purpose, space.by_quantiles(ndtr(places)), found)
+    return places, results
+
+
+def _margins(results: Sequence[CaseResult]) -> NDArray[np.float64] | None:
+    """Margins of cases; unknown ones are taken as the largest of the known, None if all are unknown."""
+    margins = [margin_of(one) for one in results]
+    known = [one for one in margins if one is not None]
+    return np.array([max(known) if one is None else one for one in margins]) if known else None

@@ -1,6 +1,7 @@
 """How episodes of a batch begin: the fog along the road, the traffic on it, and what the ego knows first."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ _FREE, _FILLING_GAP, _TRUCK_SPEED = 120.0, 25.0, 24.7
 
 
 @kernel
-def _lay_fog(one: NDArray[np.void], drawn: NDArray[np.void], depth: NDArray[np.float64]) -> None:
+def _lay_fog(one: Any, drawn: Any, depth: NDArray[np.float64]) -> None:
     """Fill in the optical depth along the road: banks with soft edges, and patches."""
     noise, patches = np.empty(CELLS_AHEAD // 2 + 18), np.ones(CELLS_AHEAD // 2 + 2)
     if drawn.strength > 0.0:
@@ -72,8 +73,8 @@ def _risen(position: float, middle: float, edge: float) -> float:
 
 
 @kernel
-def _find_place(one: NDArray[np.void], others: NDArray[np.void], j: int) -> None:
-    """Place a vehicle where it is in nobody's way; off the road where no such place is found."""
+def _find_place(one: Any, others: Any, j: int) -> None:
+    """Place a vehicle where it blocks no other; off the road where no such place is found."""
     it = others[j]
     for _ in range(10):
         place = _FREE + (LENGTH - _FREE) * uniform(one)
@@ -87,7 +88,7 @@ def _find_place(one: NDArray[np.void], others: NDArray[np.void], j: int) -> None
 
 
 @kernel
-def _place_traffic(one: NDArray[np.void], drawn: NDArray[np.void], others: NDArray[np.void]) -> None:
+def _place_traffic(one: Any, drawn: Any, others: Any) -> None:
     """Place the actor, if there is one, and other vehicles anywhere along the lanes."""
     for j in range(OTHERS):
         others[j].length, others[j].position = 0.0, -1e9
@@ -121,7 +122,7 @@ def _place_traffic(one: NDArray[np.void], drawn: NDArray[np.void], others: NDArr
 def begin(
     episodes: Episodes,
     rows: NDArray[np.int64],
-    draws: NDArray[np.void],
+    draws: Any,
     table: SurrogateArrays,
     rule: RuleConstants,
 ) -> None:

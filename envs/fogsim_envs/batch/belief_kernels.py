@@ -1,6 +1,7 @@
 """What the ego makes of the fog: estimates drawn as the estimator errs, the belief, and the built-in rule's answer."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(
 
 
 @kernel
-def uniform(one: NDArray[np.void]) -> float:
+def uniform(one: Any) -> float:
     """Next random number of an episode, above 0 and below 1 (splitmix64)."""
     one.random += GOLDEN
     z = one.random
@@ -38,7 +39,7 @@ def uniform(one: NDArray[np.void]) -> float:
 
 
 @kernel
-def normals(one: NDArray[np.void]) -> tuple[float, float]:
+def normals(one: Any) -> tuple[float, float]:
     """Two normal deviates (Box-Muller)."""
     size, angle = math.sqrt(-2.0 * math.log(uniform(one))), 2.0 * math.pi * uniform(one)
     return size * math.cos(angle), size * math.sin(angle)
@@ -53,7 +54,7 @@ def _at(quantiles: NDArray[np.float64], normal: float) -> float:
 
 
 @kernel
-def draw_estimate(one: NDArray[np.void], table: SurrogateArrays) -> None:
+def draw_estimate(one: Any, table: SurrogateArrays) -> None:
     """Draw the next estimate; see `fogsim_envs.task.surrogate.EstimatorSurrogate.estimate`."""
     new, width = normals(one)
     own, light, column = math.sqrt(1.0 - table.persistence**2), int(one.light), 0
@@ -77,7 +78,7 @@ def draw_estimate(one: NDArray[np.void], table: SurrogateArrays) -> None:
 
 
 @kernel
-def update_belief(one: NDArray[np.void], belief: NDArray[np.float64], scratch: NDArray[np.float64]) -> None:
+def update_belief(one: Any, belief: NDArray[np.float64], scratch: NDArray[np.float64]) -> None:
     """Let time pass and an estimate count, as `fogsim.fusion.GridFilter` does (`scratch` (CELLS,))."""
     if one.time > 0.0:
         moving = min(max(round(10.0 * one.speed / _SLOW) / 10.0, _STILL), 1.0)
@@ -99,7 +100,7 @@ def update_belief(one: NDArray[np.void], belief: NDArray[np.float64], scratch: N
 
 
 @kernel
-def _summarise(one: NDArray[np.void], belief: NDArray[np.float64], scale: float) -> None:
+def _summarise(one: Any, belief: NDArray[np.float64], scale: float) -> None:
     """Normalise the belief; its quantiles and deviations."""
     mean = square = fog_mean = fog_square = reached = before = 0.0
     place, below = 0, LOG_EXTINCTION[0]
@@ -127,7 +128,7 @@ def _summarise(one: NDArray[np.void], belief: NDArray[np.float64], scale: float)
 
 
 @kernel
-def _put_quantile(one: NDArray[np.void], place: int, visibility: float) -> None:
+def _put_quantile(one: Any, place: int, visibility: float) -> None:
     """Keep a quantile of the visibility [m] by its place in `_SHARES`."""
     if place == 0:
         one.quantile_95 = visibility
@@ -166,7 +167,7 @@ def _diffuse(belief: NDArray[np.float64], elapsed: float, scratch: NDArray[np.fl
 
 
 @kernel
-def answer_rule(one: NDArray[np.void], rule: RuleConstants, limit: float) -> None:
+def answer_rule(one: Any, rule: RuleConstants, limit: float) -> None:
     """What `StoppingSightDistance` and `FogLampRules` say to the belief (`limit` [m/s])."""
     is_known = one.fog_deviation <= rule.widest and one.time - one.evidence <= OLDEST
     front, rear = one.rule_lamps >= 1, one.rule_lamps >= 2

@@ -1,6 +1,7 @@
 """Road, fog, traffic, reward and observation of many episodes: one kernel moves them all by a decision period."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,10 @@ _PATIENCE, _KEEPS_LEFT = 0.3, 35.0
 SUMO's drivers do in the Fast task."""
 
 
+_ARRIVAL = END + 0.2
+"""Where an episode is over [m]: an ego at 1940.17 m was still under way in the Fast task."""
+
+
 @kernel
 def _depth_at(depth: NDArray[np.float64], position: float) -> float:
     """Optical depth from the road's beginning to a place [-]."""
@@ -64,7 +69,7 @@ def _visibility_at(depth: NDArray[np.float64], position: float) -> float:
 
 
 @kernel
-def _look_ahead(one: NDArray[np.void], depth: NDArray[np.float64]) -> None:
+def _look_ahead(one: Any, depth: NDArray[np.float64]) -> None:
     """Visibility where the ego is, and as far as one sees ahead."""
     one.visibility = _visibility_at(depth, one.position)
     sought = _depth_at(depth, one.position) + OPTICAL_DEPTH_AT_VISIBILITY
@@ -84,7 +89,7 @@ def _look_ahead(one: NDArray[np.void], depth: NDArray[np.float64]) -> None:
 
 
 @kernel
-def _is_seen(one: NDArray[np.void], depth: NDArray[np.float64], position: float, gap: float) -> bool:
+def _is_seen(one: Any, depth: NDArray[np.float64], position: float, gap: float) -> bool:
     """Whether a driver sees the rear of a vehicle (`position`, `gap` [m])."""
     distance = max(gap + 2.0, 1.0)
     eyes = Adaptation(one.airlight, one.luminance, one.eye_threshold, one.flux_root, one.luminance_root)
@@ -107,6 +112,20 @@ def safe_speed(gap: float, leader_speed: float, headway: float, braking: float) 
 
 
 @kernel
+def _followed_speed(speed: float, gap: float, leader_speed: float, headway: float, braking: float) -> float:
+    """Speed behind a leader by SUMO: hard braking is no harder than what the leader's own braking asks for [m/s]."""
+    safe = safe_speed(gap, leader_speed, headway, braking)
+    planned = (speed - safe) / STEP
+    room = gap - _MINIMUM_GAP
+    if planned <= braking or room <= 0.0:
+        return safe
+    needed = 0.5 * speed**2 / (room + 0.5 * leader_speed**2 / braking)
+    if needed > braking:
+        needed = 0.5 * (speed**2 - leader_speed**2) / room
+    return max(speed - STEP * min(max(1.2 * needed, braking), planned), 0.0)
+
+
+@kernel
 def _chosen(driver: int, visibility: float, wanted: float, factor: float) -> float:
     """Speed that a driver chooses in fog [m/s] (`wanted` [m/s]: in clear air)."""
     if visibility >= CHOSEN_SPEED.shape[1] - 1:
@@ -116,7 +135,7 @@ def _chosen(driver: int, visibility: float, wanted: float, factor: float) -> flo
 
 
 @kernel
-def _neighbours(others: NDArray[np.void], lane: int, position: float) -> tuple[int, int]:
+def _neighbours(others: Any, lane: int, position: float) -> tuple[int, int]:
     """Who is next ahead in a lane, and behind; −1 for none (`position` [m])."""
     ahead = behind = -1
     for j in range(OTHERS):
@@ -131,7 +150,7 @@ def _neighbours(others: NDArray[np.void], lane: int, position: float) -> tuple[i
 
 
 @kernel
-def find_leader(one: NDArray[np.void], others: NDArray[np.void]) -> None:
+def find_leader(one: Any, others: Any) -> None:
     """Find the ego's leader."""
     ahead, _ = _neighbours(others, one.lane, one.position)
     one.gap, one.leader_speed = math.inf, 0.0
@@ -141,7 +160,7 @@ def find_leader(one: NDArray[np.void], others: NDArray[np.void]) -> None:
 
 
 @kernel
-def _ego_speed(one: NDArray[np.void], others: NDArray[np.void], depth: NDArray[np.float64]) -> float:
+def _ego_speed(one: Any, others: Any, depth: NDArray[np.float64]) -> float:
     """Speed of the ego after the step [m/s]; it changes lanes where a slower leader is in the way."""
     own = _chosen(int(one.driver), one.visibility_ahead, LIMIT, 1.0)
     wanted = min(one.advised, own, LIMIT)
@@ -155,7 +174,7 @@ def _ego_speed(one: NDArray[np.void], others: NDArray[np.void], depth: NDArray[n
         one.seen_for = 0.0
     safe = math.inf
     if one.seen_for > REACTION:
-        safe = safe_speed(one.gap, one.leader_speed, HEADWAY, BRAKING)
+        safe = _followed_speed(one.speed, one.gap, one.leader_speed, HEADWAY, BRAKING)
         one.pressed = one.pressed + STEP * (1.0 - one.leader_speed / max(wanted, 1.0)) if safe < wanted else 0.0
         if one.pressed > _PATIENCE and _is_free(one, others, depth, one.lane + 1, wanted):
             one.lane, one.since_change, one.pressed = one.lane + 1, 0.0, 0.0
@@ -168,9 +187,7 @@ def _ego_speed(one: NDArray[np.void], others: NDArray[np.void], depth: NDArray[n
 
 
 @kernel
-def _is_free(
-    one: NDArray[np.void], others: NDArray[np.void], depth: NDArray[np.float64], lane: int, speed: float
-) -> bool:
+def _is_free(one: Any, others: Any, depth: NDArray[np.float64], lane: int, speed: float) -> bool:
     """Whether the ego can change to a lane and drive a speed there (`speed` [m/s])."""
     if lane >= one.lanes:
         return False
@@ -187,7 +204,7 @@ def _is_free(
 
 
 @kernel
-def _lead_speed(one: NDArray[np.void], lead: NDArray[np.void], wanted: float) -> float:
+def _lead_speed(one: Any, lead: Any, wanted: float) -> float:
     """Speed that the scripted lead wants: it comes to a standstill once, for a while (`wanted` [m/s])."""
     if lead.position <= one.brakes_from or one.hold <= 0.0:
         return wanted
@@ -197,7 +214,7 @@ def _lead_speed(one: NDArray[np.void], lead: NDArray[np.void], wanted: float) ->
 
 
 @kernel
-def _leader_of(one: NDArray[np.void], others: NDArray[np.void], j: int) -> tuple[float, float]:
+def _leader_of(one: Any, others: Any, j: int) -> tuple[float, float]:
     """Gap to whom another vehicle follows, the ego included, and the leader's speed [m, m/s]."""
     it, gap, leader_speed = others[j], math.inf, 0.0
     for k in range(OTHERS):
@@ -211,7 +228,7 @@ def _leader_of(one: NDArray[np.void], others: NDArray[np.void], j: int) -> tuple
 
 
 @kernel
-def _other_speed(one: NDArray[np.void], others: NDArray[np.void], j: int, depth: NDArray[np.float64]) -> float:
+def _other_speed(one: Any, others: Any, j: int, depth: NDArray[np.float64]) -> float:
     """Speed of another vehicle after the step [m/s]."""
     it = others[j]
     desired = it.wanted
@@ -223,16 +240,14 @@ def _other_speed(one: NDArray[np.void], others: NDArray[np.void], j: int, depth:
     desired = min(desired, it.speed + it.power * STEP)
     gap, leader_speed = _leader_of(one, others, j)
     if gap < _REACH:
-        safe = safe_speed(gap, leader_speed, it.headway, it.braking)
+        safe = _followed_speed(it.speed, gap, leader_speed, it.headway, it.braking)
         if safe < desired and _is_seen(one, depth, it.position, gap):
             desired = max(safe, it.speed - _EMERGENCY * STEP)
     return max(desired - it.dawdling * it.power * STEP * uniform(one), 0.0)
 
 
 @kernel
-def _move_others(
-    one: NDArray[np.void], others: NDArray[np.void], depth: NDArray[np.float64], speeds: NDArray[np.float64]
-) -> None:
+def _move_others(one: Any, others: Any, depth: NDArray[np.float64], speeds: NDArray[np.float64]) -> None:
     """Move the other vehicles, each by what it saw before the step; who leaves the road enters it again."""
     for j in range(OTHERS):
         if others[j].length > 0.0 and others[j].position <= LENGTH:
@@ -247,7 +262,7 @@ def _move_others(
 
 
 @kernel
-def _enter(one: NDArray[np.void], others: NDArray[np.void], j: int) -> None:
+def _enter(one: Any, others: Any, j: int) -> None:
     """Let a vehicle that has left the road enter it again where there is room, slow ones in the right lane."""
     it = others[j]
     lane = 0 if it.length > 6.0 else int(one.lanes * uniform(one))
@@ -261,7 +276,7 @@ def _enter(one: NDArray[np.void], others: NDArray[np.void], j: int) -> None:
 
 @kernel
 def perceive(
-    one: NDArray[np.void],
+    one: Any,
     depth: NDArray[np.float64],
     belief: NDArray[np.float64],
     state: NDArray[np.float32],
@@ -318,7 +333,7 @@ def advance(episodes: Episodes, weights: NDArray[np.float64], table: SurrogateAr
             one.ending, one.struck = COLLISION, 1
         elif behind >= 0 and others[behind].position > one.position - _LENGTH:
             one.ending = COLLISION
-        elif one.position >= END:
+        elif one.position >= _ARRIVAL:
             one.ending = ARRIVED
         elif one.time >= DURATION:
             one.ending = TIME
@@ -329,7 +344,7 @@ def advance(episodes: Episodes, weights: NDArray[np.float64], table: SurrogateAr
 
 
 @kernel
-def _reward(one: NDArray[np.void], driven: float, terms: NDArray[np.float64]) -> None:
+def _reward(one: Any, driven: float, terms: NDArray[np.float64]) -> None:
     """Terms of the reward without weights; see `fogsim_envs.task.rewards.task_terms` (`driven` [m])."""
     length = END - BEGIN
     share, time_at_limit = driven / length, length / LIMIT

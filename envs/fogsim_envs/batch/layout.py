@@ -28,9 +28,10 @@ OTHERS = 16
 DRIVERS = ("unaffected", "observed", "too_fast", "within_sight")
 """Drivers' choices of speed by number."""
 
+_CHOICES = [SPEED_CHOICES[one]() for one in DRIVERS]
 _VISIBILITIES = np.arange(int(UNAFFECTED_ABOVE) + 1.0)
-CHOSEN_SPEED = np.array([[min(SPEED_CHOICES[one](v), 1e3) for v in _VISIBILITIES.tolist()] for one in DRIVERS])
-CHOSEN_SHARE = np.array([[speed_share(SPEED_CHOICES[one], v) for v in _VISIBILITIES.tolist()] for one in DRIVERS])
+CHOSEN_SPEED = np.array([[min(one(v), 1e3) for v in _VISIBILITIES.tolist()] for one in _CHOICES])
+CHOSEN_SHARE = np.array([[speed_share(one, v) for v in _VISIBILITIES.tolist()] for one in _CHOICES])
 """Speed [m/s] and share of the speed in clear air that each driver chooses, by whole metres of visibility."""
 
 RUNNING, ARRIVED, TIME, COLLISION = range(4)

@@ -11,10 +11,10 @@ from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 
 
 class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
-    """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it."""
+    """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps."""
 
-    def __init__(self, envs: FogAdvisoryBatchEnv) -> None:
-        self.envs = envs
+    def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:
+        self.envs, self._repeat = envs, repeat
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
@@ -29,13 +29,16 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step all; an info has what Stable-Baselines3 reads at an episode's end."""
-        observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
-        over = terminated | truncated
         shown: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i in np.flatnonzero(over).tolist():
-            end = {"terminal_observation": infos["final_obs"][i], "TimeLimit.truncated": bool(truncated[i])}
-            shown[i] = end
-        return observations, rewards, over, shown
+        total, over = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
+        for _ in range(self._repeat):
+            observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+            # What the action earns in the next episode is nothing that the agent chose there.
+            total += np.where(over, 0.0, rewards)
+            for i in np.flatnonzero((terminated | truncated) & ~over).tolist():
+                shown[i] = {"terminal_observation": infos["final_obs"][i], "TimeLimit.truncated": bool(truncated[i])}
+            over |= terminated | truncated
+        return observations, total, over, shown
 
     def close(self) -> None:
         """Close the environment."""

@@ -37,7 +37,7 @@ _LAMPS = np.array([int(one) for one in LAMP_MODES])
 
 
 @checked_parameters
-class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[np.float64]]):
+class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     """Many episodes of ``fogsim/FogAdvisoryFast-v1`` in one kernel, without SUMO: for training.
 
     Spaces, reward, ``info`` and baselines are those of `FogAdvisoryFastEnv`, and episodes are drawn as there: the same
@@ -172,7 +172,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[n
         return _SPEEDS[actions[:, 0]], actions[:, 1]
 
     def _infos(self) -> Infos:
-        """As of the Fast task, an array for each number; agents must not use ``truth``."""
+        """The Fast task's, an array for each number; agents must not use ``truth``."""
         ego, terms = {name: self._episodes.ego[name].copy() for name in _SHOWN}, self._episodes.terms.copy()
         needed = ego["speed"] * REACTION_TIME + ego["speed"] ** 2 / (2.0 * DECELERATION)
         unseen = np.maximum(0.0, 1.0 - ego["visibility_ahead"] / np.maximum(needed, 1e-9))

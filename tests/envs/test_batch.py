@@ -114,9 +114,10 @@ def test_baselines_rank_as_on_sumo() -> None:
 @pytest.mark.parametrize("policy", ["rule", "none", "fixed", "random"])
 def test_returns_are_distributed_as_on_sumo(policy: str) -> None:
     ours, theirs = (fogsim_envs.evaluate(policy, env_id, range(100)) for env_id in (BATCH, FAST))
-    # Whole points: most episodes at one speed in clear air earn the same but for hundredths, which would count as all.
-    values = [np.round([episode.value for episode in one.episodes]) for one in (ours, theirs)]
-    assert ks_2samp(*values).pvalue > 0.01
+    values = [np.array([episode.value for episode in one.episodes]) for one in (ours, theirs)]
+    # Most episodes at one speed in clear air earn the same but for a tenth of a point: agreement is up to 0.2 points.
+    assert ks_2samp(values[0] + 0.2, values[1], alternative="greater").pvalue > 0.01
+    assert ks_2samp(values[0] - 0.2, values[1], alternative="less").pvalue > 0.01
     # Where both have the same fog, light and script, they also agree episode by episode.
     assert policy == "random" or np.corrcoef(*values)[0, 1] > 0.6
 

@@ -50,7 +50,7 @@ def _at(quantiles: NDArray[np.float64], normal: float) -> float:
     """Quantile at the share of a normal distribution below a deviate."""
     place = 0.5 * (1.0 + math.erf(normal / math.sqrt(2.0))) * (len(quantiles) - 1)
     low = min(int(place), len(quantiles) - 2)
-    return quantiles[low] + (place - low) * (quantiles[low + 1] - quantiles[low])
+    return float(quantiles[low] + (place - low) * (quantiles[low + 1] - quantiles[low]))
 
 
 @kernel

@@ -58,14 +58,14 @@ def _depth_at(depth: NDArray[np.float64], position: float) -> float:
     """Optical depth from the road's beginning to a place [-]."""
     place = min(float(CELLS_AHEAD - 2), max(0.0, position / CELL))
     low = int(place)
-    return depth[low] + (position / CELL - low) * (depth[low + 1] - depth[low])
+    return float(depth[low] + (position / CELL - low) * (depth[low + 1] - depth[low]))
 
 
 @kernel
 def _visibility_at(depth: NDArray[np.float64], position: float) -> float:
     """Visibility at a place [m]."""
     low = int(min(float(CELLS_AHEAD - 2), max(0.0, position / CELL)))
-    return OPTICAL_DEPTH_AT_VISIBILITY / max((depth[low + 1] - depth[low]) / CELL, THINNEST)
+    return float(OPTICAL_DEPTH_AT_VISIBILITY / max((depth[low + 1] - depth[low]) / CELL, THINNEST))
 
 
 @kernel
@@ -131,7 +131,7 @@ def _chosen(driver: int, visibility: float, wanted: float, factor: float) -> flo
     if visibility >= CHOSEN_SPEED.shape[1] - 1:
         return wanted
     column = int(visibility)
-    return min(wanted * CHOSEN_SHARE[driver, column], factor * CHOSEN_SPEED[driver, column])
+    return float(min(wanted * CHOSEN_SHARE[driver, column], factor * CHOSEN_SPEED[driver, column]))
 
 
 @kernel
@@ -183,7 +183,7 @@ def _ego_speed(one: Any, others: Any, depth: NDArray[np.float64]) -> float:
     elif one.since_change > _KEEPS_LEFT and one.lane > 0 and _is_free(one, others, depth, one.lane - 1, LIMIT + 5.0):
         one.lane, one.since_change = one.lane - 1, 0.0
         find_leader(one, others)
-    return max(min(wanted, safe), one.speed - _EMERGENCY * STEP, 0.0)
+    return float(max(min(wanted, safe), one.speed - _EMERGENCY * STEP, 0.0))
 
 
 @kernel
@@ -199,7 +199,9 @@ def _is_free(one: Any, others: Any, depth: NDArray[np.float64], lane: int, speed
             return False
     if behind >= 0:
         gap = one.position - _LENGTH - others[behind].position
-        return gap > 0.0 and safe_speed(gap, one.speed, others[behind].headway, BRAKING) >= others[behind].speed - 2.0
+        return bool(
+            gap > 0.0 and safe_speed(gap, one.speed, others[behind].headway, BRAKING) >= others[behind].speed - 2.0
+        )
     return True
 
 
@@ -210,7 +212,7 @@ def _lead_speed(one: Any, lead: Any, wanted: float) -> float:
         return wanted
     if lead.speed <= 0.0:
         one.hold -= STEP
-    return max(lead.speed - one.braking * STEP, 0.0)
+    return float(max(lead.speed - one.braking * STEP, 0.0))
 
 
 @kernel
@@ -243,7 +245,7 @@ def _other_speed(one: Any, others: Any, j: int, depth: NDArray[np.float64]) -> f
         safe = _followed_speed(it.speed, gap, leader_speed, it.headway, it.braking)
         if safe < desired and _is_seen(one, depth, it.position, gap):
             desired = max(safe, it.speed - _EMERGENCY * STEP)
-    return max(desired - it.dawdling * it.power * STEP * uniform(one), 0.0)
+    return float(max(desired - it.dawdling * it.power * STEP * uniform(one), 0.0))
 
 
 @kernel

@@ -2,12 +2,15 @@
 
 import math
 
+import gymnasium
 import numpy as np
 import pytest
 
 import fogsim
+import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.advice import AdaptiveCruiseControl, EmergencyBrake
 from fogsim.core.registry import MethodConfig
+from fogsim.errors import InputError
 from fogsim.fusion import FUSIONS
 from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.simulation.controlled_driving import ControlledDriving
@@ -103,3 +106,10 @@ def test_mistakes_name_what_is_wrong(tmp_path) -> None:
     for request in (None, Control(math.nan), Control(1.0, 2.0), Control(lamps="low")):  # type: ignore[arg-type]
         with pytest.raises(fogsim.InputError, match="controller 'mine:Idle'"):
             checked_control("mine:Idle", request)
+
+
+def test_an_environment_refuses_a_controller() -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", ["controller=emergency_brake"])
+    env = gymnasium.make("fogsim/FogAdvisoryFast-v1", scenario=scenario)
+    with pytest.raises(InputError, match="'emergency_brake' would drive the ego, and in an environment the agent does"):
+        env.reset(seed=1)

@@ -16,6 +16,7 @@ from fogsim.simulation.loop import ClosedLoop
 from fogsim.traffic.highway import EGO, HighwayTraffic, OtherRoadsError, is_highway_environment
 from fogsim.values import Command, Step
 from fogsim_envs.advising import AdvisingEnv
+from fogsim_envs.hosting import refuse_controller
 from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.spaces import ImageSize
 
@@ -100,6 +101,7 @@ class HighwayLoop:
         self._loop = self._built()
 
     def _built(self) -> ClosedLoop:
+        refuse_controller(self._scenario)
         return ClosedLoop(self._scenario, _traffic(self._environment, self._scenario))
 
     def start(self, seed: int) -> Step:

@@ -43,8 +43,18 @@ class Simulation(Protocol):
         """End the simulation; closing twice is allowed."""
 
 
+def refuse_controller(scenario: Scenario) -> None:
+    """Refuse a scenario whose ego has a controller: here, an agent decides."""
+    if scenario.controller is not None:
+        raise InputError(
+            f"controller: {scenario.controller.method!r} would drive the ego, and in an environment the agent does; "
+            "leave controller out"
+        )
+
+
 def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simulation, Step]:
     """Start a scenario here, or in a child process if another simulation runs here (`timeout` [s])."""
+    refuse_controller(scenario)
     try:
         return _begun(ClosedLoop(scenario), seed)
     except SimulationRunningError:
@@ -53,6 +63,7 @@ def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simu
 
 def restart(simulation: Simulation, scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simulation, Step]:
     """Start another scenario where a simulation runs, which is over then (`timeout` [s])."""
+    refuse_controller(scenario)
     if not isinstance(simulation, HostedLoop):
         simulation.close()
         return begin(scenario, seed, timeout)

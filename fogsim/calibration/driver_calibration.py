@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from fogsim.core.files.readers import number_in_text, read_text
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE, Surroundings
 from fogsim.traffic.drivers.sight import DriverSight, leader_reach
@@ -194,8 +195,8 @@ def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) ->
     each = scores(found)
     if int(session[0]) >= 0:
         each = np.stack([np.bincount(session, weights=score) for score in each])
-    bread = np.linalg.pinv(curvature)
-    return np.asarray(np.sqrt(np.diag(bread @ (each @ each.T) @ bread)))
+    bread, meat = inverse_of(0.5 * (curvature + curvature.T)), matrix_product(each, each.T)
+    return np.asarray(np.sqrt(np.diag(matrix_product(matrix_product(bread, meat), bread))))
 
 
 def _fitted_shares(passages: Passages, following: NDArray[np.bool_], clear: Floats) -> dict[str, Interval]:

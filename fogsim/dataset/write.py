@@ -30,7 +30,7 @@ from fogsim.dataset.ground_truth import (
 from fogsim.errors import InputError
 from fogsim.recorders import versions
 from fogsim.scenario import Scenario, build, resolved
-from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.traffic.road.configuration import input_files
 from fogsim.units import finite_or_none
@@ -320,7 +320,7 @@ def _missing(
 
 def _pictures(loop: ClosedLoop, scenario: Scenario, seed: int, every: int) -> Iterator[Step]:
     """Every n-th step of a run, if it has its own image."""
-    policy = AdvisedDriving(build.advice_config(scenario), build.periods(scenario).decision_frames)
+    policy = own_policy(scenario.run_config())
     step = loop.start(seed)
     while True:
         # After the ego has left the network, its last frame is only repeated.

@@ -208,7 +208,7 @@ class JointRoad:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
         else:
             own, free = self._joint(observation, pixels, sky, horizon, course, free, found)
-        return self._second.on(own, level, horizon, free, observation.time, course.is_straight)
+        return self._second.on(own, level, horizon, free, observation.time)
 
     def _joint(
         self,

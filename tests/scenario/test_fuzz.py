@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from fogsim.advice import ADVISERS
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.parameters import Range, accepted_parameters
 from fogsim.errors import InputError, SimulationError
 from fogsim.estimators import ESTIMATORS
@@ -32,6 +32,7 @@ from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import build as scene_build
 from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.simulation.loop import ClosedLoop
+from fogsim.traffic import SPEED_CHOICES
 
 FUZZ = int(os.environ.get("FOGSIM_FUZZ", "0"))
 """How many sets of keys are tried in a long search; 0 for a short one."""
@@ -59,6 +60,8 @@ METHODS = {
     "fusion": FUSIONS,
     "advice": ADVISERS,
     "lighting": LIGHTING_POLICIES,
+    "speed_choice": SPEED_CHOICES,
+    "controller": CONTROLLERS,
 }
 
 MISSING = object()

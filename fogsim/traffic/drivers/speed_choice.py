@@ -248,7 +248,7 @@ class CheckedChoice:
 SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(
     "speed choice",
     {"observed": ObservedSpeed, "unaffected": Unaffected, "too_fast": TooFast, "within_sight": WithinSight},
-    group="fogsim.speed_choices",
+    group="fogsim.traffic.drivers.speed_choice",
     methods=("__call__",),
 )
 

@@ -81,11 +81,17 @@ class DayFit:
     clipped: float  # Share of the sky's bins that are clipped [-]
     brightest: float  # Light that hardly any bin exceeds, over full scale [-]
     contrast: float  # How much brighter the far road is than the near one, over the sky [-]
-    response_deviation: float  # Standard deviation of ln k among responses [-]
+    log_means: Floats  # (responses,): Mean of ln k under each response, over that under the stated one [-]
     obstacle: float  # Depth at which something hides the road, if something does [m]
     # How much contrast across the road speaks against the extinction that another method claims, in logarithms of
     # chances [-]
     doubt: float = 0.0
+    images: int = 1  # Images of the drive up to this one
+
+    @property
+    def response_deviation(self) -> float:
+        """Deviation of ln k under other responses from that under the stated one [-]."""
+        return math.sqrt(float((self.responses * self.log_means**2).sum()))
 
     def quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a probability [m]."""
@@ -111,7 +117,7 @@ def fit_day(
     claimed: float = 0.0,
     earlier: DayFit | None = None,
 ) -> DayFit:
-    """Weigh all hypotheses by their evidence, or those that an earlier image of the same drive has left.
+    """Weigh all hypotheses by their evidence; after an earlier image of the same drive the likely ones and one in turn.
 
     Takes `image` (rows, cols), `free` [m], `claimed` [1/m].
     """
@@ -120,12 +126,15 @@ def fit_day(
     if math.isfinite(free):
         bins = _without_vehicle(bins, camera, horizon.row, free)
         if int((bins.first > horizon.row).sum()) < _FEWEST_BINS:
-            return _nothing_seen(camera)
+            return _nothing_seen(camera) if earlier is None else earlier
     rows = read_rows(pixels, bins, camera, horizon.row)
     fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_contradiction(rows, camera, horizon, claimed))
     if earlier is None:
         return fit
-    return replace(fit, responses=earlier.responses, response_deviation=earlier.response_deviation)
+    tried = _left(earlier, fit.responses.size)[0]
+    stated = [one.responses / max(float(one.responses[0]), _LEAST_CHANCE) for one in (fit, earlier)]
+    ratio, log_means = np.where(tried, *stated), np.where(tried, fit.log_means, earlier.log_means)
+    return replace(fit, responses=ratio / ratio.sum(), log_means=log_means, images=earlier.images + 1)
 
 
 def fit_free_road(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float) -> DayFit:
@@ -159,34 +168,37 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | 
 def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float) -> DayFit:
     """Posterior over cells and hypotheses.
 
-    Where fog may be, all surfaces are tried; where it still may be, all responses over the surfaces that suit.
+    Where fog may be, all surfaces are tried under the stated response; where it still may be, all responses over the
+    likeliest surface. What other surfaces add is taken to be the same under every response.
     """
     prior = grid.of_horizon[:, None] + grid.likely
     tried = np.array([(0, int(s)) for s in np.flatnonzero(grid.surfaces)])
-    each = grid.hypotheses(chosen, tried, kept, prior)
+    stated = grid.hypotheses(chosen, tried, kept, prior)
     good = np.full(chosen.shape, _UNLIKELY)
-    good[chosen] = np.logaddexp.reduce(each, axis=(1, 2))
+    good[chosen] = np.logaddexp.reduce(stated, axis=(1, 2))
     still = chosen & _wider(good > good.max() - _WORTHWHILE, 1)
-    each = each[still[chosen]]
-    of_surface = np.logaddexp.reduce(each, axis=(0, 2))
-    suit = tried[of_surface > of_surface.max() - _SUITS, 1]
-    more = np.array([(r, int(s)) for s in suit for r in np.flatnonzero(grid.responses) if r])
-    each = np.concatenate([each, grid.hypotheses(still, more, kept, prior)], axis=1)
-    pairs, rows = np.concatenate([tried, more]), grid.rows
+    stated = stated[still[chosen]]
+    by_surface = np.logaddexp.reduce(stated, axis=(0, 2))
+    best = int(np.argmax(by_surface))
+    more = np.array([(r, tried[best, 1]) for r in np.flatnonzero(grid.responses)[1:]])
+    others = grid.hypotheses(still, more, kept, prior) + np.logaddexp.reduce(by_surface - by_surface[best])
+    each = np.concatenate([stated, others], axis=1)
+    response, rows = np.concatenate([tried[:, 0], more[:, 0]]), grid.rows
     chance = np.logaddexp.reduce(each, axis=2)
     fine, posterior, evidence = _interpolated(grid.logs, still, chance)
     weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
+    of_surface = weight[:, : len(tried)].sum(axis=0)
     sky = rows.noise[0, : rows.cuts[0]]
     return DayFit(
         log_visibility=fine,
         chance=posterior,
         fog_over_none=evidence - none,
-        responses=_sums(pairs[:, 0], weight.sum(axis=0), grid.responses.size),
-        surfaces=_sums(pairs[:, 1], weight.sum(axis=0), grid.surfaces.size),
+        responses=_sums(response, weight.sum(axis=0), grid.responses.size),
+        surfaces=_sums(tried[:, 1], of_surface / of_surface.sum(), grid.surfaces.size),
         lights=_sums(kept, _shares(each), _ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
-        response_deviation=_apart(np.log(grid.cells[still][:, 1]), weight, pairs[:, 0]),
+        log_means=_log_means(np.log(grid.cells[still][:, 1]), weight, response, grid.responses.size),
         obstacle=grid.obstacle,
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
@@ -194,11 +206,12 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
 
 def _left(earlier: DayFit | None, count: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which of so many responses, and which surfaces, are to be tried; the stated response always is."""
+    surfaces = SURFACES.chance.size
     if earlier is None:
-        return np.ones(count, np.bool_), np.ones(SURFACES.chance.size, np.bool_)
-    responses = np.zeros(count, np.bool_)
-    responses[0], responses[np.argsort(earlier.responses)[-_LIKELY:]] = True, True
-    return responses, earlier.surfaces > _HARDLY
+        return np.ones(count, np.bool_), np.ones(surfaces, np.bool_)
+    responses, turn = np.zeros(count, np.bool_), earlier.images
+    responses[[0, turn % count, *np.argsort(earlier.responses)[-_LIKELY:]]] = True
+    return responses, (earlier.surfaces > _HARDLY) | (np.arange(surfaces) == turn % surfaces)
 
 
 def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
@@ -230,11 +243,14 @@ _OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
 """Responses and surfaces of a first look: what the usual ones do not explain may need another visibility."""
 
 _HARDLY, _LIKELY = 0.03, 2
-"""Probability below which a surface is not tried in later images of a drive [-], and how many responses are, in
+"""Probability below which a surface is not tried in every later image of a drive [-], and how many responses are, in
 addition to the stated one: an image hardly separates them, and a camera keeps its own."""
 
+_LEAST_CHANCE = 1e-9
+"""Least chance of the stated response that others are compared with [-]."""
+
 _SUITS = 5.0
-"""Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""
+"""Logarithm of the evidence below the best at which a light is not tried under other surfaces and responses [-]."""
 
 
 _ALL = np.arange(LIGHTS.sky.size)
@@ -292,7 +308,7 @@ def _nothing_seen(camera: Camera) -> DayFit:
         clipped=0.0,
         brightest=1.0,
         contrast=1.0,
-        response_deviation=0.0,
+        log_means=np.zeros(chances[0].size),
         obstacle=math.inf,
     )
 
@@ -370,12 +386,11 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
     return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
 
 
-def _apart(logs: Floats, weight: Floats, response: Ints) -> float:
-    """Standard deviation of the mean logarithm among responses (`logs` (c,), `weight` (c, pairs))."""
-    of_each = _sums(response, weight.sum(axis=0), int(response.max()) + 1)
-    means = _sums(response, (weight * logs[:, None]).sum(axis=0), of_each.size) / np.maximum(of_each, 1e-12)
-    mean = float((of_each * means).sum())
-    return math.sqrt(float((of_each * (means - mean) ** 2).sum()))
+def _log_means(logs: Floats, weight: Floats, response: Ints, count: int) -> Floats:
+    """(count,) float64: mean logarithm under each response, over that under the first (`weight` (c, pairs))."""
+    of_each, total = (_sums(response, part.sum(axis=0), count) for part in (weight, weight * logs[:, None]))
+    means = np.divide(total, of_each, out=np.full(count, total.sum() / of_each.sum()), where=of_each > 0.0)
+    return np.asarray(means - means[0])
 
 
 def _sums(which: Ints, weight: Floats, count: int) -> Floats:

@@ -244,13 +244,11 @@ class SecondOpinion:
 
     def reset(self) -> None:
         """Forget all earlier frames."""
-        self._agreed, self._response = -math.inf, 0.0
+        self._agreed, self._looked, self._response = -math.inf, -math.inf, 0.0
         self._fit: DayFit | None = None
         self._clear: tuple[float, float] | None = None
 
-    def on(
-        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
-    ) -> Estimate:
+    def on(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float) -> Estimate:
         """Return an estimate, what the day model has instead, or neither.
 
         Takes `level` (rows, cols), `free` [m], `time` [s].
@@ -259,12 +257,11 @@ class SecondOpinion:
         if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
             return self._kept(own)
         self._response, self._clear = 0.0, None
-        is_asked = not own.valid or is_straight
-        chosen = self._with_day_model(own, level, horizon, free, time) if is_asked else own
+        chosen = self._with_day_model(own, level, horizon, free, time)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:
-            self._agreed, self._fit = -math.inf, None
+            self._agreed = -math.inf
             return chosen
         self._agreed = time
         return self._kept(own)
@@ -278,10 +275,9 @@ class SecondOpinion:
     def _with_day_model(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
     ) -> Estimate:
-        if not self._agreed < time < self._agreed + 2.0 * PERIOD:
-            self._fit = None
-        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
-        self._fit = self._fit or fit
+        earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
+        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
+        self._fit, self._looked = fit, time
         verdict = verdict_of(fit, self._scale)
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.

@@ -26,7 +26,7 @@ from fogsim.vision.strips.sky import SATURATED_SHARE, Sky
 SKY_DEVIATION = 0.005
 """Relative deviation of the airlight at the horizon from the sky above it [-]."""
 
-OVEREXPOSURE = 0.15
+OVEREXPOSURE = 0.4
 """How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
 
 _HALF, _MOSTLY = 0.5, 0.98

@@ -123,19 +123,24 @@ def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
 
 @kernel
 def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
-    """Shares of pixels with all, and with some channels saturated (`rows` (n,) int64)."""
+    """Shares of pixels saturated in the least saturated channel, and in any (`rows` (n,) int64).
+
+    Noise is each channel's own: where it comes after clipping, a channel of a clipped sky is saturated in more than
+    half of the pixels, but all channels are at once in far fewer.
+    """
     pixels, largest = image.pixels, image.tables.shape[1] - 1
     cols, channels = pixels.shape[1], pixels.shape[2]
-    every, some = 0, 0
+    each, some = np.zeros(channels), 0
     for row in rows:
         for col in range(side, cols - side):
-            count = 0
+            is_any = False
             for channel in range(channels):
-                count += pixels[row, col, channel] == largest
-            every += count == channels
-            some += count > 0
+                is_saturated = pixels[row, col, channel] == largest
+                each[channel] += is_saturated
+                is_any |= is_saturated
+            some += is_any
     total = max(rows.size * (cols - 2 * side), 1)
-    return every / total, some / total
+    return each.min() / total, some / total
 
 
 _SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
@@ -271,7 +276,8 @@ class Sky(NamedTuple):
     deviation: float
     upward: float
     noise: float  # Deviation of single pixels [linear grey levels]
-    # saturated, clipped: shares of its pixels of which all channels, and of which some, have the largest value [-]
+    # saturated, clipped: shares of its pixels of which the least saturated channel, and of which any, has the largest
+    # value [-]
     saturated: float
     clipped: float
     # vignetting, vignetting_deviation: how much of what a simple lens takes from pixels off its axis (1 − cos⁴) this

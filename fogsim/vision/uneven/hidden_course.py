@@ -2,8 +2,9 @@
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +22,12 @@ from fogsim.vision.lines.road_course import (
     sag_precision,
 )
 from fogsim.vision.lines.road_course_kernels import PIECES
+from fogsim.vision.strips.albedo_filter import Albedo
 from fogsim.vision.strips.course_geometry import Bend, lay_along
 from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior, with_horizon
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import SIDES, StripGeometry, view_of
+from fogsim.vision.strips.strip_geometry import SIDES, RoadView, StripGeometry, view_of
 from fogsim.vision.uneven.fog_evidence import CHANCES_OF_EVEN, EvenFog, even_fog_over, thinned_bins
 
 Floats = NDArray[np.float64]
@@ -41,6 +43,21 @@ _LEAST_VARIANCE = 1e-4
 
 _RIVAL = 20.0
 """By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
+
+
+_EVERY, _CHANCES = np.array([one[:6] for one in ALBEDOS]), np.array(CHANCES_OF_EVEN)
+"""All albedos, and how likely even fog over each is beforehand [-]."""
+
+
+class _Road(NamedTuple):
+    """Road that bends, and may sag or crest."""
+
+    straight: StripGeometry
+    seen_from: RoadView
+    bend: Bend
+    sides: Floats
+    ahead: SagsAhead
+    before: Floats  # See `sag_precision`
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,31 +78,51 @@ class HiddenCourse:
     ) -> list[EvenFog]:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
         course, found, begun = self.course, [], []
-        view, bend = view_of(self.camera), Bend(course.column, course.bend, course.bend_covariance)
-        sides, before = SIDES[: len(curves.variance)], sag_precision()
-        costs = _costs(course.ahead, before, _TRIED).tolist()
+        bend = Bend(course.column, course.bend, course.bend_covariance)
+        sides = SIDES[: len(curves.variance)]
+        road = _Road(self.straight, view_of(self.camera), bend, sides, course.ahead, sag_precision())
+        first = (start.extinction, start.airlight)
 
-        def along(piece: int, over: int, curvature: float) -> EvenFog:
-            around, sag, cost = _around(course.ahead, before, prior, piece, curvature)
-            shift = view.horizon + around.shift - view.horizon
-            bins = thinned_bins(curves, lay_along(self.straight, view, shift, sag, bend, sides), around)
-            first = (start.extinction, start.airlight, around.shift)
-            one = even_fog_over(bins, ALBEDOS[over], around, first, CHANCES_OF_EVEN[over])
-            return EvenFog(one.cost + cost, *one[1:])
+        def along(*tries: tuple[int, float, int]) -> list[EvenFog]:
+            seen = _along(curves, road, prior, first, np.array(tries, np.float64).reshape(-1, 3)).tolist()
+            return [EvenFog(cost, k, variance, int(left)) for cost, k, variance, left in seen]
 
+        def at_curvature(piece: int, curvature: float) -> EvenFog:
+            return along((piece, curvature, albedo))[0]
+
+        costs = _costs(course.ahead, road.before, _TRIED)
+        places = np.argwhere(costs[1:] < gain + _RIVAL).tolist()
+        tries = [(1 + piece, float(_TRIED[place]), albedo) for piece, place in places]
+        looks = list(zip(tries, along(*tries), strict=True))
         for piece in range(1, PIECES):
-            tried = [value for value, cost in zip(_TRIED.tolist(), costs[piece], strict=True) if cost < gain + _RIVAL]
+            tried = {curvature: one for (on, curvature, _), one in looks if on == piece}
             if len(tried) < 3:
                 continue
-            curvature, one, width = _likeliest(functools.partial(along, piece, albedo), tried)
+            curvature, one, width = _likeliest(functools.partial(at_curvature, piece), tried)
             found.append(EvenFog(one.cost + width, *one[1:]))
             begun.append((found[-1].cost, piece, curvature, width))
         least = min((one.cost for one in found), default=math.inf)
-        for cost, piece, curvature, width in begun:
-            if cost < least + _RIVAL:
-                others = (along(piece, other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
-                found += [EvenFog(one.cost + width, *one[1:]) for one in others]
+        rivals = [(*one, other) for one in begun if one[0] < least + _RIVAL for other in range(len(ALBEDOS))]
+        rivals = [one for one in rivals if one[-1] != albedo]
+        others = along(*((piece, curvature, other) for _, piece, curvature, _, other in rivals))
+        found += [EvenFog(one.cost + rival[3], *one[1:]) for one, rival in zip(others, rivals, strict=True)]
         return found
+
+
+@kernel
+def _along(curves: StripCurves, road: _Road, prior: JointPrior, start: tuple[float, float], tries: Floats) -> Floats:
+    """(n, 4): values of `EvenFog` by piece, curvature over its standard deviation and albedo (n, 3)."""
+    out = np.empty((len(tries), 4))
+    for i in range(len(tries)):
+        piece, curvature, over = int(tries[i, 0]), tries[i, 1], int(tries[i, 2])
+        around, sag, cost = _around(road.ahead, road.before, prior, piece, curvature)
+        shift = road.seen_from.horizon + around.shift - road.seen_from.horizon
+        bins = thinned_bins(curves, lay_along(road.straight, road.seen_from, shift, sag, road.bend, road.sides), around)
+        one = _EVERY[over]
+        albedo = Albedo(one[0], one[1], one[2], one[3], one[4], one[5], 0.0)
+        fog = even_fog_over(bins, albedo, around, (start[0], start[1], around.shift), _CHANCES[over])
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = fog.cost + cost, fog.extinction, fog.variance, fog.left_out
+    return out
 
 
 @kernel
@@ -118,9 +155,8 @@ def _around(
     return around, sag, _cost(ahead, before, sag, curvature * SAG_DEVIATION)
 
 
-def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple[float, EvenFog, float]:
+def _likeliest(fog: Callable[[float], EvenFog], tried: dict[float, EvenFog]) -> tuple[float, EvenFog, float]:
     """Likeliest curvature over its standard deviation, its fog, and what its width adds to the cost (Laplace)."""
-    tried = {value: fog(value) for value in first}
     curve = 1.0
     for _ in range(_STEPS):
         at = sorted(tried)

@@ -25,12 +25,12 @@ def said(monkeypatch):
     """Function from an estimate and what the day model finds to what comes of both, and how often it looked."""
     looks = []
 
-    def answer(own, verdict, times=(0.0,), is_straight=True):
+    def answer(own, verdict, times=(0.0,)):
         looks.clear()
         monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
         monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: verdict)
         second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
-        found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time, is_straight) for time in times]
+        found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time) for time in times]
         return found[-1], len(looks)
 
     return answer
@@ -81,10 +81,6 @@ def test_contrast_beyond_its_fog_ends_an_estimate(said):
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
-def test_a_bent_road_is_the_joint_fits(said):
-    assert said(OWN, DENSER, is_straight=False)[1] == 0
-
-
 CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
 
 
@@ -101,7 +97,7 @@ def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch)
     monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: CLEAR if len(looks) < 2 else AGREES)
     second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
     found = [
-        second.on(own, image, Horizon(23.5, 1.0), math.inf, time, True)
+        second.on(own, image, Horizon(23.5, 1.0), math.inf, time)
         for time, own in ((0.0, thin), (0.1, thin), (0.2, OWN))
     ]
     assert len(looks) == 2

@@ -74,6 +74,13 @@ def test_saturated_and_clipped_pixels_are_counted():
     assert pixel_noise(paired, np.arange(120)) == 0.0
 
 
+def test_noise_that_comes_after_clipping_leaves_each_channel_saturated_in_most_pixels():
+    noise = np.random.default_rng(3).normal(0.0, 1.5, (240, 320, 3))
+    noisy = np.clip(np.rint(255.0 + noise), 0, 255).astype(np.uint8)
+    least, some = saturation(linear_pixels(noisy, CAMERA), np.arange(120), 40)
+    assert 0.5 < least < 0.7 < some
+
+
 def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():
     rows = even_rows(100, 10, 16)
     axis = np.array([159.5, 119.5, CAMERA.horizon_row, 288.0])

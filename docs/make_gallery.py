@@ -20,10 +20,13 @@ PICTURES = HERE / "pictures" / "gallery"
 PAGE = HERE / "gallery.md"
 SIZE = (320, 240)
 MOMENTS: dict[str, float] = {
+    "camera_blackout": 6.8,
     "city_fog": 12.0,
+    "cut_in_at_15_m": 6.8,
     "emergency_brake_in_fog": 9.4,
     "highway_99_corridor": 41.0,
-    "motorcycle_at_dusk": 12.0,
+    "motorcycle_at_dusk": 15.0,
+    "patchy_fog": 35.4,
     "pedestrian_crossing_fog": 21.0,
     "ramp_merge": 33.0,
     "sign_missing_and_moved": 4.0,

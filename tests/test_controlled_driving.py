@@ -50,6 +50,8 @@ def test_requests_pass_delay_lag_and_limits() -> None:
     reached = [-8.0 * (1.0 - math.exp(-steps)) for steps in (1, 2, 3, 4)]
     assert found == pytest.approx([0.0, 0.0, *reached])
     assert driven("none", [9.0], delay=0.0, lag=0.0, accelerating=2.0) == [2.0]
+    part = driven("human", [-8.0, -8.0, None, None], delay=0.125, lag=0.0)
+    assert part == pytest.approx([None, -6.0, -8.0, -2.0]), "a quarter of the period is still the request before"
 
 
 def test_who_drives_without_a_request() -> None:
@@ -90,6 +92,33 @@ def test_a_standing_truck_in_fog(tmp_path, controller: str, passes: bool) -> Non
     assert result.metrics["ego_collisions"] == (0 if passes else 1)
 
 
+def test_the_stronger_of_driver_and_controller_brakes(tmp_path) -> None:
+    """A gentle brake does not hold back a driver who sees the truck; without a driver it ends in the truck."""
+    (tmp_path / "mine.py").write_text(
+        "from fogsim.values import Control\nclass Gentle:\n"
+        "    def control(self, seen):\n        return Control(acceleration=-0.1)\n"
+    )
+    for driver, collisions in (("human", 0), ("none", 1)):
+        text = SCENARIO.replace("CONTROLLER", "'mine:Gentle'").replace("driver: none", f"driver: {driver}")
+        (tmp_path / "test.fog.yaml").write_text(text.replace("40 m}", "1 km}"))
+        assert check_one_case(tmp_path / "test.fog.yaml").metrics["ego_collisions"] == collisions
+
+
+def test_a_stop_within_the_minimum_gap_is_no_collision(tmp_path) -> None:
+    """SUMO by default counts each gap below 2.5 m; only contact is a collision here."""
+    (tmp_path / "mine.py").write_text(
+        "from fogsim.values import Control\nclass Precise:\n    def control(self, seen):\n"
+        "        if seen.lead is None or seen.lead.distance > 60.0 or seen.speed < 0.1:\n"
+        "            return Control(acceleration=0.0 if seen.speed > 0.1 else -1.0)\n"
+        "        return Control(acceleration=-(seen.speed ** 2) / (2.0 * max(seen.lead.distance - 1.0, 0.2)))\n"
+    )
+    text = SCENARIO.replace("CONTROLLER", "{method: 'mine:Precise', delay: 0 s}")
+    text = text.replace("always: ego.gap > 1 m", "eventually: ego.gap < 2 m")
+    (tmp_path / "test.fog.yaml").write_text(text)
+    result = check_one_case(tmp_path / "test.fog.yaml")
+    assert result.is_passed, result.findings
+
+
 def test_mistakes_name_what_is_wrong(tmp_path) -> None:
     file = tmp_path / "test.fog.yaml"
     (tmp_path / "mine.py").write_text("class Idle:\n    pass\n")
@@ -97,6 +126,9 @@ def test_mistakes_name_what_is_wrong(tmp_path) -> None:
         "driver goes with controller": SCENARIO.replace("controller: CONTROLLER, ", ""),
         "must have a method control\\(\\) or control_by_belief": SCENARIO.replace("CONTROLLER", "'mine:Idle'"),
         "did you mean 'emergency_brake'": SCENARIO.replace("CONTROLLER", "emergency_brak"),
+        "a whole multiple of clocks.camera_period_s, got 0.25 s and 0.1 s": SCENARIO.replace(
+            "CONTROLLER", "{method: emergency_brake, period: 0.25 s}"
+        ),
         "braking_mps2": SCENARIO.replace("CONTROLLER", "{method: emergency_brake, braking: -3 m/s²}"),
     }
     for message, text in wrong.items():

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.core.linear_algebra import convolution, inverse_of, matrix_product, straight_line, times
+from fogsim.core.linear_algebra import (
+    cholesky_factor,
+    convolution,
+    inverse_of,
+    matrix_product,
+    solved_lower,
+    solved_upper,
+    straight_line,
+    times,
+)
 
 RNG = np.random.default_rng(3)
 
@@ -56,6 +65,15 @@ def test_where_two_say_the_same_one_is_left_out() -> None:
     inverse = inverse_of(normal)
     np.testing.assert_allclose(normal @ inverse @ normal, normal, rtol=1e-12)
     assert sorted(inverse.any(axis=0).tolist()) == [False, True, True]
+
+
+def test_a_factor_and_what_it_solves() -> None:
+    root, right = RNG.normal(size=(7, 9)), RNG.normal(size=(7, 3))
+    matrix = root @ root.T
+    factor = cholesky_factor(matrix)
+    np.testing.assert_allclose(factor, np.linalg.cholesky(matrix), rtol=1e-9)
+    solution = solved_upper(factor, solved_lower(factor, right))
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-7)
 
 
 def test_a_straight_line_has_the_least_squares() -> None:

@@ -169,6 +169,8 @@ def entries() -> dict[str, Entry]:
         "network": Entry(".onnx", _files("tests/data/mean_network.onnx"), read_model),
         "video": Entry(".mp4", [_video()], pictures),
         "module": Entry(".py", [MODULE], _use_module),
+        "odd": Entry(".odd.yaml", _files("fogsim/testing/odd/shipped/*.odd.yaml"), _read_odd),
+        "openodd": Entry(".yaml", _files("fogsim/testing/odd/shipped/driving_in_fog.yaml"), _read_odd),
         "run": Entry(".json", [_run_file()], lambda p: read_run(p, STUDY_RUN)),
     }
 
@@ -215,6 +217,20 @@ def _use_module(path: Path) -> None:
     method = ESTIMATORS.find(f"{name}:Mine", path.parent)(camera)
     method.reset()
     checked_estimate("mine:Mine", method.update(fogsim.Observation(np.zeros((8, 8, 3), np.uint8))))
+
+
+def _read_odd(path: Path) -> None:
+    """Read a binding of the shipped domain, or a domain by the shipped binding."""
+    from fogsim.testing.odd.odd_file import read_odd  # noqa: PLC0415
+    from fogsim.testing.odd.openodd_library import Coverage  # noqa: PLC0415
+
+    domain, binding = (ROOT / "fogsim/testing/odd/shipped" / name for name in ("driving_in_fog.yaml", "fog.odd.yaml"))
+    if path.name.endswith(".odd.yaml"):
+        shutil.copy(domain, path.parent)
+    else:
+        shutil.copy(path, path.with_name(domain.name))
+        path = Path(shutil.copy(binding, path.parent))
+    Coverage(read_odd(str(path)))
 
 
 HOSTILE = [

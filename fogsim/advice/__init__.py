@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 
+from fogsim.advice.agent import trained_agent
 from fogsim.advice.controllers import AdaptiveCruiseControl, BeliefController, Controller, EmergencyBrake, SightLimiter
+from fogsim.advice.osi_controller import OsiController
 from fogsim.advice.protocol import Adviser, VehicleAdviser
 from fogsim.advice.sight_distance import FixedSpeed, NoAdvice, StoppingSightDistance
 from fogsim.advice.step_tables import (
@@ -37,9 +39,15 @@ ADVISERS: Registry[Callable[..., Adviser | VehicleAdviser]] = Registry(
 
 CONTROLLERS: Registry[Callable[..., Controller | BeliefController]] = Registry(
     "controller",
-    {"emergency_brake": EmergencyBrake, "cruise_control": AdaptiveCruiseControl, "sight_limiter": SightLimiter},
+    {
+        "emergency_brake": EmergencyBrake,
+        "cruise_control": AdaptiveCruiseControl,
+        "sight_limiter": SightLimiter,
+        "osi": OsiController,
+    },
     group="fogsim.advice.controllers",
     methods=("control|control_by_belief",),
+    files={"onnx": trained_agent},
 )
 
 __all__ = [

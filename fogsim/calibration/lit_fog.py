@@ -29,10 +29,11 @@ from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.night.own_light import SUB_ROWS, VISIBILITIES, Cells, OwnLight, cells_of
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.units import extinction_from_visibility
-from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.camera import Camera
 from fogsim.values.fog import FogField
 from fogsim.values.light import Beam, HeadLamp, Lamp
 from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.pinhole import OWN_FRAME
 
 Floats = NDArray[np.float64]
 Watch = Callable[[int, int], None]
@@ -251,7 +252,7 @@ def _road_glow(camera: Camera, cells: Cells, lit: tuple[HeadLamp, ...]) -> NDArr
     """Light that the lit road returns and the fog scatters to the eye (visibilities, cells) [cd/m²]."""
     rays = cells.rays[:, SUB_ROWS // 2]
     reach = np.where(cells.is_sky, np.inf, camera.mount_height / np.maximum(-rays[:, 2], 1e-3))
-    pose, patches = CameraPose((0.0, 0.0, 0.0), 0.0), RoadGlow()
+    pose, patches = OWN_FRAME, RoadGlow()
     found = np.zeros((len(VISIBILITIES), len(rays)))
     for row, visibility in enumerate(VISIBILITIES.tolist()):
         extinction = extinction_from_visibility(visibility)

@@ -1,5 +1,6 @@
 """``fogsim campaign``: draw cases from a declared space, and find where a scenario fails and how often."""
 
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +14,10 @@ from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from fogsim.study.execution import Engine
+    from fogsim.testing.campaign.drawing_plan import Findings
+    from fogsim.testing.campaign.running import Campaign
+    from fogsim.testing.odd.odd_file import OddFile
+    from fogsim.testing.shrinking import SmallestCase
 
 
 class CampaignEngine(StrEnum):
@@ -44,60 +49,121 @@ def campaign_command(
         str | None, typer.Option(help="With --engine ray: as in fogsim study. Default: $RAY_ADDRESS, or local.")
     ] = None,
     budget: Annotated[
-        int, typer.Option(min=16, max=100_000, help="Number of cases; a failure rate needs 400 or more.")
-    ] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all draws.")] = 0,
-    first: Annotated[FirstDraws, typer.Option(help="How the first cases fill the space.")] = FirstDraws.SOBOL,
+        int | None,
+        typer.Option(min=16, max=100_000, help="Number of cases, 200 by default; a failure rate needs 400 or more."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws, 0 by default.")] = None,
+    first: Annotated[
+        FirstDraws | None, typer.Option(help="How the first cases fill the space, sobol by default.")
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="Directory of an earlier campaign: run its cases again, and show which ones changed."),
+    ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML, a test case for each case.")] = None,
+    odd: Annotated[
+        str | None, typer.Option(help="Collect coverage of an ODD: `fog`, or a binding file. Needs the extra odd.")
+    ] = None,
     case: CaseValues = "",
     settings: Settings = None,
     method_timeout: MethodTimeout = None,
 ) -> None:
     """Find where a scenario with `space:` fails, and how often; exit code 0 (all passed), 1 (not all) or 2."""
-    from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
-    from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
-    from fogsim.testing.campaign.running import load_campaign, run_campaign
+    from fogsim.testing.campaign.running import load_campaign, run_campaign, smallest_failing
 
+    _refuse_clashes(out, junit, against, {"--budget": budget, "--seed": seed, "--first": first})
     if address is not None and engine is CampaignEngine.LOCAL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
-    refuse_unwritable_folder(out)
-    if junit is not None:
-        refuse_unwritable(junit, "--junit", read=[], makes_folder=True)
     chosen = with_timeout(settings, method_timeout)
     campaign = load_campaign(
-        file, chosen, case, budget=budget, seed=seed, sequencing=first.value, may_import=CodeNotice()
+        file,
+        chosen,
+        case,
+        budget=budget or 200,
+        seed=seed or 0,
+        sequencing="sobol" if first is None else first.value,
+        against=against,
+        odd=odd,
+        may_import=CodeNotice(),
     )
     try:
         with progress_bar(stderr, stays=True) as progress:
-            task = progress.add_task(STARTING, total=budget)
+            task = progress.add_task(STARTING, total=campaign.budget)
 
             def show(done: int, failed: int) -> None:
                 failures = f", {failed} failed" if failed else ""
-                progress.update(task, completed=done, description=f"{done} of {budget} cases{failures}")
+                progress.update(task, completed=done, description=f"{done} of {campaign.budget} cases{failures}")
 
-            found = run_campaign(campaign, out, _engine(engine, address, processes), show)
+            found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
+            progress.update(task, description="searching the smallest failing case")
+            # One case after another: a cluster would be connected to for each.
+            smallest = smallest_failing(campaign, found, out, _engine(CampaignEngine.LOCAL, None, 1))
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished cases are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None
-    write_cases(out / "cases.csv", campaign, found)
-    write_report(out / "report.html", campaign, found, chosen)
-    if junit is not None:
-        write_campaign_junit(junit, campaign, found, chosen)
-    stdout.print(f"{escape(counts_text(found))}\n{escape(rate_text(found))}", soft_wrap=True)
-    for path in (out / "cases.csv", out / "report.html", junit):
-        if path is not None:
-            stdout.print(f"  {escape(path)}", soft_wrap=True)
+    _report(campaign, found, smallest, chosen, out, junit)
     if not all(one.is_passed for one in found.results):
         raise typer.Exit(FAILED)
 
 
-def _engine(chosen: CampaignEngine, address: str | None, processes: int | None) -> "Engine":
+def _refuse_clashes(out: Path, junit: Path | None, against: Path | None, drawing: Mapping[str, object]) -> None:
+    """Refuse before the first run what could not be written after the last, and options that do not go together."""
+    from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
+
+    for option, value in drawing.items():
+        if against is not None and value is not None:
+            raise InputError(f"{option} does not go with --against, whose cases are drawn already")
+    if against is not None and against.resolve() == out.resolve():
+        raise InputError(f"--against {against}: --out is the same directory; give another, so that both are kept")
+    refuse_unwritable_folder(out)
+    if junit is not None:
+        refuse_unwritable(junit, "--junit", read=[], makes_folder=True)
+
+
+def _report(
+    campaign: "Campaign",
+    found: "Findings",
+    smallest: "SmallestCase | None",
+    settings: Sequence[str],
+    out: Path,
+    junit: Path | None,
+) -> None:
+    from fogsim.testing.campaign.comparison import CASES, changes_text
+    from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
+    from fogsim.testing.campaign.running import as_test
+    from fogsim.testing.odd.coverage_files import write_coverage
+    from fogsim.testing.shrinking import smallest_text
+
+    write_cases(out / CASES, campaign, found)
+    write_report(out / "report.html", campaign, found, settings, smallest)
+    if junit is not None:
+        write_campaign_junit(junit, campaign, found, settings)
+    lines = [counts_text(found), rate_text(found)]
+    if (broken := next((one.message for one in found.results if one.message is not None), None)) is not None:
+        lines.append(f"the first error: {broken}")
+    if campaign.earlier:
+        lines.append(changes_text(campaign.earlier, found))
+    if smallest is not None:
+        lines.append(smallest_text(as_test(campaign, found), smallest, settings))
+    paths = [out / CASES, out / "report.html", *([] if junit is None else [junit])]
+    if campaign.odd is not None:
+        summary, files = write_coverage(out, campaign.odd, [one.run for one in found.results])
+        lines, paths = [*lines, *summary], [*paths, *files]
+    stdout.print(escape("\n".join(lines)), soft_wrap=True)
+    for path in paths:
+        stdout.print(f"  {escape(path)}", soft_wrap=True)
+
+
+def _engine(
+    chosen: CampaignEngine, address: str | None, processes: int | None, odd: "OddFile | None" = None
+) -> "Engine":
     import os
 
     from fogsim.study import RayCluster
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import check_outcome, check_to_file
+    from fogsim.testing.execution import CoverageCheck, check_outcome, check_to_file
 
+    check = None if odd is None else CoverageCheck(odd)
     if chosen is CampaignEngine.RAY:
-        return RayCluster(address, processes, check_outcome)
-    return ProcessPool(processes or os.cpu_count() or 1, check_to_file)
+        return RayCluster(address, processes, check_outcome if check is None else check.outcome)
+    return ProcessPool(processes or os.cpu_count() or 1, check_to_file if check is None else check.to_file)

@@ -12,7 +12,7 @@ from fogsim.conditions.clauses import (
 )
 from fogsim.conditions.expectation_watch import ExpectationWatch
 from fogsim.conditions.moment import EGO, History, Moment
-from fogsim.conditions.parsing import mended, parse_condition
+from fogsim.conditions.parsing import mended, parse_condition, parse_signal
 from fogsim.conditions.possibility import (
     Limits,
     RunContent,
@@ -61,6 +61,7 @@ __all__ = [
     "mended",
     "outcomes",
     "parse_condition",
+    "parse_signal",
     "pointless_parts",
     "shown_value",
     "signals_of",

@@ -103,6 +103,12 @@ class Moment:
         row, place = self.row(vehicle), self._place(vehicle)
         return None if row is None or place is None else extent_of(place, self.traffic, row)
 
+    def curvature(self, vehicle: str) -> float | None:
+        """Curvature of the route at a vehicle [1/m]; None if it is not on it."""
+        row, route = self.row(vehicle), self._route
+        place = None if row is None or route is None else self._on_route(route, row)
+        return None if route is None or place is None else route.curvature(place.front)
+
     def _place(self, vehicle: str) -> RoutePlace | None:
         if vehicle not in self._places:
             self._places[vehicle] = self._located(vehicle)

@@ -55,6 +55,11 @@ def parse_condition(written: object) -> Condition:
     return _read(written, 0)
 
 
+def parse_signal(text: str) -> Reference:
+    """Parse the name of one signal with its arguments; ValueError with what is nearest if there is none."""
+    return _Text(text).signal()
+
+
 def _read(written: object, depth: int) -> Condition:
     if depth > DEEPEST:
         raise ValueError(f"conditions may be {DEEPEST} deep inside one another")
@@ -124,6 +129,13 @@ class _Text:
         result = self._any()
         if self._rest():
             raise self._wrong("'and', 'or', 'for', 'delayed' or the end")
+        return result
+
+    def signal(self) -> Reference:
+        """Parse all of it as the name of a signal."""
+        result = self._reference()
+        if self._rest():
+            raise self._wrong("the end of the signal's name")
         return result
 
     def _any(self) -> Condition:

@@ -1,5 +1,7 @@
 """Vehicles along a route: positions, extents, gaps and times between them."""
 
+import bisect
+import functools
 import math
 from dataclasses import dataclass
 
@@ -14,6 +16,9 @@ FARTHEST_ASIDE = 30.0
 
 _AS_NEAR = 1.0
 """Where a route passes a point twice, its parts there are at most this far apart [m]."""
+
+_HALF_ARC = 25.0
+"""Half of the part of a route whose curvature is measured [m]: maps draw curves with corners 5 to 20 m apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +51,28 @@ class Route:
         x, y, _ = self._direction[nearest].tolist()
         along = x * math.cos(heading) + y * math.sin(heading)
         return RoutePlace(float(self._start[nearest] + at[nearest]), along)
+
+    @functools.cached_property
+    def _pieces(self) -> tuple[list[float], list[list[float]]]:
+        """Beginning of each piece [m], and x, y of its beginning [m] and of its direction: quick to look up singly."""
+        return self._start.tolist(), np.hstack((self.points[:-1, :2], self._direction[:, :2])).tolist()
+
+    def curvature(self, at: float) -> float:
+        """Curvature about a position [1/m]: that of the circle through the points 25 m before it, there and after."""
+        last = float(self._start[-1] + self._length[-1])
+        if last < 2.0 * _HALF_ARC:
+            return 0.0
+        middle = min(max(at, _HALF_ARC), last - _HALF_ARC)
+        a, b, c = (self._point(middle + ahead) for ahead in (-_HALF_ARC, 0.0, _HALF_ARC))
+        doubled = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+        return 2.0 * abs(doubled) / max(math.dist(a, b) * math.dist(b, c) * math.dist(a, c), 1e-9)
+
+    def _point(self, at: float) -> tuple[float, float]:
+        """Point at a position along the route [m]."""
+        starts, pieces = self._pieces
+        piece = max(bisect.bisect_right(starts, at) - 1, 0)
+        (x, y, east, north), further = pieces[piece], at - starts[piece]
+        return x + further * east, y + further * north
 
 
 @kernel

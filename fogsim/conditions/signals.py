@@ -6,10 +6,11 @@ from typing import TypeVar
 
 from fogsim.conditions.moment import Moment
 from fogsim.conditions.signal import Kind, Need, Place, Signal, length_signal, speed_signal
+from fogsim.conditions.surroundings import OF_SURROUNDINGS, is_inside
 from fogsim.conditions.vehicle_signals import LAMP_WORDS, OF_VEHICLES, lit_lamps
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.core.registry import Registry
-from fogsim.values import DriverWarning, Ending, Estimate, FogBank, Leader, SignalAhead, SignalColour, Step
+from fogsim.values import DriverWarning, Ending, Estimate, Leader, SignalAhead, SignalColour, Step
 
 NO_LEADER = "none"
 """Value of ``ego.leader`` without a vehicle ahead."""
@@ -63,10 +64,7 @@ def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | Non
     row, fog = moment.row(vehicle), moment.step.truth.fog
     if row is None or fog is None or int(number) >= len(fog.banks):
         return None
-    bank: FogBank = fog.banks[int(number)]
-    east, north, _ = moment.traffic.position[row]
-    along = (east - bank.origin[0]) * bank.axis[0] + (north - bank.origin[1]) * bank.axis[1]
-    return bool(bank.start <= along <= bank.end)
+    return is_inside(fog.banks[int(number)], moment.traffic.position[row])
 
 
 def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callable[[Moment, str], float | bool | None]:
@@ -262,6 +260,8 @@ _OF_FOG = {
     ),
 }
 
-SIGNALS: Registry[Signal] = Registry("signal", {**_OF_RUN, **OF_VEHICLES, **_OF_EGO, **_OF_LIGHTS, **_OF_FOG})
+SIGNALS: Registry[Signal] = Registry(
+    "signal", {**_OF_RUN, **OF_VEHICLES, **_OF_EGO, **OF_SURROUNDINGS, **_OF_LIGHTS, **_OF_FOG}
+)
 """Every signal by name. In a name, X and Y are vehicles (``ego`` for the ego), METHOD an estimator of the
 scenario, ID a traffic light, N the number of a fog bank, EVENT an entry of the timeline."""

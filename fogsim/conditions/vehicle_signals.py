@@ -82,9 +82,9 @@ def _lane(moment: Moment, vehicle: str) -> LanePlace | None:
         return None
     lane = moment.traffic.lane[row]
     edge, _, number = lane.rpartition("_")
-    beside = moment.step.truth.carriageways.get(edge, ())
-    if lane in beside:
-        return LanePlace(beside.index(lane), len(beside))
+    lanes = moment.step.truth.carriageways.get(edge, ())
+    if lane in lanes:
+        return LanePlace(lanes.index(lane), len(lanes))
     return LanePlace(int(number), None) if number.isdecimal() else None
 
 

@@ -123,6 +123,49 @@ def _sweep(matrix: NDArray[np.float64], pivot: int) -> None:
 
 
 @kernel
+def cholesky_factor(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lower factor L (n, n) of a positive definite matrix L·Lᵀ (`matrix` (n, n)); NaN where it is not."""
+    count = len(matrix)
+    factor, column = matrix.copy(), np.empty(count)
+    for k in range(count):
+        factor[k, k] = math.sqrt(factor[k, k])
+        for i in range(k + 1, count):
+            factor[k, i] = 0.0
+            factor[i, k] /= factor[k, k]
+            column[i] = factor[i, k]
+        for i in range(k + 1, count):
+            for j in range(k + 1, i + 1):
+                factor[i, j] -= column[i] * column[j]
+    return factor
+
+
+@kernel
+def solved_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """X (n, m) with L·X = `right` (n, m), for a lower factor L (n, n)."""
+    found = right.copy()
+    for i in range(len(factor)):
+        for k in range(i):
+            for j in range(found.shape[1]):
+                found[i, j] -= factor[i, k] * found[k, j]
+        for j in range(found.shape[1]):
+            found[i, j] /= factor[i, i]
+    return found
+
+
+@kernel
+def solved_upper(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """X (n, m) with Lᵀ·X = `right` (n, m), for a lower factor L (n, n)."""
+    found = right.copy()
+    for i in range(len(factor) - 1, -1, -1):
+        for j in range(found.shape[1]):
+            found[i, j] /= factor[i, i]
+        for k in range(i):
+            for j in range(found.shape[1]):
+                found[k, j] -= factor[i, k] * found[i, j]
+    return found
+
+
+@kernel
 def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
     """Product (n,) of a matrix and a vector, for kernels (`matrix` (n, m), `vector` (m,))."""
     out = np.zeros(len(matrix))

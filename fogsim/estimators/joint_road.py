@@ -202,13 +202,13 @@ class JointRoad:
             return Estimate.invalid(self.method, "too dark above the horizon: this is a daytime method", **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
-        horizon, course = self._seen_course(pixels)
+        horizon, course, lines = self._seen_course(pixels)
         free = free_road(observation.lead)
         if sky is None:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
         else:
             own, free = self._joint(observation, pixels, sky, horizon, course, free, found)
-        return self._second.on(own, level, horizon, free, observation.time)
+        return self._second.on(own, level, horizon, free, observation.time, lines)
 
     def _joint(
         self,
@@ -327,17 +327,22 @@ class JointRoad:
         """Average with the earlier frames' curves."""
         return mean_curves((*self._earlier, (curves, sky)))
 
-    def _seen_course(self, pixels: LinearPixels) -> tuple[Horizon, RoadCourse]:
-        """Course of the road, and its horizon: of a straight one weighed with the point in which its lines meet."""
+    def _seen_course(self, pixels: LinearPixels) -> tuple[Horizon, RoadCourse, int | None]:
+        """Horizon and course of the road, and how many lines meet where it vanishes; None if it bends.
+
+        A straight road's horizon is weighed with the point in which its lines meet.
+        """
         seen = seen_lines(pixels, self._camera, self._horizon)
         unseen = unseen_course(self._camera, self._horizon)
         if seen is None:
-            return self._horizon, unseen
+            return self._horizon, unseen, 0
         course = road_course(seen, pixels, self._camera, self._horizon) or unseen
         if not course.is_straight:
-            return course.horizon, course
+            return course.horizon, course, None
         point = vanishing_point_of(seen, self._camera, self._horizon)
-        return self._horizon if point is None else weighted_mean(self._horizon, point.horizon), course
+        if point is None:
+            return self._horizon, course, 0
+        return weighted_mean(self._horizon, point.horizon), course, point.lines
 
     def _change(self, time: float, extinction: float) -> float:
         """Relative deviation of the extinction by how it changed over the last pictures [-]; 0 without their times."""

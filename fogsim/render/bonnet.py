@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.values import Camera, CameraPose, View
-from fogsim.values.pinhole import ray_from_pixel
+from fogsim.values import Camera, View
+from fogsim.values.pinhole import OWN_FRAME, ray_from_pixel
 
 REFLECTANCE = 0.06
 """Of dark paint, alike in all directions [-]."""
@@ -23,8 +23,6 @@ _ROUNDING = 0.5
 
 _NEAREST = 0.35
 """Distance ahead of the camera at which the bonnet begins: before it are windscreen and scuttle, as dark [m]."""
-
-_AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +66,7 @@ def with_bonnet(view: View, camera: Camera, bonnet: Bonnet, instance: int, illum
 def _seen(camera: Camera, bonnet: Bonnet) -> _Seen:
     rows, columns = np.mgrid[: camera.height, : camera.width].astype(np.float64)
     pixels = np.stack((columns.ravel(), rows.ravel(), np.ones(rows.size)), axis=1)
-    rays = np.asarray(matrix_product(pixels, np.ascontiguousarray(ray_from_pixel(camera, _AT_REST).T)))
+    rays = np.asarray(matrix_product(pixels, np.ascontiguousarray(ray_from_pixel(camera, OWN_FRAME).T)))
     lengths = np.sqrt((rays**2).sum(axis=1))
     falls = np.maximum(-rays[:, 2], 1e-9)
     scale = (camera.mount_height - bonnet.height) / falls

@@ -18,7 +18,7 @@ from fogsim.scenario.expect.checks import last_time
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.departures import entering_vehicles
-from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
+from fogsim.scenario.roads.files import DemandError, TrafficFiles, traffic_files, with_way
 from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
@@ -349,11 +349,11 @@ def _checked_scenario(
     if refused:
         raise InputError("\n".join(refused))
     _check_files(document, scenario)
-    _check_placement(document, scenario)
+    files = _placed_files(document, scenario)
     _check_departures(document, scenario)
     scenario = with_way(scenario)
     end = math.inf if _is_shortened(document, context) else last_time(scenario)
-    unknown = demand_mistakes(document, scenario, end) if named_files and closed_demand else []
+    unknown = demand_mistakes(document, scenario, files, end) if named_files and closed_demand else []
     if unknown:
         raise InputError("\n".join(unknown))
     return scenario
@@ -422,11 +422,9 @@ def _check_departures(document: Document, scenario: Scenario) -> None:
         raise
 
 
-def _check_placement(document: Document, scenario: Scenario) -> None:
-    if scenario.road is None and not scenario.actors:
-        return
+def _placed_files(document: Document, scenario: Scenario) -> TrafficFiles:
     try:
-        traffic_files(scenario)
+        return traffic_files(scenario)
     except (PlacementError, DemandError) as error:
         at = ("actors", error.actor) if isinstance(error, PlacementError) else ("demand", *error.key.split("."))
         raise InputError(f"{document.where(at)}: {dotted(at)}: {error.message}") from error

@@ -48,7 +48,7 @@ class ControllerSection(Method):
     """A controller in the ego, and what its actuators can do."""
 
     delay_s: Time = 0.2
-    """From a request to the first change of the acceleration, in whole camera periods."""
+    """From a request to the first change of the acceleration."""
 
     lag_s: Time = 0.1
     """Time constant of that change."""
@@ -58,6 +58,9 @@ class ControllerSection(Method):
 
     accelerating_mps2: Deceleration = 2.5
     """Greatest acceleration."""
+
+    period_s: Annotated[Period, Field(le=3600)] | None = None
+    """Time from one request to the next, a whole multiple of the camera period; by default that."""
 
 
 class Clocks(Section):
@@ -74,14 +77,15 @@ class Clocks(Section):
 
     @model_validator(mode="after")
     def _multiples(self) -> Self:
-        for faster, slower in (("traffic_step_s", "camera_period_s"), ("camera_period_s", "decision_period_s")):
-            ratio = getattr(self, slower) / getattr(self, faster)
-            if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
-                raise ValueError(
-                    f"{slower} must be a whole multiple of {faster}, "
-                    f"got {getattr(self, slower):g} s and {getattr(self, faster):g} s"
-                )
+        _check_multiple("camera_period_s", self.camera_period_s, "traffic_step_s", self.traffic_step_s)
+        _check_multiple("decision_period_s", self.decision_period_s, "camera_period_s", self.camera_period_s)
         return self
+
+
+def _check_multiple(slower: str, period: float, faster: str, of: float) -> None:
+    """Refuse a period that is no whole multiple of another one [s]."""
+    if round(period / of) < 1 or abs(period / of - round(period / of)) > 1e-6:
+        raise ValueError(f"{slower} must be a whole multiple of {faster}, got {period:g} s and {of:g} s")
 
 
 class Light(Section):
@@ -307,6 +311,10 @@ class ScenarioFile(Section):
             raise ValueError("controller drives the ego, and traffic.ego is none; name one, or leave it out")
         if self.driver is not None and self.controller is None:
             raise ValueError("driver goes with controller, which is missing")
+        if self.controller is not None and self.controller.period_s is not None:
+            _check_multiple(
+                "controller.period_s", self.controller.period_s, "clocks.camera_period_s", self.clocks.camera_period_s
+            )
         return self
 
     @model_validator(mode="after")

@@ -10,7 +10,7 @@ from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.expect.checks import last_time, named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
-from fogsim.scenario.roads.files import traffic_files
+from fogsim.scenario.roads.files import TrafficFiles
 from fogsim.scenario.schema import Clocks, ScenarioFile
 from fogsim.scenario.timeline import departing_vehicles, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
@@ -77,10 +77,10 @@ _MOST_SHOWN = 10
 """Maximum number of names in a message."""
 
 
-def demand_mistakes(document: Document, scenario: ScenarioFile, end: float) -> list[str]:
+def demand_mistakes(document: Document, scenario: ScenarioFile, made: TrafficFiles, end: float) -> list[str]:
     """One line for each vehicle, edge or lane that a scenario names and its route files or network lack.
 
-    `end` is the time by which conditions must have been decided [s].
+    `made` are the scenario's files, and `end` is the time by which conditions must have been decided [s].
 
     Nothing is reported where vehicles may come from elsewhere, routes are not written out, or files are very large.
     """
@@ -88,10 +88,10 @@ def demand_mistakes(document: Document, scenario: ScenarioFile, end: float) -> l
     others = departing_vehicles(scenario.timeline) | {EGO}
     watched = [(at, vehicle) for at, vehicle in named_vehicles(scenario.expect) if vehicle not in others]
     watched += scripted_vehicles(scenario.timeline)
-    demand = _demand(scenario, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
+    demand = _demand(scenario, made, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
     asked = (*named.items(), *watched)
     mistakes = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
-    edges = _edges(scenario, demand)
+    edges = _edges(scenario, made, demand)
     if edges is not None:
         places = {vehicle: at for at, vehicle in reversed(named.items())}
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
@@ -113,21 +113,20 @@ def _named_vehicles(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
 
 
-def _demand(scenario: ScenarioFile, wanted: frozenset[str]) -> Demand:
+def _demand(scenario: ScenarioFile, made: TrafficFiles, wanted: frozenset[str]) -> Demand:
     traffic, folder = scenario.traffic, scenario.directory
     if traffic.config is not None:
         return read_configured_demand(folder / traffic.config, wanted)
-    files = traffic_files(scenario)
-    return read_demand((*files.additional, *files.routes), wanted)
+    return read_demand((*made.additional, *made.routes), wanted)
 
 
-def _edges(scenario: ScenarioFile, demand: Demand) -> NetEdges | None:
+def _edges(scenario: ScenarioFile, made: TrafficFiles, demand: Demand) -> NetEdges | None:
     """Edges of the network, if a check needs them."""
     traffic, folder = scenario.traffic, scenario.directory
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
     if not (demand.routes or changes or traffic.along or scenario.timeline or scenario.expect or scenario.end_when):
         return None
-    net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net or Path()
+    net = configured_files(folder / traffic.config)[0] if traffic.config else made.net or Path()
     return read_net_edges(net, _way(scenario, demand), must_follow=bool(traffic.along))
 
 

@@ -36,33 +36,42 @@ def own_policy(config: RunConfig) -> Policy:
 
 
 class ControlledDriving:
-    """Asks a controller once a camera period [s]; it gets what the vehicle knows, never the truth."""
+    """Asks a controller by its own clock and acts each camera period [s]; it gets what the vehicle knows, no truth."""
 
     def __init__(self, advised: AdvisedDriving, config: ControllerConfig, period: float) -> None:
         self._advised, self._config, self._period = advised, config, period
         self._ask = _questions_to(controller(config.method))
         self._advice: Command | None = None
-        self._delayed: deque[float | None] = deque([None] * round(config.delay / period))
+        self._request = Control()
+        whole, self._late_share = divmod(round(config.delay / period, 9), 1.0)
+        self._delayed: deque[float | None] = deque([None] * (int(whole) + 1))
         self._acceleration = 0.0
         self._has_intervened = False
 
     def decide(self, step: Step) -> Command:
         """Command for the next camera period."""
         self._advice = self._advised.decide(step, self._advice)
-        request = checked_control(self._config.method.name, self._ask(step))
+        if step.index % self._config.frames == 0:
+            self._request = checked_control(self._config.method.name, self._ask(step))
+        request = self._request
         acceleration = self._actuated(_wanted_acceleration(request, step.observation.speed))
         return dataclasses.replace(
             self._advice,
             lamps=self._advice.lamps if request.lamps is None else request.lamps,
             warning=self._advice.warning if request.warning is None else request.warning,
-            control=None if acceleration is None else EgoControl(acceleration),
+            control=None
+            if acceleration is None
+            else EgoControl(acceleration, brakes_with_driver=self._config.driver == "human"),
         )
 
     def _actuated(self, wanted: float | None) -> float | None:
         """Acceleration of the next period [m/s²]; None while a human drives."""
         config = self._config
         self._delayed.append(wanted)
-        now = self._delayed.popleft()
+        earlier, now = self._delayed.popleft(), self._delayed[0]
+        if self._late_share and (earlier, now) != (None, None):
+            # Within the period the later request takes the place of the earlier one: their mean over time.
+            now = self._late_share * (earlier or 0.0) + (1.0 - self._late_share) * (now or 0.0)
         self._has_intervened |= now is not None
         if now is None and (config.driver == "human" or (config.driver != "none" and not self._has_intervened)):
             self._acceleration = 0.0

@@ -229,6 +229,7 @@ class ControllerConfig:
     lag: float = 0.1  # Time constant of that change [s]
     braking: float = 9.0  # Greatest deceleration [m/s²]
     accelerating: float = 2.5  # Greatest acceleration [m/s²]
+    frames: int = 1  # Camera periods from one request to the next
 
 
 class Situation(Protocol):

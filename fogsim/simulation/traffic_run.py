@@ -203,7 +203,15 @@ class TrafficRun:
         seen = extinction(fog, snapshot.state.position + EYES)
         self._section_meters.hear(self._reporters.heard_from_roadside(time, fog))
         sections = self._section_meters.measure(fog)
-        return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections, route=self._route)
+        return Truth(
+            measured,
+            measured,
+            fog=fog,
+            vehicle_extinctions=seen,
+            sections=sections,
+            route=self._route,
+            illuminance=self._config.world.illuminance,
+        )
 
     def _ending(self, index: int, snapshot: NetworkSnapshot, cohort: Cohort | None) -> Ending | None:
         if cohort is not None and not cohort.unfinished and self._cohort.is_complete:

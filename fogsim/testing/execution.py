@@ -21,13 +21,18 @@ from fogsim.study.execution import Engine, RunWatch, outcome_of, result_file
 from fogsim.study.plan import StudyRun
 from fogsim.study.pool import ProcessPool, Work
 from fogsim.testing.collection import FogTest
+from fogsim.testing.odd.coverage_watch import CoverageWatch
+from fogsim.testing.odd.odd_file import OddFile
 from fogsim.testing.results import CaseResult, finding_from_json, finding_to_json
 from fogsim.testing.session import FileOutcome, run_tests
 
 
-def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
-    """Run a case and return ``findings``, ``metrics`` and ``ending`` as JSON data."""
+def check_case(
+    scenario: Scenario, seed: int, sumo_outputs: Path | None = None, odd: OddFile | None = None
+) -> dict[str, Any]:
+    """Run a case and return ``findings``, ``metrics``, ``ending`` and, with an ODD, ``coverage`` as JSON data."""
     standard, watch = build.safety_standard(scenario), ExpectationWatch(clauses_of(scenario.expect))
+    coverage = None if odd is None else CoverageWatch(odd)
     ending = None
     with warnings.catch_warnings():
         # Expectations decide about events that were not played.
@@ -37,6 +42,8 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
             for step in run(scenario, seed, sumo_outputs=sumo_outputs):
                 of_ego.update(step)
                 watch.update(step)
+                if coverage is not None:
+                    coverage.update(step)
                 ending = step.ending
             summary = of_ego.summary()
         else:
@@ -44,24 +51,42 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
             for instant in run_traffic(scenario, seed, sumo_outputs):
                 of_traffic.update(instant)
                 watch.update(instant)
+                if coverage is not None:
+                    coverage.update(instant)
                 ending = instant.ending
             summary = of_traffic.summary()
-    findings = [finding_to_json(one) for one in watch.findings(summary.to_json())]
-    return {"findings": findings, "metrics": summary.flat(), "ending": ending}
+    findings = watch.findings(summary.to_json())
+    found = {"findings": [finding_to_json(one) for one in findings], "metrics": summary.flat(), "ending": ending}
+    return found if coverage is None else {**found, "coverage": coverage.document(scenario.name, findings)}
 
 
-def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path, odd: OddFile | None = None) -> dict[str, Any]:
     """Check a case and return the content of its file, which also reports failures."""
     begun = time.monotonic()
-    outcome = outcome_of(lambda: check_case(scenario, seed, sumo_outputs))
+    outcome = outcome_of(lambda: check_case(scenario, seed, sumo_outputs, odd))
     return {**outcome, "duration_s": round(time.monotonic() - begun, 3)}
 
 
-def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
+def check_to_file(scenario: Scenario, seed: int, result: Path, odd: OddFile | None = None) -> str | None:
     """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
-    outcome = check_outcome(scenario, seed, result.with_suffix(""))
+    outcome = check_outcome(scenario, seed, result.with_suffix(""), odd)
     write_json(result, outcome)
     return outcome.get("message")
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageCheck:
+    """Work of an engine that also collects the coverage of an ODD."""
+
+    odd: OddFile
+
+    def outcome(self, scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+        """As `check_outcome`."""
+        return check_outcome(scenario, seed, sumo_outputs, self.odd)
+
+    def to_file(self, scenario: Scenario, seed: int, result: Path) -> str | None:
+        """As `check_to_file`."""
+        return check_to_file(scenario, seed, result, self.odd)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,13 @@ are failures, since those servers treat skipped tests as passed.
 
 import platform
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fogsim.core.files.atomic import write_text
+from fogsim.scenario import Scenario
 from fogsim.testing.collection import label_of
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.page import broken_text, case_lines, command_text, judgement_text
@@ -49,7 +50,7 @@ def _suite(outcome: FileOutcome, settings: Sequence[str], now: str) -> ET.Elemen
         hostname=platform.node(),
         file=xml_text(str(outcome.test.path)),
     )
-    suite.extend(_clause(outcome, one, settings) for one in outcome.judgements)
+    suite.extend([_clause(outcome, one, settings) for one in outcome.judgements])
     if outcome.broken:
         suite.append(_broken(outcome, outcome.broken, settings))
     return suite
@@ -59,11 +60,12 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
     # The runs are those of all clauses: each has its share of their time.
     share = outcome.duration / (len(outcome.judgements) + bool(outcome.broken))
     case = _case(outcome, judgement.title, share)
-    told = judgement_text(judgement)
+    add_requirements(case, judgement.run.scenario, [judgement.name])
+    text = judgement_text(judgement)
     if judgement.outcome is not Outcome.PASSED:
-        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(told))
+        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=xml_text(text))
         where = outcome.test.lines[judgement.name]
-        failure.text = xml_text(f"{where}\n{told}\n{command_text(outcome.test, judgement.run, settings)}\n")
+        failure.text = xml_text(f"{where}\n{text}\n{command_text(outcome.test, judgement.run, settings)}\n")
     lines = case_lines(outcome, judgement)
     if lines:
         ET.SubElement(case, "system-out").text = xml_text("\n".join(lines) + "\n")
@@ -72,9 +74,9 @@ def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str])
 
 def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequence[str]) -> ET.Element:
     case = _case(outcome, "run", outcome.duration / (len(outcome.judgements) + 1))
-    told = broken_text(broken)
-    error = ET.SubElement(case, "error", type="error", message=xml_text(told))
-    error.text = xml_text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
+    text = broken_text(broken)
+    error = ET.SubElement(case, "error", type="error", message=xml_text(text))
+    error.text = xml_text(f"{outcome.test.path}\n{text}\n{command_text(outcome.test, broken[0].run, settings)}\n")
     if len(outcome.results) > 1:
         listed = "".join(f"{label_of(one.run)}: {one.message}\n" for one in broken)
         ET.SubElement(case, "system-out").text = xml_text(listed)
@@ -84,6 +86,16 @@ def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequen
 def _case(outcome: FileOutcome, name: str, seconds: float) -> ET.Element:
     attributes = {"classname": xml_text(str(outcome.test.path)), "name": xml_text(name), "time": _seconds(seconds)}
     return ET.Element("testcase", attributes)
+
+
+def add_requirements(case: ET.Element, scenario: Scenario, names: Container[str]) -> None:
+    """Add the requirements of expectations as properties, as pytest writes its own and Jenkins and Xray read them."""
+    expected = [one for name, one in scenario.expect.items() if name in names]
+    ids = dict.fromkeys(one for expectation in expected for one in expectation.requirement)
+    if ids:
+        properties = ET.SubElement(case, "properties")
+        for one in ids:
+            ET.SubElement(properties, "property", name="requirement", value=xml_text(one))
 
 
 def xml_text(text: str) -> str:

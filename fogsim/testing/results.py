@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import AfterValidator, Field, TypeAdapter
 
 from fogsim.conditions import Finding, FindingVerdict
 from fogsim.study.execution import result_file
@@ -24,6 +24,13 @@ def finding_from_json(values: Mapping[str, Any]) -> Finding:
     return _FINDING.validate_python(values)
 
 
+def _checked_coverage(document: dict[str, Any]) -> dict[str, Any]:
+    odd = document.get("odd")
+    if document.get("schema") != "openodd.coverage/1" or not isinstance(odd, dict) or "samples" not in odd:
+        raise ValueError("expected the coverage of a run, by openodd-py")
+    return document
+
+
 class CompleteCase(RunRecord):
     """A case with a completed run."""
 
@@ -32,6 +39,7 @@ class CompleteCase(RunRecord):
     metrics: Metrics
     ending: Word | None
     duration_s: Finite
+    coverage: Annotated[dict[str, Any], AfterValidator(_checked_coverage)] | None = None
 
 
 _FINDING = TypeAdapter(Finding)
@@ -85,3 +93,9 @@ def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> Cas
         return None
     findings = tuple(one for one in found.findings if one.name in expectations)
     return CaseResult(run, None, findings, found.metrics, found.duration_s)
+
+
+def read_coverage(folder: Path, run: StudyRun) -> dict[str, Any] | None:
+    """Coverage of an ODD by a case; None if its run failed or collected none."""
+    found = read_run(result_file(folder, run), _CASE)
+    return found.coverage if isinstance(found, CompleteCase) else None

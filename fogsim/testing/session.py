@@ -146,9 +146,14 @@ def begin_session(out: Path, resume: bool) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     last = _read_session(out)
     if not (resume and last.versions == versions()):
-        shutil.rmtree(out / _RESULTS, ignore_errors=True)
+        shutil.rmtree(results_folder(out), ignore_errors=True)
     write_json(session, {"versions": versions(), "not_passed": last.not_passed})
-    (out / _RESULTS).mkdir(exist_ok=True)
+    results_folder(out).mkdir(exist_ok=True)
+    return results_folder(out)
+
+
+def results_folder(out: Path) -> Path:
+    """Folder of the cases' results in the directory of a session."""
     return out / _RESULTS
 
 

@@ -1,14 +1,14 @@
 """The smallest failing case: as many names as possible at their first values, numbers as near to them as possible."""
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogsim.conditions import FindingVerdict
 from fogsim.errors import InputError
 from fogsim.scenario.loading import load_cases
-from fogsim.scenario.variation import Variation, number_with_unit, value_text
+from fogsim.scenario.variation import number_with_unit, value_text
 from fogsim.study.execution import Engine
 from fogsim.testing.collection import FogTest, collect
 from fogsim.testing.judgement import Judgement
@@ -43,9 +43,9 @@ class SmallestCase:
 def smallest_text(test: FogTest, found: SmallestCase, settings: Sequence[str] = ()) -> str:
     """The smallest case in words, with the command that runs it."""
     passes = ", ".join(f"{name}={value}" for name, value in found.passes_at.items())
-    told = f"; it does not with {passes}" if passes else ""
+    limit = f", which no longer fails with {passes}" if passes else ""
     run = replace(test.runs[0], levels=found.values)
-    return f"the smallest case that fails ({found.tried} more runs){told}: {command_text(test, run, settings)}"
+    return f"smallest failing case after {found.tried} more runs{limit}: {command_text(test, run, settings)}"
 
 
 def shrink(
@@ -56,24 +56,36 @@ def shrink(
     variation = load_cases(path, settings).variation
     gridded = [name for name, values in variation.varied.items() if not values.is_drawn]
     first = {name: value_text(variation.varied[name].value(0)) for name in gridded}
-    known: dict[str, bool | None] = {
-        _key(_values(result, gridded)): _fails(result, judgement) for result in outcome.results
-    }
+    failing = [_values(result, gridded) for result in outcome.results if _fails(result, judgement)]
+    start = min(failing, key=lambda values: sum(values[name] != first[name] for name in gridded))
+    known = {case_key(_values(result, gridded)): _fails(result, judgement) for result in outcome.results}
+    divisible = {name for name in gridded if variation.varied[name].is_divisible}
+    return smallest_case(
+        start, first, divisible, known, lambda values: _run(path, settings, values, judgement, engine, out)
+    )
+
+
+def smallest_case(
+    start: Values, first: Values, divisible: Container[str], known: Mapping[str, bool], run: Fails
+) -> SmallestCase:
+    """The smallest case that fails, from the failing one `start`; `divisible` names are searched between values.
+
+    `known` outcomes, by `case_key`, are not run again.
+    """
+    outcomes: dict[str, bool | None] = {**known}
     tried = 0
 
     def fails(values: Values) -> bool | None:
         nonlocal tried
-        if _key(values) not in known:
+        key = case_key(values)
+        if key not in outcomes:
             tried += 1
-            known[_key(values)] = _run(path, settings, values, judgement, engine, out)
-        return known[_key(values)]
+            outcomes[key] = run(values)
+        return outcomes[key]
 
-    failing = [_values(result, gridded) for result in outcome.results if _fails(result, judgement)]
-    start = min(failing, key=lambda values: sum(values[name] != first[name] for name in gridded))
-    values = _at_first_values(start, first, fails)
-    passes_at = {}
-    for name in gridded:
-        nearer = _nearer(values, name, first[name], variation, fails)
+    values, passes_at = _at_first_values(start, first, fails), {}
+    for name in first:
+        nearer = _nearer(values, name, first[name], fails) if name in divisible else None
         if nearer is not None:
             values, passes_at[name] = nearer
     return SmallestCase(values, passes_at, tried)
@@ -83,7 +95,8 @@ def _values(result: CaseResult, gridded: Sequence[str]) -> Values:
     return {name: result.run.levels[name] for name in gridded}
 
 
-def _key(values: Values) -> str:
+def case_key(values: Values) -> str:
+    """A case as text, whatever the order of its names."""
     return repr(sorted(values.items()))
 
 
@@ -118,9 +131,9 @@ def _at_first_values(values: Values, first: Values, fails: Fails) -> Values:
     return values
 
 
-def _nearer(values: Values, name: str, first: str, variation: Variation, fails: Fails) -> tuple[Values, str] | None:
+def _nearer(values: Values, name: str, first: str, fails: Fails) -> tuple[Values, str] | None:
     """A failing case with a number nearer to its first value, and the nearest with which it did not fail."""
-    if values[name] == first or not variation.varied[name].is_divisible:
+    if values[name] == first:
         return None
     bad, good = split_quantity(values[name]), split_quantity(first)
     if bad is None or good is None or bad[1] != good[1]:
@@ -132,5 +145,5 @@ def _nearer(values: Values, name: str, first: str, variation: Variation, fails: 
         if found is None:
             break
         failing, passing = ((failing + passing) / 2, passing) if found else (failing, (failing + passing) / 2)
-    told = [value_text(number_with_unit(one, bad[1])) for one in (failing, passing)]
-    return {**values, name: told[0]}, told[1]
+    ends = [value_text(number_with_unit(one, bad[1])) for one in (failing, passing)]
+    return {**values, name: ends[0]}, ends[1]

@@ -151,10 +151,13 @@ class EgoControl:
     lanes : int
         Change of lane that begins now: how many lanes to the left, negative to the right; none where there is no such
         lane.
+    brakes_with_driver : bool
+        Whether SUMO's driver brakes too: of an acceleration below 0 and the driver's, the lower one counts.
     """
 
     acceleration: float = 0.0
     lanes: int = 0
+    brakes_with_driver: bool = False
 
 
 @dataclass(frozen=True, slots=True)

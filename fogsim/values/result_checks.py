@@ -162,6 +162,7 @@ def checked_command(value: object) -> Command:
         if not (_is_number(control.acceleration) and math.isfinite(control.acceleration)):
             raise InputError(f"the command: control.acceleration must be finite, got {shown(control.acceleration)}")
         _check_kind("the command", "control.lanes", control.lanes, int, "a whole number of lanes to the left")
+        _check_kind("the command", "control.brakes_with_driver", control.brakes_with_driver, bool, "true or false")
     if command.warning is not None:
         _of_type("the command's warning", command.warning, DriverWarning)
     _check_kind("the command", "stretches", command.stretches, tuple, "a tuple of StretchAdvice")

@@ -182,6 +182,8 @@ class Truth:
         What the ego's lamps do; None by day.
     profile : FogProfile or None
         The fog at places along the route behind the ego and ahead, with deviations of 0; None where no route is known.
+    illuminance : float or None
+        Horizontal illuminance of the sky [lx]; None where it is not known.
     """
 
     extinction: float
@@ -197,6 +199,7 @@ class Truth:
     carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lamp_effects: LampEffects | None = None
     profile: FogProfile | None = None
+    illuminance: float | None = None
 
     @property
     def visibility(self) -> float:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fogsim.conditions import parse_condition, signals_of
+from fogsim.conditions import parse_condition, parse_signal, signals_of
 from fogsim.conditions.parsing import DEEPEST, mended
 from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Flag, Held, Not, Quantity, Reference, Word
 
@@ -115,3 +115,11 @@ def test_lists_in_lists_have_a_limit() -> None:
 def test_the_signals_of_a_condition() -> None:
     told = signals_of(parse_condition("ego.speed > advice and (gap(ego, b) < 3 m or not ego.speed > 3 m/s) for 2 s"))
     assert [str(signal) for signal in told] == ["ego.speed", "advice", "gap(ego, b)"]
+
+
+def test_one_signal_by_itself() -> None:
+    assert parse_signal("gap(ego, b)") == Reference("gap(X, Y)", ("ego", "b"))
+    assert str(parse_signal("ego.curvature")) == "ego.curvature"
+    for written, message in (("ego.sped", "did you mean 'ego.speed'"), ("ego.speed > 3", "the end"), ("", "a signal")):
+        with pytest.raises(ValueError, match=message):
+            parse_signal(written)

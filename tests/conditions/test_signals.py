@@ -16,6 +16,7 @@ from fogsim.values import (
     Command,
     DriverWarning,
     Estimate,
+    Fault,
     FogBank,
     FogField,
     Lamp,
@@ -29,6 +30,8 @@ from fogsim.values import (
     StretchAdvice,
     TrafficStep,
 )
+from fogsim.values.fault import Outage
+from tests.helpers.vehicles import vehicles
 from tests.recorders.synthetic import estimate, make_step, traffic
 
 ROUTE = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [500.0, 1000.0, 0.0]])
@@ -240,6 +243,8 @@ def test_banks() -> None:
     step = replace(step, truth=replace(step.truth, fog=fog))
     assert [read(f"fog.bank({n})", step) for n in (0, 1, 2)] == [False, False, None]
     assert [read(f"fog.bank({n}, other)", step) for n in (0, 1)] == [False, True]
+    assert read("fog.in_bank", step) is False
+    assert read("fog.in_bank", placed(step, (150.0, 0.0), (350.0, 0.0))) is True
 
 
 def test_estimates_and_belief() -> None:
@@ -298,3 +303,47 @@ def test_times_to_who_is_ahead_count_from_other_points() -> None:
         assert read(signal, ahead) is None
     with pytest.raises(ValueError, match="expected a number and a unit such as '10 m'"):
         parse_condition("headway(ego, other, far) < 2 s")
+
+
+def test_light_and_faults() -> None:
+    step = make_step()
+    assert read("light", step) is None
+    assert read("ego.sensor_fault", step) is False
+    faulty = replace(step.truth, illuminance=0.05, faults=(Fault(Outage()),))
+    dark = replace(step, truth=faulty)
+    assert read("light", dark) == 0.05
+    assert read("ego.sensor_fault", dark) is True
+
+
+def test_curvature_is_that_of_the_circle_through_the_road() -> None:
+    angles = np.arange(65) / 64.0
+    # 400 m straight, then a curve to the left with a radius of 800 m and corners 12.5 m apart.
+    arc = np.stack([400.0 + 800.0 * np.sin(angles), 800.0 * (1.0 - np.cos(angles)), np.zeros(65)], axis=1)
+    step = make_step(route_position=600.0)
+    route = np.vstack([[[0.0, 0.0, 0.0]], arc])
+
+    def at(x: float, y: float, heading: float) -> object:
+        state = replace(step.traffic, position=np.array([[0.0, 0.0, 0.0], [x, y, 0.0]]), heading=np.array([0, heading]))
+        return read("ego.curvature", replace(step, traffic=state, truth=replace(step.truth, route=route)))
+
+    assert at(200.0, 0.0, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert at(10.0, 0.0, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert at(*arc[40, :2], angles[40]) == pytest.approx(1.0 / 800.0, rel=1e-3)
+    # Between corners a road of straight pieces lies up to 2.4 cm inside the circle.
+    assert at(*arc[40:42, :2].mean(axis=0), angles[40]) == pytest.approx(1.0 / 800.0, rel=0.01)
+    assert at(*arc[-1, :2], 1.0) == pytest.approx(1.0 / 800.0, rel=1e-3)
+    assert read("ego.curvature", replace(step, truth=replace(step.truth, route=route[:1]))) is None
+    assert Watch(parse_condition("ego.curvature < 1 km^-1")).update(placed(step, (0.0, 0.0), (100.0, 0.0))) is True
+
+
+def test_traffic_density_counts_the_ego_s_direction_within_250_m() -> None:
+    step = make_step()
+    # 100 m ahead, 240 m behind, beyond, and one that comes towards it; the ego is last.
+    x = [100.0, -240.0, 300.0, 50.0, 0.0]
+    state = vehicles(x, ids=("a", "b", "c", "d", "ego"), heading=[0.0, 0.0, 0.0, math.pi, 0.0])
+    step = replace(step, traffic=state, ego=4)
+    assert read("ego.traffic_density", step) == pytest.approx(2.0 / 500.0)
+    assert read("ego.traffic_density", replace(step, reading_radius=150.0)) == pytest.approx(1.0 / 300.0)
+    assert Watch(parse_condition("ego.traffic_density > 3.9 veh/km")).update(step) is True
+    assert read("ego.has_leader", replace(step, leader=None)) is False
+    assert read("ego.has_leader", replace(step, leader=Leader("a", 100.0, 20.0))) is True

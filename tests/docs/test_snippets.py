@@ -43,6 +43,8 @@ PARSED_ONLY = ("reproduce", "recover", "compile", "calibrate")
 """Commands that take minutes, that need a run that was killed (tests/faults has some), or that `make test` has run."""
 TRAINS = "stable_baselines3"
 """What takes a quarter of an hour and an extra: examples/train_ppo.py is that, tried by hand."""
+SERVES = "serve_forever"
+"""What runs until it is ended; tests/advice/test_osi_controller.py starts it."""
 TRUTH = "sut.advice={method: stopping_sight_distance, informed_by: truth}"
 BLIND = ("--set", "renderer=none", "--set", "estimators=[]", "--set", TRUTH, "--case", "visibility=200 m,run=0")
 SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.5")
@@ -85,6 +87,11 @@ def is_quick(line: list[str]) -> bool:
     return line[1] not in PARSED_ONLY and not of_shipped
 
 
+def is_run(block: str) -> bool:
+    """Whether a block of Python is run here."""
+    return TRAINS not in block and SERVES not in block
+
+
 def shortened(line: list[str]) -> list[str]:
     """A command line that takes less time: what the page itself sets comes later and counts."""
     name, rest = line[1], line[2:]
@@ -108,7 +115,7 @@ def test_what_is_printed_runs(
     for page, text in TEXTS.items():
         lines = [shlex.split(line, comments=True) for line in LINES[page]]
         quick: list[str | list[str]] = [shortened(line) for line in lines if is_quick(line)]
-        quick += [block.replace("8813", str(listening)) for block in PYTHON[page] if TRAINS not in block]
+        quick += [block.replace("8813", str(listening)) for block in PYTHON[page] if is_run(block)]
         folder = str(readers_folder(text)) if quick else ""
         items += [(page, folder, item) for item in quick]
     done = python(RUNNER, json.dumps(items), str(early_motorway))

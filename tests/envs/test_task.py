@@ -14,13 +14,14 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation
 
 import fogsim_envs
+from fogsim.advice.agent import AGENT_STATE, agent_state, clipped, scaled_visibility
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.observation import STATE_FEATURES, scaled_visibility, task_observation, task_space, task_state
+from fogsim_envs.task.observation import STATE_FEATURES, task_observation, task_space, task_state
 from fogsim_envs.task.rewards import Way, fault, task_terms
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
@@ -349,6 +350,8 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     assert told["ambient_light"] == pytest.approx(math.log10(_illuminance(step)) / 3.0 - 2.0 / 3.0, abs=1e-6)
     sensorless = dataclasses.replace(step, observation=dataclasses.replace(step.observation, light=None))
     assert task_state(sensorless, Command(), 100.0, 500.0)[-1] == 1.0
+    known = [STATE_FEATURES.index(name) for name in AGENT_STATE]
+    np.testing.assert_array_equal(mine[known], clipped(agent_state(step.observation, step.belief)))
     assert [scaled_visibility(one) for one in (0.0, 10.0, 100.0, 1000.0, math.inf)] == [-1.0, -1.0, 0.0, 1.0, 1.0]
 
 

@@ -6,6 +6,8 @@ import enum
 import pickle
 import subprocess
 import sys
+import zlib
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,9 +15,11 @@ import grimp
 import numpy as np
 import pytest
 from early_motorway import EARLY
-from tiny_network import write_network
+from osi3.osi_motionrequest_pb2 import MotionRequest
+from tiny_network import write_network, write_policy
 
 import fogsim
+from fogsim.advice.agent import AGENT_STATE
 from fogsim.estimators import ESTIMATORS
 from fogsim.values import (
     Camera,
@@ -33,6 +37,7 @@ from fogsim.values import (
     TrafficState,
     Truth,
 )
+from tests.helpers.osi_peer import framed, osi_peer
 
 HONEST = ("fogsim.estimators", "fogsim.vision", "fogsim.advice")
 """What estimators, advisers and controllers are made of."""
@@ -54,12 +59,12 @@ def methods(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return sorted([*ESTIMATORS, *guests])
 
 
-def drive(methods: list[str]) -> list[Step]:
+def drive(methods: list[str], controller: str = "cruise_control") -> list[Step]:
     """A few frames in traffic with the methods."""
     written = ", ".join(f"{{method: '{name}'}}" for name in methods)
     size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
     sensors = "sensors.scatterometer={}", "sensors.reports.roadside={camera: {}, every_m: 500, period_s: 1, delay_s: 0}"
-    methods_under_test = f"estimators=[{written}]", "controller=cruise_control"
+    methods_under_test = f"estimators=[{written}]", f"controller={controller}"
     scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, *methods_under_test])
     return list(fogsim.run(scenario, seed=1))
 
@@ -105,13 +110,9 @@ def test_deleting_the_truth_changes_nothing(
     check_same(as_it_is, blind)
 
 
-def test_a_false_truth_changes_nothing(
-    as_it_is: list[Step], methods: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured.
-
-    Reports of roadside cameras stay the same too.
-    """
+@pytest.fixture
+def false_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured."""
     from fogsim.sensors import measure_lead
     from fogsim.simulation.ego.fog_reports import FogReports
     from fogsim.simulation.ego.view_rendering import ViewRenderer
@@ -146,10 +147,40 @@ def test_a_false_truth_changes_nothing(
     monkeypatch.setattr(FogReports, "heard", hear_in_another_fog)
     monkeypatch.setattr("fogsim.simulation.ego.measurements.measure_lead", measure_another)
     monkeypatch.setattr(ViewRenderer, "render", render_falsely)
+
+
+@pytest.mark.usefixtures("false_world")
+def test_a_false_truth_changes_nothing(as_it_is: list[Step], methods: list[str]) -> None:
+    """Reports of roadside cameras stay the same too."""
     misled = drive(methods)
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility
     assert not np.array_equal(misled[3].view.distance, as_it_is[3].view.distance)
     check_same(as_it_is, misled)
+
+
+@pytest.fixture
+def controllers(tmp_path: Path) -> Iterator[list[str]]:
+    """Controllers from elsewhere, whose request changes with every value that they are given."""
+
+    def answer(content: bytes) -> list[bytes]:
+        request = MotionRequest()
+        request.desired_state.acceleration.x = -zlib.crc32(content) / 2**32
+        return [framed(request.SerializeToString())]
+
+    with osi_peer(answer) as port:
+        found = [f"{{method: osi, parameters: {{port: {port}, timeout: 60, frames: true}}, delay: 0 s}}"]
+        if find_spec("onnx") and find_spec("onnxruntime"):
+            policy = write_policy(tmp_path / "policy.onnx", np.linspace(0.05, 0.1, len(AGENT_STATE))[:, None])
+            found.append(f"{{method: 'onnx:{policy}', delay: 0 s}}")
+        yield found
+
+
+def test_controllers_from_elsewhere_get_no_truth(controllers: list[str], request: pytest.FixtureRequest) -> None:
+    honest = [drive(["negru2013"], one) for one in controllers]
+    request.getfixturevalue("false_world")
+    for one, steps in zip(controllers, honest, strict=True):
+        check_same(steps, drive(["negru2013"], one))
+        assert len({step.command.control for step in steps}) > len(steps) // 2
 
 
 ALLOWED = (

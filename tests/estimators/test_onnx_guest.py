@@ -248,7 +248,7 @@ def multiplying(side: int, times: int):
 
 
 def test_a_model_that_does_not_answer_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fogsim.estimators.learned.onnx_model.LONGEST_TRIAL", 0.2)
+    monkeypatch.setattr("fogsim.core.onnx_network.LONGEST_TRIAL", 0.2)
     with pytest.raises(InputError, match=r"the model fails on a grey frame \(after 0.2 s\)"):
         make(f"onnx:{write_network(tmp_path / 'n.onnx', change=multiplying(1000, 1000))}", CAMERA)
 

@@ -18,6 +18,7 @@ OPTIONAL = {
     "minari": ("rl", "minari"),
     "onnx": ("onnx", "onnx"),
     "onnxruntime": ("onnx", "onnxruntime"),
+    "openodd": ("odd", "openodd-py"),
     "osi3": ("osi", "osi-python"),
     "pettingzoo": ("rl", "pettingzoo"),
     "ray": ("ray", "ray"),

@@ -4,14 +4,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from fogsim.advice.agent import pedal_acceleration
 from fogsim.values import Command, EgoControl
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 
 _ACCELERATIONS = (-8.0, -4.0, -2.0, 0.0, 1.0, 2.0)
 """Acceleration of each level [m/s²]: an emergency, hard and gentle braking, none, and a car's usual ones."""
-
-_HARDEST_BRAKING, _LARGEST_ACCELERATION = 8.0, 2.5
-"""What −1 and 1 of a continuous action stand for [m/s²]; 0 is 0, and between them it is proportional."""
 
 _LANE_CHANGES = (-1, 0, 1)
 """Lanes to the left of each choice."""
@@ -45,7 +43,7 @@ class FogDriveEnv(FogAdvisoryV1Env):
     def _commanded(self, action: NDArray[Any]) -> Command:
         if self._continuous:
             pedal, wheel = action.tolist()
-            acceleration = pedal * (_LARGEST_ACCELERATION if pedal > 0.0 else _HARDEST_BRAKING)
+            acceleration = pedal_acceleration(pedal)
             lanes = _LANE_CHANGES[min(int((wheel + 1.0) / 2.0 * len(_LANE_CHANGES)), len(_LANE_CHANGES) - 1)]
         else:
             level, choice = action.tolist()

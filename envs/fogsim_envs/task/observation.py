@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.advice.agent import SPEED_SCALE, agent_state, clipped, scaled_visibility
 from fogsim.errors import UnknownNameError
 from fogsim.values import Camera, Command, Lamp, Step
 from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs
@@ -15,12 +16,8 @@ from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, obs
 _OBSERVATIONS = ("dict", "state", "camera", "camera+sign_map", "dict+sign_map")
 """What can be asked for: all of it, the numbers alone, or the picture alone; these with the picture of the sign map."""
 
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Quantiles of the believed visibility in an agent's observation."""
-
-_SPEED, LEAD, _WAY, TIME, _VISIBILITY = 25.0, 100.0, 2500.0, 300.0, 100.0
-"""What is 0 in ``state``: speed [m/s], lead's distance [m], way [m], time [s], visibility [m]. Nothing is −1, twice
-that 1; of visibilities a tenth is −1 and tenfold 1. So what matters in fog fills the range, as networks wish."""
+_WAY, TIME = 2500.0, 300.0
+"""What is 0 in ``state``: way [m] and time [s]. Nothing is −1, twice that 1."""
 
 STATE_FEATURES = (
     "speed",
@@ -49,8 +46,6 @@ STATE_FEATURES = (
 """Meaning of the entries of ``state``; the environment's docstring gives their scales."""
 
 _LANE_SCALE = 5.0
-_LIGHT_RANGE = (-1.0, 5.0)
-"""log10 of the illuminance [lx] that is −1 and 1 in ``state``: a moonlit night and the brightest overcast day."""
 
 
 def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
@@ -91,28 +86,24 @@ def task_observation(step: Step, mode: str, own: Command, duration: float, way_e
 
 def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:
     """Entries of ``state`` (`STATE_FEATURES`), float32 in −1 … 1 (`time_left` [s], `to_go` [m])."""
-    lead, belief, advice = step.observation.lead, step.belief, own.advice.speed
+    known, advice = agent_state(step.observation, step.belief), own.advice.speed
     lane, lanes = _lane(step)
     values = (
-        step.observation.speed / _SPEED - 1.0,
-        step.speed_limit / _SPEED - 1.0,
+        known[0],
+        step.speed_limit / SPEED_SCALE - 1.0,
         to_go / _WAY - 1.0,
         time_left / TIME - 1.0,
         lane / _LANE_SCALE,
         lanes / _LANE_SCALE,
-        float(lead is not None),
-        lead.distance / LEAD - 1.0 if lead else 1.0,
-        lead.relative_speed / _SPEED if lead else 0.0,
+        *known[1:4],
         *_estimate(step),
-        *map(scaled_visibility, belief.visibility_quantiles(_QUANTILES)),
-        belief.log_standard_deviation,
-        advice / _SPEED - 1.0 if math.isfinite(advice) else 1.0,
+        *known[4:10],
+        advice / SPEED_SCALE - 1.0 if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in own.lamps),
         float(Lamp.REAR_FOG in own.lamps),
-        _ambient_light(step),
+        known[10],
     )
-    state = np.array(values, dtype=np.float32)
-    return np.minimum(np.maximum(state, -1.0, out=state), 1.0, out=state)
+    return clipped(values)
 
 
 def _estimate(step: Step) -> tuple[float, float, float]:
@@ -121,19 +112,6 @@ def _estimate(step: Step) -> tuple[float, float, float]:
     estimate = step.estimates[0]
     deviation = estimate.standard_deviation / estimate.extinction if estimate.extinction > 0.0 else 1.0
     return 1.0, scaled_visibility(estimate.visibility), deviation
-
-
-def _ambient_light(step: Step) -> float:
-    """Reading of the light sensor, on a logarithmic scale: bright day without one."""
-    light, (darkest, brightest) = step.observation.light, _LIGHT_RANGE
-    if light is None:
-        return 1.0
-    return 2.0 * (math.log10(max(light.illuminance, 1e-9)) - darkest) / (brightest - darkest) - 1.0
-
-
-def scaled_visibility(visibility: float) -> float:
-    """Visibility on a logarithmic scale: −1 for 10 m or less, 0 for 100 m, 1 for 1 km or more (`visibility` [m])."""
-    return min(max(math.log10(max(visibility, 1e-9) / _VISIBILITY), -1.0), 1.0) if math.isfinite(visibility) else 1.0
 
 
 def _lane(step: Step) -> tuple[int, int]:

@@ -34,7 +34,7 @@ from fogsim.atmosphere.lamps.veil import (
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, View
-from fogsim.values.pinhole import camera_axes, ray_from_pixel
+from fogsim.values.pinhole import OWN_FRAME, camera_axes, ray_from_pixel
 
 _ONE, _HALF, _THIRD = np.float32(1.0), np.float32(0.5), np.float32(1.0 / 3.0)
 _ZERO = np.float32(0.0)
@@ -305,7 +305,6 @@ def add_own_light(
         _add_lamplight(channels, veiled, shone, response[v] if lit else no_response, out[v])
 
 
-_AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
 _MIRROR = np.diag((1.0, -1.0, 1.0))
 """Tables of beams count to the right, the vehicle's axes to the left."""
 
@@ -392,7 +391,7 @@ class OwnLamplight:
 @lru_cache(_REMEMBERED)
 def _rays(camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
     """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
-    ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, _AT_REST))
+    ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, OWN_FRAME))
     return veil_rays(camera), ray_map.astype(np.float32)
 
 
@@ -422,7 +421,7 @@ def _extinction_on(
         everywhere = np.full((1, 1), fog.extinction, np.float32)
         return everywhere, everywhere
     distances = node_distances()
-    to_world = matrix_product(camera_axes(camera, pose).T, camera_axes(camera, _AT_REST))
+    to_world = matrix_product(camera_axes(camera, pose).T, camera_axes(camera, OWN_FRAME))
     shape = (len(rays.directions), len(distances))
     extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
     directions = np.ascontiguousarray(matrix_product(rays.directions.astype(np.float64), to_world.T))

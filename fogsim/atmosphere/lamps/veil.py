@@ -22,8 +22,8 @@ from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_S
 from fogsim.atmosphere.lamps.phase_function import Droplets, blurred, phase_function
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.values import Camera, CameraPose
-from fogsim.values.pinhole import camera_axes
+from fogsim.values import Camera
+from fogsim.values.pinhole import OWN_FRAME, camera_axes
 
 _PIECES = 4
 """Pieces of a ray between two of its nodes."""
@@ -213,7 +213,7 @@ def veil_rays(camera: Camera) -> VeilRays:
     right = (np.linspace(0, camera.width - 1, CELLS + 1) - u0) / camera.focal_length
     down = (np.linspace(0, camera.height - 1, rows) - v0) / camera.focal_length
     plane = np.stack(np.broadcast_arrays(right, down[:, None], np.ones((1, 1))), axis=-1).reshape(-1, 3)
-    rays = matrix_product(plane, camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0)))
+    rays = matrix_product(plane, camera_axes(camera, OWN_FRAME))
     at, length = ray_pieces()
     directions = rays / np.linalg.norm(rays, axis=1)[:, None]
     return VeilRays((rows, CELLS + 1), np.ascontiguousarray(directions, dtype=np.float32), at, length)

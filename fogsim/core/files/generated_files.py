@@ -20,16 +20,17 @@ def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
     try:
         if folder.is_file():
             folder.unlink()
-        for name, text in texts.items():
-            if not _holds(folder / name, text.encode()):
-                replace_file(folder / name, text.encode())
+        missing = {name: text for name, text in texts.items() if not _holds(folder / name, text.encode())}
+        for name, text in missing.items():
+            replace_file(folder / name, text.encode())
         os.utime(folder)
     except OSError as error:
         raise InputError(
             f"the files of a road cannot be written into {folder}: {error.strerror}; name another folder "
             f"in the environment variable {VARIABLE}"
         ) from error
-    keep_newest(folder.parent, _MOST_KEPT)
+    if missing:
+        keep_newest(folder.parent, _MOST_KEPT)
     return folder
 
 

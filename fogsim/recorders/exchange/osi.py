@@ -1,6 +1,5 @@
-"""What a run was as a trace of ASAM OSI's ground truth; the only file that knows its library."""
+"""What a run was as a trace of ASAM OSI's ground truth."""
 
-import struct
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -8,7 +7,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from fogsim.errors import MissingDependencyError
+from fogsim.core.files.osi_messages import framed, osi_library, stamp
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Lamp, SignalColour, Step, TrafficState, TrafficStep
 from fogsim.values.traffic import BOX, PEDESTRIAN
@@ -43,8 +42,6 @@ _COLOURS: Mapping[SignalColour, tuple[str, ...]] = MappingProxyType(
 _PERSON = (0.5, 0.5, 1.75)
 """Length, width and height of a person [m]."""
 
-_NANOSECONDS = 1_000_000_000
-
 
 class OsiRecorder:
     """Writes ``ground_truth.osi``: a GroundTruth message for each camera period, each after its length (4 bytes).
@@ -68,8 +65,7 @@ class OsiRecorder:
         if self._file is None:
             # The folder is there from the first step on.
             self._file = self._path.open("wb")
-        message = self._message(step).SerializeToString(deterministic=True)
-        self._file.write(struct.pack("<L", len(message)) + message)
+        self._file.write(framed(self._message(step)))
 
     def close(self, complete: bool) -> None:  # noqa: ARG002 - a trace that was cut short is one all the same
         """Finish the file; closing twice does nothing."""
@@ -79,9 +75,7 @@ class OsiRecorder:
 
     def _message(self, step: TrafficStep) -> Any:
         message, traffic = self._new_message(), step.traffic
-        message.version.version_major, message.version.version_minor, message.version.version_patch = 3, 8, 0
-        total = round(step.time * _NANOSECONDS)
-        message.timestamp.seconds, message.timestamp.nanos = divmod(total, _NANOSECONDS)
+        stamp(message, step.time)
         if isinstance(step, Step):
             message.host_vehicle_id.value = self._number(f"vehicle {traffic.ids[step.ego]}")
         for row in range(len(traffic.ids)):
@@ -194,21 +188,12 @@ def _set_vector(vector: Any, values: Any) -> None:
 
 def _library() -> tuple[Any, dict[str, Any]]:
     """The message's class, and the enumerations that are used of the package."""
-    try:
-        from osi3 import (  # noqa: PLC0415 - an extra
-            osi_environment_pb2,
-            osi_groundtruth_pb2,
-            osi_object_pb2,
-            osi_trafficlight_pb2,
-            osi_trafficsign_pb2,
-        )
-    except ImportError as error:
-        raise MissingDependencyError(f"an OSI trace needs osi-python ({error}): pip install 'fogsim[osi]'") from error
-    vehicle = osi_object_pb2.MovingObject.VehicleClassification
-    light = osi_trafficlight_pb2.TrafficLight.Classification
-    return osi_groundtruth_pb2.GroundTruth, {
-        "fog": osi_environment_pb2.EnvironmentalConditions.Fog,
-        "object": osi_object_pb2.MovingObject.Type,
+    osi = osi_library("an OSI trace")
+    vehicle = osi.osi_object_pb2.MovingObject.VehicleClassification
+    light = osi.osi_trafficlight_pb2.TrafficLight.Classification
+    return osi.osi_groundtruth_pb2.GroundTruth, {
+        "fog": osi.osi_environment_pb2.EnvironmentalConditions.Fog,
+        "object": osi.osi_object_pb2.MovingObject.Type,
         "vehicle": vehicle.Type,
         "lamp": vehicle.LightState.GenericLightState,
         "indicator": vehicle.LightState.IndicatorState,
@@ -216,6 +201,6 @@ def _library() -> tuple[Any, dict[str, Any]]:
         "colour": light.Color,
         "icon": light.Icon,
         "mode": light.Mode,
-        "sign": osi_trafficsign_pb2.TrafficSign.MainSign.Classification.Type,
-        "unit": osi_trafficsign_pb2.TrafficSignValue.Unit,
+        "sign": osi.osi_trafficsign_pb2.TrafficSign.MainSign.Classification.Type,
+        "unit": osi.osi_trafficsign_pb2.TrafficSignValue.Unit,
     }

@@ -75,6 +75,15 @@ Times = Annotated[Whole, Field(ge=1, le=1_000_000), BeforeValidator(_number_of_t
 """A number of times, perhaps written ``3 times``."""
 
 
+RequirementId = Annotated[str, Field(pattern=r"^\S(.*\S)?$", max_length=100)]
+"""Id of a requirement, such as ``SYS-REQ-042``."""
+
+
+def _listed(value: object) -> object:
+    """Accept a single id for a list of one."""
+    return [value] if isinstance(value, str) else value
+
+
 class Expectation(Section):
     """What is expected of a run: one clause or several."""
 
@@ -115,6 +124,9 @@ class Expectation(Section):
 
     metric: Annotated[str, Field(max_length=200)] | None = None
     """A key of metrics.json with what it must be: `minimum_gap_m >= 5`."""
+
+    requirement: Annotated[tuple[RequirementId, ...], BeforeValidator(_listed)] = ()
+    """Ids of the requirements that it verifies, one or a list; properties of its test cases in JUnit XML."""
 
     @model_validator(mode="before")
     @classmethod

@@ -89,6 +89,7 @@ def controller_config(scenario: ScenarioFile) -> ControllerConfig | None:
         written.lag_s,
         written.braking_mps2,
         written.accelerating_mps2,
+        1 if written.period_s is None else round(written.period_s / scenario.clocks.camera_period_s),
     )
 
 

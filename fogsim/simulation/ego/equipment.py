@@ -285,6 +285,7 @@ class EgoEquipment:
             self._way,
             tuple(one.fault for one in faults),
             snapshot.route_position,
+            light,
         )
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))

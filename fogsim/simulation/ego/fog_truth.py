@@ -49,8 +49,12 @@ def fog_truth(
     way: KnownWay | None = None,
     faults: tuple[Fault, ...] = (),
     place: float | None = None,
+    illuminance: float | None = None,
 ) -> Truth:
-    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it (`place` [m])."""
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
+
+    Takes `place` [m] and `illuminance` [lx].
+    """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
@@ -68,6 +72,7 @@ def fog_truth(
         faults=faults,
         vehicle_extinctions=drivers,
         profile=None if way is None or place is None else _way_profile(fog, way, place),
+        illuminance=illuminance,
     )
 
 

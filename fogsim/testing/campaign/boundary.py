@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
+
+from fogsim.core.linear_algebra import cholesky_factor, matrix_product, solved_lower, solved_upper
 
 Points = NDArray[np.float64]
 """(n, d) places in the space, each coordinate 0 … 1 over the range of its parameter (in logarithms where declared)."""
@@ -47,9 +48,9 @@ class Boundary:
     def latent(self, places: Points) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Mean and standard deviation of the latent function at places, (m,) each."""
         cross = _kernel(self.parameters, self.points, places)
-        reduced = solve_triangular(self.factor, self.root[:, None] * cross, lower=True)
+        reduced = solved_lower(self.factor, self.root[:, None] * cross)
         variance = np.exp(2.0 * self.parameters[0]) - (reduced**2).sum(axis=0)
-        return cross.T @ self.gradient, np.sqrt(np.maximum(variance, 0.0))
+        return matrix_product(cross.T, self.gradient), np.sqrt(np.maximum(variance, 0.0))
 
     def failure(self, places: Points) -> NDArray[np.float64]:
         """Probability of failure at places (m,)."""
@@ -62,8 +63,8 @@ class Boundary:
         best = np.argsort(np.abs(mean) / np.maximum(deviation, _ENOUGH), kind="stable")[: max(200, 10 * number)]
         mean = mean[best]
         cross = _kernel(self.parameters, self.points, candidates[best])
-        reduced = solve_triangular(self.factor, self.root[:, None] * cross, lower=True)
-        covariance = _kernel(self.parameters, candidates[best], candidates[best]) - reduced.T @ reduced
+        reduced = solved_lower(self.factor, self.root[:, None] * cross)
+        covariance = _kernel(self.parameters, candidates[best], candidates[best]) - matrix_product(reduced.T, reduced)
         chosen: list[int] = []
         for _ in range(number):
             doubt = -np.abs(mean) / np.sqrt(np.maximum(covariance.diagonal(), _ENOUGH))
@@ -76,12 +77,12 @@ class Boundary:
         return best[chosen]
 
 
-def fit_boundary(points: Points, failed: NDArray[np.bool_]) -> Boundary:
-    """Fit a classifier to runs; both outcomes must be among them."""
+def fit_boundary(points: Points, failed: NDArray[np.bool_], near: Boundary | None = None) -> Boundary:
+    """Fit a classifier to runs with both outcomes, beginning at the scales of a fit to fewer runs if there is one."""
     signs = np.where(failed, -1.0, 1.0)
     width = points.shape[1]
     bounds = [(np.log(_LEAST_SCALE), np.log(_GREATEST_SCALE))] + [(np.log(_SHORTEST), np.log(_LONGEST))] * width
-    starts = [np.log([scale] + [length] * width) for scale, length in _STARTS]
+    starts = [np.log([scale] + [length] * width) for scale, length in _STARTS] if near is None else [near.parameters]
     fits = [minimize(_loss, start, (points, signs), jac=True, bounds=bounds, method="L-BFGS-B") for start in starts]
     parameters = min(fits, key=lambda one: float(one.fun)).x
     _, gradient, root, factor, _ = _mode(_kernel(parameters, points, points), signs)
@@ -91,7 +92,7 @@ def fit_boundary(points: Points, failed: NDArray[np.bool_]) -> Boundary:
 def _kernel(parameters: NDArray[np.float64], left: Points, right: Points) -> NDArray[np.float64]:
     scale, lengths = np.exp(parameters[0]), np.exp(parameters[1:])
     a, b = left / lengths, right / lengths
-    squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
+    squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * matrix_product(a, b.T)
     return np.asarray(scale**2 * np.exp(-0.5 * np.maximum(squared, 0.0)))
 
 
@@ -103,15 +104,15 @@ def _mode(
     for _ in range(_ITERATIONS):
         gradient, weight = _slopes(latent, signs)
         root = np.sqrt(weight)
-        factor = cholesky(np.eye(len(signs)) + root[:, None] * kernel * root, lower=True)
+        factor = cholesky_factor(np.eye(len(signs)) + root[:, None] * kernel * root)
         inner = weight * latent + gradient
-        new = inner - root * cho_solve((factor, True), root * (kernel @ inner))
+        new = inner - root * _solved(factor, (root * matrix_product(kernel, inner))[:, None])[:, 0]
         # A full step may overshoot.
         step = 1.0
         while True:
             trial = coefficients + step * (new - coefficients)
-            moved = kernel @ trial
-            value = float(-0.5 * trial @ moved + log_ndtr(signs * moved).sum())
+            moved = matrix_product(kernel, trial)
+            value = float(-0.5 * matrix_product(trial, moved) + log_ndtr(signs * moved).sum())
             if value >= objective or step < 1e-3:
                 break
             step *= 0.5
@@ -120,8 +121,13 @@ def _mode(
             break
     gradient, weight = _slopes(latent, signs)
     root = np.sqrt(weight)
-    factor = cholesky(np.eye(len(signs)) + root[:, None] * kernel * root, lower=True)
+    factor = cholesky_factor(np.eye(len(signs)) + root[:, None] * kernel * root)
     return latent, gradient, root, factor, objective - float(np.log(factor.diagonal()).sum())
+
+
+def _solved(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solution of L·Lᵀ·X = `right` (n, m)."""
+    return solved_upper(factor, solved_lower(factor, np.ascontiguousarray(right)))
 
 
 def _slopes(latent: NDArray[np.float64], signs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -140,8 +146,8 @@ def _loss(
     z = signs * latent
     ratio = signs * gradient
     third = signs * ratio * ((z + ratio) * (z + 2.0 * ratio) - 1.0)
-    inverse = root[:, None] * cho_solve((factor, True), np.diag(root))
-    reduced = solve_triangular(factor, root[:, None] * kernel, lower=True)
+    inverse = root[:, None] * _solved(factor, np.diag(root))
+    reduced = solved_lower(factor, root[:, None] * kernel)
     s2 = 0.5 * (kernel.diagonal() - (reduced**2).sum(axis=0)) * third
     slopes = []
     for number in range(len(parameters)):
@@ -150,8 +156,10 @@ def _loss(
         else:
             lag = (points[:, None, number - 1] - points[:, number - 1]) / np.exp(parameters[number])
             change = kernel * lag**2
-        s1 = 0.5 * float(gradient @ change @ gradient) - 0.5 * float((inverse * change).sum())
-        b = change @ gradient
-        s3 = b - kernel @ (inverse @ b)
-        slopes.append(-(s1 + float(s2 @ s3)))
+        s1 = 0.5 * float(matrix_product(gradient, matrix_product(change, gradient))) - 0.5 * float(
+            (inverse * change).sum()
+        )
+        b = matrix_product(change, gradient)
+        s3 = b - matrix_product(kernel, matrix_product(inverse, b))
+        slopes.append(-(s1 + float(matrix_product(s2, s3))))
     return -likelihood, np.array(slopes)

@@ -113,7 +113,7 @@ def batches(
     yield from _fill(space, seed, budget, sequencing, found)
     for_boundary = budget if budget < 2 * _LEAST_FOR_RATE else min(_MOST_FOR_BOUNDARY, budget // 2)
     yield from _search_boundary(space, seed, for_boundary, found)
-    found.boundary = _fitted(space, found.results)
+    found.boundary = fitted(space, found.results)
     yield from _search_rate(space, seed, budget - len(found.drawn), found)
 
 
@@ -123,7 +123,11 @@ _Batches = Generator[list[Drawn], list[CaseResult], None]
 def _run(
     purpose: Purpose, values: Sequence[dict[str, Value]], found: Findings
 ) -> Generator[list[Drawn], list[CaseResult], list[CaseResult]]:
-    drawn = [Drawn(purpose, one) for one in values]
+    return (yield from run_batch([Drawn(purpose, one) for one in values], found))
+
+
+def run_batch(drawn: list[Drawn], found: Findings) -> Generator[list[Drawn], list[CaseResult], list[CaseResult]]:
+    """One batch of cases: it is sent their results, and `found` gets both."""
     results = yield drawn
     found.drawn += drawn
     found.results += results
@@ -141,21 +145,22 @@ def _fill(space: Space, seed: int, budget: int, sequencing: Sequencing, found: F
 
 
 def _search_boundary(space: Space, seed: int, until: int, found: Findings) -> _Batches:
+    boundary = None
     while len(found.drawn) < until:
         generator = named_generator(seed, f"boundary {len(found.drawn)}")
         candidates = qmc.Sobol(len(space.axes), rng=generator).random_base2(int(np.log2(_CANDIDATES)))
         number = min(_BATCH, until - len(found.drawn))
-        boundary = _fitted(space, found.results)
+        boundary = fitted(space, found.results, boundary)
         # While all cases have one outcome, others may be anywhere.
         chosen = candidates[:number] if boundary is None else candidates[boundary.choose(candidates, number)]
         yield from _run(Purpose.BOUNDARY, space.by_places(chosen), found)
 
 
-def _fitted(space: Space, results: Sequence[CaseResult]) -> Boundary | None:
+def fitted(space: Space, results: Sequence[CaseResult], near: Boundary | None = None) -> Boundary | None:
     """Boundary of cases with both outcomes; cases that are inconclusive or went wrong do not count."""
     decided = [one for one in results if is_decided(one)]
     failed = np.array([one.has_failed for one in decided])
-    return fit_boundary(space.places(decided), failed) if failed.any() and not failed.all() else None
+    return fit_boundary(space.places(decided), failed, near) if failed.any() and not failed.all() else None
 
 
 def is_decided(result: CaseResult) -> bool:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
+from fogsim.core.linear_algebra import cholesky_factor, matrix_product, solved_lower
+
 _DECLARED_SHARE = 0.1
 """Share of the draws of a proposal that comes from the declared distributions [-]."""
 
@@ -46,7 +48,7 @@ class Proposal:
 
     def log_weights(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Logarithm of the declared density over that of the proposal (n,)."""
-        centred = np.linalg.solve(self.factor, (places - self.mean).T)
+        centred = solved_lower(self.factor, np.ascontiguousarray((places - self.mean).T))
         own = -0.5 * (centred**2).sum(axis=0) - float(np.log(self.factor.diagonal()).sum())
         declared = -0.5 * (places**2).sum(axis=1)
         mixed = np.logaddexp(math.log(1.0 - _DECLARED_SHARE) + own, math.log(_DECLARED_SHARE) + declared)
@@ -70,10 +72,10 @@ def next_proposal(proposal: Proposal, places: NDArray[np.float64], margins: NDAr
     # Weights of failure relative to those of the smoothed limit: once they vary little, the limit is reached.
     is_final = bool(failed.any()) and _variation(ratio) <= _TARGET
     share = np.exp(chosen - logsumexp(chosen))
-    mean = share @ places
+    mean = (share[:, None] * places).sum(axis=0)
     spread = (places - mean) * np.sqrt(share)[:, None]
-    covariance = spread.T @ spread * _WIDENING**2 + 1e-6 * np.eye(len(mean))
-    return Proposal(mean, np.linalg.cholesky(covariance), is_final)
+    covariance = matrix_product(spread.T, spread) * _WIDENING**2 + 1e-6 * np.eye(len(mean))
+    return Proposal(mean, cholesky_factor(covariance), is_final)
 
 
 def _variation(log_values: NDArray[np.float64]) -> float:

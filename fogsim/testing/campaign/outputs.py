@@ -18,12 +18,14 @@ from fogsim.scenario.variation import Draws
 from fogsim.study.drawing import INK, dress, svg_of
 from fogsim.study.table import write_csv
 from fogsim.testing.campaign.boundary import BAND, Boundary
+from fogsim.testing.campaign.comparison import changes, changes_text, first_columns
 from fogsim.testing.campaign.drawing_plan import Findings, Purpose, Space, margin_of, number_of, verdict_of
 from fogsim.testing.campaign.running import Campaign, as_test
 from fogsim.testing.collection import FogTest
-from fogsim.testing.junit import xml_text
+from fogsim.testing.junit import add_requirements, xml_text
 from fogsim.testing.page import command_text, finding_text
 from fogsim.testing.results import CaseResult
+from fogsim.testing.shrinking import SmallestCase, smallest_text
 
 _METRICS = {
     "min_ttc_s": "minimum_time_to_collision_s",
@@ -42,22 +44,22 @@ _MARKS = {"passed": ("#1f7a4d", "o"), "failed": ("#a31f1a", "X"), "inconclusive"
 
 def write_cases(path: Path, campaign: Campaign, found: Findings) -> None:
     """Write a row for each case, in the order of the draws."""
-    axes = campaign.space.axes
-    names = [f"{name} [{axis.unit}]" if axis.unit else name for name, axis in axes.items()]
+    before = ["verdict_before"] if campaign.earlier else []
     rows = [
         [
             number,
             drawn.purpose,
-            *(number_of(one.run.levels[name]) for name in axes),
+            *(number_of(one.run.levels[name]) for name in campaign.space.axes),
             one.run.seed,
             verdict_of(one),
+            *([campaign.earlier[number].verdict] if before else []),
             margin_of(one),
             *(one.metrics.get(metric) for metric in _METRICS.values()),
             one.message,
         ]
         for number, (drawn, one) in enumerate(zip(found.drawn, found.results, strict=True))
     ]
-    write_csv(path, ["case", "purpose", *names, "seed", "verdict", "margin", *_METRICS, "message"], rows)
+    write_csv(path, [*first_columns(campaign.space), *before, "margin", *_METRICS, "message"], rows)
 
 
 def write_campaign_junit(path: Path, campaign: Campaign, found: Findings, settings: Sequence[str]) -> None:
@@ -72,6 +74,7 @@ def write_campaign_junit(path: Path, campaign: Campaign, found: Findings, settin
     for one, verdict in zip(found.results, verdicts, strict=True):
         label, seconds = _label(one), f"{one.duration:.3f}"
         case = ET.SubElement(suite, "testcase", classname=xml_text(str(test.path)), name=xml_text(label), time=seconds)
+        add_requirements(case, one.run.scenario, one.run.scenario.expect)
         if verdict != "passed":
             why = xml_text(_why(one))
             wrong = ET.SubElement(case, "error" if verdict == "error" else "failure", type=verdict, message=why)
@@ -110,7 +113,9 @@ def counts_text(found: Findings) -> str:
     return f"{len(verdicts)} cases: {counted}"
 
 
-def write_report(path: Path, campaign: Campaign, found: Findings, settings: Sequence[str]) -> None:
+def write_report(
+    path: Path, campaign: Campaign, found: Findings, settings: Sequence[str], smallest: SmallestCase | None = None
+) -> None:
     """Write the page: maps, failure rate, and the cases that did not pass with the commands that run them again."""
     test, verdicts = as_test(campaign, found), [verdict_of(one) for one in found.results]
     worst = next((word for word in ("error", "failed", "inconclusive") if word in verdicts), "passed")
@@ -122,8 +127,19 @@ def write_report(path: Path, campaign: Campaign, found: Findings, settings: Sequ
         worst=worst,
         counts=counts_text(found),
         rate=rate_text(found),
+        smallest=None if smallest is None else smallest_text(test, smallest, settings),
+        compared=changes_text(campaign.earlier, found) if campaign.earlier else "",
+        changes=[
+            (one.before, one.after, _label(one.result), _why(one.result), command_text(test, one.result.run, settings))
+            for one in changes(campaign.earlier, found)
+        ]
+        if campaign.earlier
+        else [],
         space=[(name, _distribution(axis)) for name, axis in campaign.space.axes.items()],
-        maps=[(caption, data_url(svg.encode(), "image/svg+xml")) for caption, svg in _maps(campaign, found)],
+        maps=[
+            (caption, data_url(svg_of(figure, caption).encode(), "image/svg+xml"))
+            for caption, figure in maps(campaign, found)
+        ],
         failures=list(_failures(test, found, settings)),
         purposes=[(purpose, sum(one.purpose is purpose for one in found.drawn)) for purpose in Purpose],
     )
@@ -147,8 +163,8 @@ def _failures(test: FogTest, found: Findings, settings: Sequence[str]) -> Iterat
         yield verdict_of(one), _label(one), _why(one), command_text(test, one.run, settings)
 
 
-def _maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, str]]:
-    """Caption and SVG of the map of each pair of parameters, those that matter most first."""
+def maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, Figure]]:
+    """Caption and map of each pair of parameters, at most six, those that matter most first."""
     names = list(campaign.space.axes)
     if found.boundary is not None:
         lengths = found.boundary.parameters[1:]
@@ -158,7 +174,7 @@ def _maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, str]]:
         yield _map(campaign, found, across, upwards)
 
 
-def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tuple[str, str]:
+def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tuple[str, Figure]:
     axes = campaign.space.axes
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     panel = figure.subplots()
@@ -202,7 +218,7 @@ def _map(campaign: Campaign, found: Findings, across: str, upwards: str) -> tupl
     caption = f"{across} and {upwards}" + (f", cut at {cut}; cases off the cut are drawn smaller" if cut else "")
     if found.boundary is not None:
         caption += "; line: as likely to pass as to fail; dashed: from there on one outcome is 95 % certain"
-    return caption, svg_of(figure, f"{across} {upwards}")
+    return caption, figure
 
 
 def _draw_boundary(

@@ -1,20 +1,27 @@
 """Running a campaign: its cases batch by batch with any engine, resumed from the results in its directory."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.core.randomness import named_generator
 from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError
 from fogsim.scenario.loading import SpaceReader, read_space, scenario_file
+from fogsim.scenario.variation import SeedLevels, number_with_unit
 from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
-from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Sequencing, Space, batches
+from fogsim.testing.campaign.comparison import EarlierCase, again, read_earlier
+from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Sequencing, Space, batches, number_of
 from fogsim.testing.collection import FogTest, run_of
+from fogsim.testing.odd.odd_file import OddFile, read_odd
+from fogsim.testing.odd.openodd_library import Coverage
 from fogsim.testing.results import CaseResult, read_result
-from fogsim.testing.session import begin_session
+from fogsim.testing.session import begin_session, results_folder
+from fogsim.testing.shrinking import SmallestCase, Values, case_key, smallest_case
 
 CampaignWatch = Callable[[int, int], None]
 """Called with the numbers of completed and failed cases."""
@@ -36,6 +43,10 @@ class Campaign:
         Number of cases.
     sequencing : str
         How the first cases fill the space: ``"sobol"`` or ``"latin_hypercube"``.
+    earlier : tuple of EarlierCase
+        Cases of an earlier campaign that are run again instead of draws.
+    odd : OddFile or None
+        The ODD whose coverage is collected, if any.
     """
 
     file: Path
@@ -43,6 +54,8 @@ class Campaign:
     seed: int
     budget: int
     sequencing: Sequencing
+    earlier: tuple[EarlierCase, ...] = ()
+    odd: OddFile | None = None
 
     @property
     def space(self) -> Space:
@@ -58,6 +71,8 @@ def load_campaign(
     budget: int = 200,
     seed: int = 0,
     sequencing: Sequencing = "sobol",
+    against: Path | None = None,
+    odd: str | None = None,
     may_import: MayImport = import_anything,
 ) -> Campaign:
     """Read a campaign.
@@ -72,22 +87,33 @@ def load_campaign(
         One case of ``vary``, as comma-separated ``name=value``.
     budget, seed, sequencing
         See `Campaign`.
+    against : Path or None
+        Directory of an earlier campaign, whose cases are run again instead of draws.
+    odd : str or None
+        Name or binding file of the ODD whose coverage is collected.
     may_import : callable
         As in `load_scenario`.
 
     Raises
     ------
     InputError
-        If the file does not fit.
+        If a file does not fit.
+    MissingDependencyError
+        With an ODD, if openodd-py is missing.
     """
     path = scenario_file(file)
     reader = read_space(path, settings, case, may_import)
     _, scenario = reader.load({}, 0)
     if not scenario.expect:
         raise InputError(f"{path}: expect is missing; a campaign needs something that passes or fails")
-    if not Space.of(reader.variation.space).axes:
+    space = Space.of(reader.variation.space)
+    if not space.axes:
         raise InputError(f"{path}: space has no distribution, only seeds")
-    return Campaign(path, reader, seed, budget, sequencing)
+    earlier = () if against is None else read_earlier(against, space)
+    domain = None if odd is None else read_odd(odd)
+    if domain is not None:
+        Coverage(domain)  # refuses what does not fit before the first run
+    return Campaign(path, reader, seed, len(earlier) or budget, sequencing, earlier, domain)
 
 
 def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignWatch = lambda _, __: None) -> Findings:
@@ -111,7 +137,11 @@ def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignW
     """
     folder, found, failed = begin_session(out, resume=True), Findings(), 0
     with WriterLock(out):
-        plan = batches(campaign.space, campaign.seed, campaign.budget, campaign.sequencing, found)
+        plan = (
+            again(campaign.space, campaign.earlier, found)
+            if campaign.earlier
+            else batches(campaign.space, campaign.seed, campaign.budget, campaign.sequencing, found)
+        )
         batch = next(plan)
         while True:
             runs = _runs(campaign, batch, len(found.drawn))
@@ -138,9 +168,49 @@ def _runs(campaign: Campaign, batch: Sequence[Drawn], first: int) -> list[StudyR
     runs = []
     for number, drawn in enumerate(batch, first):
         # Each case has its own noise, whatever it was drawn for.
-        seed = int(named_generator(campaign.seed, f"case {number}").integers(2**31))
-        runs.append(run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed)))
+        seed = (
+            campaign.earlier[number].seed
+            if campaign.earlier
+            else int(named_generator(campaign.seed, f"case {number}").integers(2**31))
+        )
+        run = run_of(campaign.file, number, *campaign.reader.load(drawn.values, seed))
+        # A result without the coverage of this ODD does not count.
+        runs.append(run if campaign.odd is None else replace(run, key=campaign.odd.keyed(run.key)))
     return runs
+
+
+def smallest_failing(campaign: Campaign, found: Findings, out: Path, engine: Engine) -> SmallestCase | None:
+    """The smallest failing case: as many parameters as possible at their medians, the others as near as possible.
+
+    The search begins at the failing case that is nearest to the medians; None if no case failed. Results are kept in
+    the campaign's directory.
+    """
+    failing = [one for one in found.results if one.message is None and one.has_failed]
+    if not failing:
+        return None
+    space, first = campaign.space, campaign.reader.case.levels
+    medians = np.array([axis.place(axis.quantile(0.5)) for axis in space.axes.values()])
+    nearest = int(np.argmin(((space.places(failing) - medians) ** 2).sum(axis=1)))
+    names = tuple(found.results[0].run.scenario.expect)
+
+    def fails(values: Values) -> bool | None:
+        drawn = {name: number_with_unit(number_of(values[name]), axis.unit) for name, axis in space.axes.items()}
+        seeds = [
+            int(values[name]) for name in values if isinstance(campaign.reader.variation.space.get(name), SeedLevels)
+        ]
+        try:
+            run = run_of(campaign.file, 0, *campaign.reader.load(drawn, seeds[0] if seeds else 0))
+        except InputError:
+            return None
+        folder = results_folder(out)
+        if read_result(folder, run, names) is None:
+            engine.run([run], folder, lambda *_: None)
+        result = read_result(folder, run, names)
+        return None if result is None or result.message is not None else result.has_failed
+
+    with WriterLock(out):
+        known = {case_key(one.run.levels): one.has_failed for one in found.results if one.message is None}
+        return smallest_case(failing[nearest].run.levels, first, space.axes, known, fails)
 
 
 def as_test(campaign: Campaign, found: Findings) -> FogTest:

@@ -41,10 +41,11 @@ def _usual(setup: TrafficSetup) -> dict[str, str]:
         **dict.fromkeys(("no-step-log", "duration-log.disable", "no-warnings"), "true"),
         **dict.fromkeys(("verbose", "duration-log.statistics"), "false"),
     }
-    # Vehicles are not teleported: collisions stay where they happen and are counted. How jams dissolve in a simulation
-    # of the user's own is left to its configuration.
-    # Nor is it changed whether it looks for collisions at junctions.
-    own = {"time-to-teleport": "-1", "collision.check-junctions": "true"} if setup.config is None else {}
+    # Vehicles are not teleported: collisions stay where they happen and are counted. They are contacts, where SUMO by
+    # default counts each gap below a vehicle's minimum (2.5 m). A simulation of the user's own keeps what its
+    # configuration says of these.
+    own = {"time-to-teleport": "-1", "collision.check-junctions": "true", "collision.mingap-factor": "0"}
+    own = own if setup.config is None else {}
     if setup.after_collision is AfterCollision.STOP:
         return {**quiet, **own, "collision.action": "warn", "collision.stoptime": _FOR_EVER}
     return {**quiet, **own, "collision.action": "remove"}

@@ -109,6 +109,7 @@ class EgoDriving:
         self._step_length = step_length
         self._modes: tuple[int, int] | None = None
         self._last: EgoControl | None = None
+        self._planned_from: float | None = None
 
     def apply(self, control: EgoControl | None, present: set[str]) -> bool:
         """Drive for the next step.
@@ -125,12 +126,24 @@ class EgoDriving:
             self._modes = int(vehicles.getSpeedMode(ego)), int(vehicles.getLaneChangeMode(ego))
             vehicles.setSpeedMode(ego, _NO_CHECKS)
             vehicles.setLaneChangeMode(ego, _NO_CHECKS)
-        speed = float(vehicles.getSpeed(ego)) + self._step_length * control.acceleration
+            self._planned_from = None
+        now, acceleration = float(vehicles.getSpeed(ego)), control.acceleration
+        if control.brakes_with_driver and acceleration < 0.0:
+            acceleration = min(acceleration, self._planned_by_driver(ego))
+        self._planned_from = now
+        speed = now + self._step_length * acceleration
         vehicles.setSpeed(ego, min(max(speed, 0.0), float(vehicles.getMaxSpeed(ego))))
         if control.lanes and control is not self._last and has_lane(self._api, ego, control.lanes):
             vehicles.changeLaneRelative(ego, control.lanes, _STAY)
         self._last = control
         return True
+
+    def _planned_by_driver(self, ego: str) -> float:
+        """Acceleration that SUMO's driver would have had in the last step [m/s²], which it had if it drove."""
+        if self._planned_from is None:
+            return float(self._api.vehicle.getAcceleration(ego))
+        planned = float(self._api.vehicle.getSpeedWithoutTraCI(ego))
+        return (planned - self._planned_from) / self._step_length
 
     def _release(self, ego: str) -> None:
         if self._modes is not None:

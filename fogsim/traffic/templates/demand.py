@@ -132,8 +132,11 @@ def _actor(one: Placed, layout: Ways) -> Iterator[str]:
     speed = min(layout.edge(edge).limit, kind.top_speed) if actor.speed is None else actor.speed
     steady = {"speedFactor": "1.0", "speedDev": "0", "sigma": "0"}
     if actor.speed:
-        # What it is to keep it also keeps where the limit is lower.
-        steady |= {"maxSpeed": f"{speed:.3f}", "speedFactor": f"{max(1.0, speed / layout.edge(edge).limit):.3f}"}
+        # What it is to keep it also keeps where the limit is lower; SUMO refuses a maximum of 0.
+        steady |= {
+            "maxSpeed": f"{max(speed, 0.001):.3f}",
+            "speedFactor": f"{max(1.0, speed / layout.edge(edge).limit):.3f}",
+        }
     lane = actor.lane % layout.edge(edge).lanes
     yield _type(f"type.{actor.name}", kind, **steady)
     yield element("route", id=f"route.{actor.name}", edges=" ".join(way))

@@ -97,14 +97,18 @@ _A_ROAD, _LIKELY_A_ROAD, _SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
 method has no answer, and against another one's [-]."""
 
 _EVEN_SURFACES, _USUAL_SURFACES, _LEAST_USUAL, _LEAST_SKY = 2, 3, 0.8, 0.5
-"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least
-probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
+"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; the next
+lies in shade; least probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
 
 _CLIPPING = 0.4
 """Probability that the airlight is not even, where a clipped sky does not show it [-]."""
 
 _DENSEST = 13.5
 """Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
+
+_LANE = 4
+"""Lines that meet where the road vanishes from which on it is one although shade lies on it, whose patches follow no
+law; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
 _HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
@@ -163,8 +167,8 @@ class DayVerdict:
         return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
 
 
-def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
-    """Judge a posterior."""
+def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdict:
+    """Judge a posterior, of an image in which so many lines meet where a straight road vanishes."""
     low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
     calibration = NORMAL_90_PERCENT * scale_deviation
     low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
@@ -176,13 +180,15 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
     outside = max(float(by_light[LIGHTS.is_unusual].sum()), _CLIPPING if fit.clipped > 0.0 else 0.0)
     shows = fit.below(_FOG) > _LEAST_FOG and fit.contrast > _LEAST_CONTRAST
     answers = is_clear or (shows and high < WIDEST * low)
-    is_road = fit.fog_over_none > _A_ROAD
+    is_stated = fit.responses[0] > _HARDLY_STATED
+    is_lane = lines >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _LEAST_USUAL and is_stated
+    is_road = fit.fog_over_none > _A_ROAD or is_lane
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sky = sky > _LEAST_SKY or fit.clipped > 0.0
-    is_sure = fit.fog_over_none > _LIKELY_A_ROAD and usual > _LEAST_USUAL and is_sky
-    is_sure = is_sure and low > _DENSEST
+    is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _LEAST_USUAL) or is_lane
+    is_sure = is_sure and is_sky and low > _DENSEST
     even = float(fit.surfaces[:_EVEN_SURFACES].sum())
-    is_even = fit.fog_over_none > _SURELY_A_ROAD and even > _LEAST_USUAL and fit.responses[0] > _HARDLY_STATED
+    is_even = fit.fog_over_none > _SURELY_A_ROAD and even > _LEAST_USUAL and is_stated
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
@@ -248,16 +254,19 @@ class SecondOpinion:
         self._fit: DayFit | None = None
         self._clear: tuple[float, float] | None = None
 
-    def on(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float) -> Estimate:
+    def on(
+        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, lines: int | None
+    ) -> Estimate:
         """Return an estimate, what the day model has instead, or neither.
 
-        Takes `level` (rows, cols), `free` [m], `time` [s].
+        Takes `level` (rows, cols), `free` [m], `time` [s], and how many lines meet where the road vanishes; None if it
+        bends.
         """
         is_recent = self._agreed < time < self._agreed + PERIOD
         if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
             return self._kept(own)
         self._response, self._clear = 0.0, None
-        chosen = self._with_day_model(own, level, horizon, free, time)
+        chosen = self._with_day_model(own, level, horizon, free, time, lines)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:
@@ -273,18 +282,21 @@ class SecondOpinion:
         return _with_calibration(own, self._scale, self._response)
 
     def _with_day_model(
-        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
+        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, lines: int | None
     ) -> Estimate:
         earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
         self._fit, self._looked = fit, time
-        verdict = verdict_of(fit, self._scale)
+        verdict = verdict_of(fit, self._scale, lines or 0)
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
+        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
+        if own.valid and lines is None:
+            # It follows no bend: there it shows what responses change, not how dense the fog is.
+            return own
         shows_none = math.isinf(verdict.interval[1]) and agree(own.visibility_interval, verdict.interval)
         self._clear = verdict.interval if shows_none else None
-        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:
             return chosen

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.pinhole import camera_axes
+from fogsim.values.camera import Camera
+from fogsim.values.pinhole import OWN_FRAME, camera_axes
 from fogsim.vision.restoration import light_kernels, planar_kernels
 from fogsim.vision.restoration.picture import Floats, FoggyPicture
 
@@ -93,7 +93,7 @@ def _distance(camera: Camera, rows: NDArray[np.float64], cols: NDArray[np.float6
     """Distance H / −sin(elevation) of each ray."""
     u0, v0 = camera.principal_point
     right, down = (cols[None, :] - u0) / camera.focal_length, (rows[:, None] - v0) / camera.focal_length
-    across, lower, ahead = camera_axes(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))[:, 2].tolist()
+    across, lower, ahead = camera_axes(camera, OWN_FRAME)[:, 2].tolist()
     under = -(across * right + lower * down + ahead)
     length = np.sqrt(1.0 + right**2 + down**2)
     road = under * FARTHEST > camera.mount_height * length

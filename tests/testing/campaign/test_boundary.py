@@ -49,11 +49,11 @@ def searched(seed: int, budget: int = 200) -> Findings:
     batch = next(plan)
     try:
         while True:
-            told = []
+            results = []
             for one in batch:
                 fog, *others = (number_of(str(value)) for value in one.values.values())
-                told.append(result(one.values, fog < stopping_distance(*others)))
-            batch = plan.send(told)
+                results.append(result(one.values, fog < stopping_distance(*others)))
+            batch = plan.send(results)
     except StopIteration:
         return found
 

@@ -8,38 +8,25 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from drawn_scenario import SCENARIO
 
 from fogsim.conditions import Finding, FindingVerdict
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.study.execution import result_file
+from fogsim.testing.campaign.comparison import changes, changes_text
 from fogsim.testing.campaign.drawing_plan import Findings
 from fogsim.testing.campaign.outputs import rate_text, write_campaign_junit, write_cases, write_report
-from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign
+from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign, smallest_failing
 from fogsim.testing.results import finding_to_json
-
-SCENARIO = """
-name: drawn
-duration: 1 s
-road: {template: motorway, length: 1 km}
-actors: {ego: {position: 50 m, speed: $speed}}
-fog: {visibility: $fog}
-renderer: none
-sut: {estimators: []}
-expect: {safe: {always: ego.speed > 1 km/h}}
-space:
-  fog: {lognormal: [100 m, 1], at_least: 20 m, at_most: 1000 m}
-  speed: {uniform: [50 km/h, 120 km/h]}
-  run: seeds
-"""
 
 
 class Closed:
     """An engine that decides each case in closed form, and ends after some of them."""
 
-    def __init__(self, most: int = 1000, reverse: bool = False) -> None:
-        self.left, self.reverse = most, reverse
+    def __init__(self, most: int = 1000, reverse: bool = False, passes_below: float = 0.0) -> None:
+        self.left, self.reverse, self.passes_below = most, reverse, passes_below
 
     def run(self, runs, folder, watch) -> None:
         for run in reversed(runs) if self.reverse else runs:
@@ -47,6 +34,7 @@ class Closed:
                 raise KeyboardInterrupt
             self.left -= 1
             margin = run.scenario.fog.visibility_m / 200.0 - run.scenario.actors["ego"].speed_kmh / 100.0
+            margin = 1.0 if run.scenario.fog.visibility_m < self.passes_below else margin
             verdict = FindingVerdict.PASSED if margin > 0.0 else FindingVerdict.FAILED
             finding = Finding("safe", "always", verdict, "fast", f"margin {margin:.3f}", None, None, "", margin)
             told = {"findings": [finding_to_json(finding)], "metrics": {"minimum_gap_m": 2.0}, "ending": None}
@@ -84,6 +72,7 @@ def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, tmp
         assert (row["verdict"] == "passed") == (float(row["margin"]) > 0.0)
     cases = ET.fromstring(whole["junit.xml"]).findall(".//testcase")  # noqa: S314 - written just now
     assert len(cases) == 40
+    assert {one.attrib["value"] for one in cases[0].findall("properties/property")} == {"SYS-1", "SYS 2"}
     assert {"failed", "passed"} == {row["verdict"] for row in rows}
     page = whole["report.html"].decode()
     assert page.index("<img") < page.index("declared distribution")
@@ -100,6 +89,62 @@ def test_the_command_of_a_failure_runs_the_same_case(campaign: Campaign, tmp_pat
 
     ((case, scenario),) = load_cases(campaign.file, wanted=label[1], is_test=True).cases
     assert (case.seed, scenario) == (failed.run.seed, failed.run.scenario)
+
+
+def test_the_same_cases_before_and_after(campaign: Campaign, tmp_path: Path) -> None:
+    """What changed is found: here each case below 100 m, which the engine no longer lets fail."""
+    before = run_campaign(campaign, tmp_path / "a", Closed())
+    write_cases(tmp_path / "a" / "cases.csv", campaign, before)
+    again = load_campaign(campaign.file, ["light.illuminance_lx=20000"], against=tmp_path / "a")
+    after = run_campaign(again, tmp_path / "b", Closed(passes_below=100.0))
+    assert [one.values for one in after.drawn] == [one.values for one in before.drawn]
+    assert [one.run.seed for one in after.results] == [one.run.seed for one in before.results]
+    mended = [
+        one.run.levels
+        for one in before.results
+        if one.has_failed and float(one.run.levels["fog"].removesuffix(" m")) < 100.0
+    ]
+    assert [one.result.run.levels for one in changes(again.earlier, after)] == mended
+    assert changes_text(again.earlier, after) == f"{len(mended)} of 40 cases changed: {len(mended)} failed → passed"
+    content = files(again, after, tmp_path / "b")
+    rows = list(csv.DictReader(content["cases.csv"].decode().splitlines()))
+    assert sum(row["verdict"] != row["verdict_before"] for row in rows) == len(mended)
+    assert f"<h2>Before and after</h2>\n<p>{len(mended)} of 40 cases changed" in content["report.html"].decode()
+    assert load_campaign(campaign.file, against=tmp_path / "b").earlier[0].verdict == rows[0]["verdict"]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (None, "no cases.csv of a campaign is there"),
+        ("case,purpose,fog [m],seed,verdict\n", "expected the columns case, purpose, fog \\[m\\], speed"),
+        ("case,purpose,fog [m],speed [km/h],seed,verdict\n", "has no case"),
+        ("case,purpose,fog [m],speed [km/h],seed,verdict\n0,space,x,1,2,passed\n", "cases.csv:2: expected a case"),
+        ("", "expected the columns"),
+    ],
+)
+def test_what_is_no_earlier_campaign(campaign: Campaign, tmp_path: Path, table: str | None, message: str) -> None:
+    if table is not None:
+        (tmp_path / "cases.csv").write_text(table)
+    with pytest.raises(InputError, match=message):
+        load_campaign(campaign.file, against=tmp_path)
+
+
+def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, tmp_path: Path) -> None:
+    """At the median speed, 85 km/h, the closed form fails below 170 m; the median fog is thicker than that."""
+    found = run_campaign(campaign, tmp_path / "a", Closed())
+    smallest = smallest_failing(campaign, found, tmp_path / "a", Closed())
+    assert smallest is not None
+    assert smallest.values == campaign.reader.case.levels, "the median case fails"
+    clearer = load_campaign(campaign.file, ["space.fog={loguniform: [100 m, 1000 m]}"], budget=40)
+    found = run_campaign(clearer, tmp_path / "b", Closed())
+    smallest = smallest_failing(clearer, found, tmp_path / "b", Closed())
+    assert smallest is not None
+    fog, passing = (float(one["fog"].removesuffix(" m")) for one in (smallest.values, smallest.passes_at))
+    assert (smallest.values["speed"], smallest.values["run"]) == ("85 km/h", "0")
+    assert 160.0 < fog < 170.0 <= passing < 180.0
+    resumed = smallest_failing(clearer, found, tmp_path / "b", Closed(0))
+    assert resumed == smallest, "known results are not run again"
 
 
 def test_latin_hypercube_and_seed_draw_others(campaign: Campaign, tmp_path: Path) -> None:
@@ -124,7 +169,7 @@ def test_mistakes(tmp_path: Path) -> None:
         "\\$other stands nowhere": SCENARIO + "  other: {uniform: [1, 2]}\n",
         "choose one with --case": SCENARIO.replace("renderer: none", "renderer: $drawn")
         + "vary: {drawn: [none, cpu]}\n",
-        "expect is missing": SCENARIO.replace("expect: {safe: {always: ego.speed > 1 km/h}}", ""),
+        "expect is missing": re.sub("expect: .*", "", SCENARIO),
     }
     for message, text in wrong.items():
         file.write_text(text)

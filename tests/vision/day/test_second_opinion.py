@@ -8,7 +8,8 @@ import pytest
 
 from fogsim.values import Camera, Estimate
 from fogsim.vision.day import second_opinion
-from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion
+from fogsim.vision.day.row_kernels import LIGHTS
+from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
@@ -25,12 +26,12 @@ def said(monkeypatch):
     """Function from an estimate and what the day model finds to what comes of both, and how often it looked."""
     looks = []
 
-    def answer(own, verdict, times=(0.0,)):
+    def answer(own, verdict, times=(0.0,), lines=0):
         looks.clear()
         monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
         monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: verdict)
         second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
-        found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time) for time in times]
+        found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time, lines) for time in times]
         return found[-1], len(looks)
 
     return answer
@@ -81,6 +82,37 @@ def test_contrast_beyond_its_fog_ends_an_estimate(said):
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
+def test_on_a_bent_road_the_joint_fit_answers_and_the_day_model_says_what_responses_change(said):
+    found, looks = said(OWN, replace(DENSER, response_deviation=0.1), lines=None)
+    assert looks == 1
+    assert found.extinction == OWN.extinction
+    assert found.common_deviation == pytest.approx(math.hypot(SCALE, 0.1))
+    assert found.standard_deviation == pytest.approx(math.hypot(0.0015, 0.03 * math.hypot(SCALE, 0.1)))
+
+
+def test_a_road_in_shade_is_one_where_its_lines_meet_under_the_stated_response():
+    fit = second_opinion.DayFit(
+        log_visibility=np.log([95.0, 100.0, 105.0]),
+        chance=np.full(3, 1.0 / 3.0),
+        fog_over_none=-5.0,
+        responses=np.array([0.9, 0.1]),
+        surfaces=np.eye(6)[3],
+        lights=LIGHTS.chance,
+        clipped=0.0,
+        brightest=0.8,
+        contrast=0.5,
+        log_means=np.zeros(2),
+        obstacle=math.inf,
+    )
+    assert verdict_of(fit, SCALE, 3).reason
+    assert not verdict_of(replace(fit, responses=np.array([0.01, 0.99])), SCALE, 4).is_sure
+    assert not verdict_of(replace(fit, surfaces=np.eye(6)[4]), SCALE, 4).is_sure
+    seen = verdict_of(fit, SCALE, 4)
+    assert not seen.reason
+    assert seen.is_sure
+    assert not seen.is_even
+
+
 CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
 
 
@@ -97,7 +129,7 @@ def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch)
     monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: CLEAR if len(looks) < 2 else AGREES)
     second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
     found = [
-        second.on(own, image, Horizon(23.5, 1.0), math.inf, time)
+        second.on(own, image, Horizon(23.5, 1.0), math.inf, time, 0)
         for time, own in ((0.0, thin), (0.1, thin), (0.2, OWN))
     ]
     assert len(looks) == 2

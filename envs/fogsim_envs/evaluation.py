@@ -19,8 +19,8 @@ from fogsim_envs.infos import reward_terms_of, row_of, word_of
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
 
-_BATCH = "fogsim/FogAdvisoryBatch-v1"
-"""The id that is a vector environment alone."""
+_BATCH = "fogsim/FogAdvisoryBatch-"
+"""How the ids begin that are vector environments alone."""
 
 _CORRIDOR = "fogsim/FogCorridor-v1"
 """The id that is PettingZoo's, not Gymnasium's."""
@@ -153,7 +153,7 @@ def evaluate(
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
-    if env_id.rpartition(":")[2] == _BATCH:
+    if env_id.rpartition(":")[2].startswith(_BATCH):
         return summarise(_batch_episodes(policy, env_id, numbers, discount, arguments))
     env = _made(env_id, arguments)
     try:

@@ -25,7 +25,7 @@ from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
 from fogsim_envs.task.observation import task_space
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import split_number
-from fogsim_envs.task.surrogate import SurrogateTable
+from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable
 
 Infos = dict[str, Any]
 _SPEEDS = np.array([*ADVISED_SPEEDS, np.inf])
@@ -57,6 +57,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+    _measured = MEASURED
 
     def __init__(
         self,
@@ -84,7 +85,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         self._scenes = scenario_distribution or FAST_SCENARIO
         weights = reward_weights or TaskWeights()
         self._weights = np.array([getattr(weights, name) for name in TERMS])
-        table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(Path(surrogate))
+        table = SurrogateTable.load(self._measured if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()
         self._episodes = Episodes.empty(num_envs)
@@ -194,3 +195,13 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
             "truth": {"visibility_m": ego["visibility"], "visibility_ahead_m": ego["visibility_ahead"]},
             "reward_terms": {name: terms[:, i] for i, name in enumerate(TERMS)},
         }
+
+
+class FogAdvisoryBatchV2Env(FogAdvisoryBatchEnv):
+    """Many episodes of ``fogsim/FogAdvisoryFast-v2`` in one kernel, without SUMO: see `FogAdvisoryBatchEnv`.
+
+    ### Version history
+    * v2: estimates are drawn as those of the estimators for day and night err
+    """
+
+    _measured = MEASURED_2

@@ -14,8 +14,8 @@ from fogsim.scenario import Scenario, load_scenario, override
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting
 
-MOTORWAY = Path(__file__).with_name("motorway.yaml")
-"""The road of the default task."""
+MOTORWAY, MOTORWAY_2 = (Path(__file__).with_name(name) for name in ("motorway.yaml", "motorway_2.yaml"))
+"""The road of the default task, in version 1 and in version 2."""
 
 _SPLITS = ("train", "test")
 """Streams of random numbers that never overlap."""
@@ -92,13 +92,14 @@ class EpisodeSource:
         fog: FogDistribution | None,
         overrides: tuple[str, ...],
         split: str,
+        motorway: Path = MOTORWAY,
     ) -> None:
         self._split = split_number(split)
         self._drawn = ScenarioDistribution() if scenario is None and distribution is None else distribution
         self._fog = FogDistribution() if fog is None and is_own_motorway(scenario, distribution) else fog
         self._overrides = overrides
         if isinstance(self._drawn, ScenarioDistribution) or self._drawn is None:
-            self._scenarios: tuple[AnyScenario, ...] = (MOTORWAY if scenario is None else scenario,)
+            self._scenarios: tuple[AnyScenario, ...] = (motorway if scenario is None else scenario,)
         elif scenario is not None:
             raise InputError("scenario and scenario_distribution: give one scenario or several to draw from, not both")
         else:

@@ -11,15 +11,21 @@ from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 
 
 class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
-    """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps."""
+    """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps.
+
+    Rewards are less by `multiplier` times ``info["cost"]``, 0 at first, for constrained learning. At its end an episode's
+    info has what it ``earned`` without that, and the sum of its ``cost``.
+    """
 
     def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:
-        self.envs, self._repeat = envs, repeat
+        self.envs, self._repeat, self.multiplier = envs, repeat, 0.0
+        self._earned, self._cost = np.zeros(envs.num_envs), np.zeros(envs.num_envs)
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each, with the seed that `seed` has set."""
         first = self._seeds[0]
+        self._earned[:] = self._cost[:] = 0.0
         self._reset_seeds()
         return self.envs.reset(seed=first)[0]
 
@@ -33,11 +39,20 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
         total, over = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
         for _ in range(self._repeat):
             observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+            costs = infos.get("final_info", infos)["cost"]
             # What the action earns in the next episode is nothing that the agent chose there.
-            total += np.where(over, 0.0, rewards)
+            self._earned += np.where(over, 0.0, rewards)
+            self._cost += np.where(over, 0.0, costs)
+            total += np.where(over, 0.0, rewards - self.multiplier * costs)
             for i in np.flatnonzero((terminated | truncated) & ~over).tolist():
-                shown[i] = {"terminal_observation": infos["final_obs"][i], "TimeLimit.truncated": bool(truncated[i])}
+                shown[i] = {
+                    "terminal_observation": infos["final_obs"][i],
+                    "TimeLimit.truncated": bool(truncated[i]),
+                    "earned": float(self._earned[i]),
+                    "cost": float(self._cost[i]),
+                }
             over |= terminated | truncated
+        self._earned[over] = self._cost[over] = 0.0
         return observations, total, over, shown
 
     def close(self) -> None:

@@ -84,6 +84,8 @@ def trained(minutes: float, seed: int, cost_limit: float) -> tuple[PPO, list[tup
         policy_kwargs={"net_arch": [64, 64]},
     )  # fmt: skip
     agent.learn(10**9, callback=clock)
+    agent.learning_rate = LAST_RATE  # The file need not hold the clock, and with it all episodes.
+    agent._setup_lr_schedule()  # noqa: SLF001 - it has no public way
     return agent, clock.curve
 
 

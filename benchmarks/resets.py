@@ -2,8 +2,8 @@
 
 Parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and the
 steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered, and
-``highway`` of fogsim/FogHighway-v0, without SUMO. ``episodes`` is the bare ``load`` of what fogsim/FogAdvisory-v1
-draws, another road and traffic each time, and ``advisory-v1``, ``fast-v1``, ``drive-v1`` and ``highway-v1`` are those
+``highway`` of fogsim/FogHighway-v0, without SUMO. ``episodes`` is the bare ``load`` of what fogsim/FogAdvisory-v2
+draws, another road and traffic each time, and ``advisory-v2``, ``fast-v2``, ``drive-v2`` and ``highway-v1`` are those
 environments.
 The first quarter of the resets is not counted (libraries load, caches fill, the allocator's pools settle). Growth is
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
@@ -30,7 +30,7 @@ import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic, command_line
-from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+from fogsim_envs.task.sampling import MOTORWAY_2, EpisodeChoice, EpisodeSource
 
 SCENARIO = "motorway_fog_bank"
 
@@ -64,8 +64,8 @@ def traffic(_: str) -> Iterator[Reset]:
 
 @contextmanager
 def episodes(_: str) -> Iterator[Reset]:
-    """SUMO alone, on the roads and with the demand that fogsim/FogAdvisory-v1 draws."""
-    link, source = LibsumoLink(), EpisodeSource(None, None, None, (), "train")
+    """SUMO alone, on the roads and with the demand that fogsim/FogAdvisory-v2 draws."""
+    link, source = LibsumoLink(), EpisodeSource(None, None, None, (), "train", MOTORWAY_2)
 
     def reset(seed: int) -> None:
         _, drawn = source.draw(np.random.default_rng(seed), EpisodeChoice())
@@ -89,13 +89,13 @@ def environment(size: str, env_id: str) -> Iterator[Reset]:
     env.close()
 
 
-FAST_ID = "fogsim/FogAdvisoryFast-v1"
+FAST_ID = "fogsim/FogAdvisoryFast-v2"
 ENVIRONMENTS = {
     "environment": "fogsim/FogAdvisory-v0",
     "highway": "fogsim/FogHighway-v0",
-    "advisory-v1": "fogsim/FogAdvisory-v1",
-    "fast-v1": FAST_ID,
-    "drive-v1": "fogsim/FogDrive-v1",
+    "advisory-v2": "fogsim/FogAdvisory-v2",
+    "fast-v2": FAST_ID,
+    "drive-v2": "fogsim/FogDrive-v2",
     "highway-v1": "fogsim/FogHighway-v1",
 }
 PARTS: dict[str, Part] = {

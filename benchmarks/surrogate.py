@@ -1,9 +1,9 @@
-"""How near the surrogate of camera and estimator of fogsim/FogAdvisoryFast-v1 comes to the real ones.
+"""How near the surrogate of camera and estimators of fogsim/FogAdvisoryFast-v2 comes to the real ones.
 
-Episodes of fogsim/FogAdvisory-v1 are run with frames, half of them by the built-in rule, half without advice. Errors of
-its estimator are compared with those that the surrogate draws for the same fog, light and times: by the share of valid
-estimates, and by the largest distance between the two distributions of ln(estimated / true k) (Kolmogorov-Smirnov), for
-each light and each class of visibility with 30 estimates or more.
+Episodes of fogsim/FogAdvisory-v2 are run with frames, half of them by the built-in rule, half without advice. Errors of
+the first estimator that answers are compared with those that the surrogate draws for the same fog, light and times: by
+the share of valid estimates, and by the largest distance between the two distributions of ln(estimated / true k)
+(Kolmogorov-Smirnov), for each light and each class of visibility with 30 estimates or more.
 
     python benchmarks/surrogate.py [--json] [--episodes 60] [--split test]
     python benchmarks/surrogate.py --fit          # writes the table again, from episodes of the split "train"
@@ -23,11 +23,12 @@ from scipy.stats import ks_2samp, norm
 from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.units import visibility_from_extinction
-from fogsim.values import Command, Estimate
-from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+from fogsim.values import Command, Estimate, Step
+from fogsim_envs.task.observation import first_valid_estimate
+from fogsim_envs.task.sampling import MOTORWAY_2, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import (
     LIGHTS,
-    MEASURED,
+    MEASURED_2,
     EstimatorSurrogate,
     SurrogateTable,
     light_class,
@@ -62,18 +63,24 @@ class Cell:
 
 def episodes(number: int, split: str) -> Iterator[list[Record]]:
     """Run episodes with frames."""
-    source, rng = EpisodeSource(None, None, None, SIZE, split), np.random.default_rng(0)
+    source, rng = EpisodeSource(None, None, None, SIZE, split, MOTORWAY_2), np.random.default_rng(0)
     for index in range(number):
         seed, drawn = source.draw(rng, EpisodeChoice())
         config = drawn.scenario.run_config()
         policy, light = AdvisedDriving(config.advice, config.periods.decision_frames), config.world.illuminance
         with ClosedLoop(config) as loop:
             step = loop.start(seed)
-            run = [Record(step.truth.extinction_ahead, light, step.estimates[0])]
+            run = [_record(step, light)]
             while step.ending is None:
                 step = loop.advance(policy.decide(step) if index % 2 else Command())
-                run.append(Record(step.truth.extinction_ahead, light, step.estimates[0]))
+                run.append(_record(step, light))
         yield run
+
+
+def _record(step: Step, illuminance: float) -> Record:
+    """The first valid estimate of a step, if there is one."""
+    estimate = first_valid_estimate(step.estimates) or step.estimates[0]
+    return Record(step.truth.extinction_ahead, illuminance, estimate)
 
 
 def redrawn(runs: list[list[Record]], table: SurrogateTable) -> list[list[Record]]:
@@ -220,8 +227,8 @@ def main() -> None:
     )
     runs = list(episodes(given.episodes, "train" if given.fit else given.split))
     if given.fit:
-        MEASURED.write_text(fit(runs, runs[0][0].estimate.method).as_json() + "\n", encoding="utf-8")
-    records = compare(runs, redrawn(runs, SurrogateTable.load()))
+        MEASURED_2.write_text(fit(runs, "first_valid").as_json() + "\n", encoding="utf-8")
+    records = compare(runs, redrawn(runs, SurrogateTable.load(MEASURED_2)))
     ratio = "median k / true k: real / drawn"
     heads = ("light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance")
     publish(given, records, docs=lambda records: lines_of(heads, map(shown, records)))

@@ -2,7 +2,7 @@
 
 What each baseline is worth:
 
-    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 …] [--density]
+    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v2 …] [--density]
 
 ``--agent NAME=FILE`` adds a row for an agent of Stable-Baselines3 (a .zip file of its PPO).
 """
@@ -79,7 +79,7 @@ def main() -> None:
     """Write the tables that the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--episodes", type=int, default=50)
-    parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v1", "fogsim/FogAdvisoryFast-v1"])
+    parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v2", "fogsim/FogAdvisoryFast-v2"])
     parser.add_argument("--density", action="store_true", help="the table over densities, too")
     parser.add_argument("--agent", action="append", default=[], help="NAME=FILE of an agent of Stable-Baselines3's PPO")
     asked = parser.parse_args()
@@ -88,7 +88,7 @@ def main() -> None:
     for env_id in asked.ids:
         write_table(PAGE, f"returns {env_id}", lines_of(heads, rows(env_id, asked.episodes, agents)))
     if asked.density:
-        found = density_rows("fogsim/FogAdvisoryFast-v1", asked.episodes)
+        found = density_rows("fogsim/FogAdvisoryFast-v2", asked.episodes)
         write_table(PAGE, "densities", lines_of(("policy", *DENSITIES.values()), found))
 
 

@@ -1,4 +1,4 @@
-"""Train an agent on pictures alone, fogsim/FogAdvisory-v1's camera, by PPO in one file.
+"""Train an agent on pictures alone, fogsim/FogAdvisory-v2's camera, by PPO in one file.
 
     pip install 'fogsim[rl]'
     python examples/ppo_camera.py --minutes 60 --out runs/ppo_camera
@@ -30,7 +30,7 @@ from torch.distributions import Categorical
 
 from fogsim_envs import evaluate
 
-ID = "fogsim_envs:fogsim/FogAdvisory-v1"
+ID = "fogsim_envs:fogsim/FogAdvisory-v2"
 SIDE, FRAMES = 84, 4
 REWARD_SCALE = 0.1
 RECENT = 50

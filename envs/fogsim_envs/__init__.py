@@ -51,6 +51,39 @@ gymnasium.register(
 )
 
 gymnasium.register(
+    id="fogsim/FogAdvisoryBatch-v1",
+    vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchEnv",
+    reward_threshold=21.0,
+)
+
+gymnasium.register(
+    id="fogsim/FogAdvisory-v2",
+    entry_point="fogsim_envs.task:FogAdvisoryV2Env",
+    max_episode_steps=600,
+    reward_threshold=25.0,
+)
+
+gymnasium.register(
+    id="fogsim/FogAdvisoryFast-v2",
+    entry_point="fogsim_envs.task:FogAdvisoryFastV2Env",
+    max_episode_steps=520,
+    reward_threshold=21.0,
+)
+
+gymnasium.register(
+    id="fogsim/FogAdvisoryBatch-v2",
+    vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchV2Env",
+    reward_threshold=21.0,
+)
+
+gymnasium.register(
+    id="fogsim/FogDrive-v2",
+    entry_point="fogsim_envs.task:FogDriveV2Env",
+    max_episode_steps=600,
+    reward_threshold=25.0,
+)
+
+gymnasium.register(
     id="fogsim/FogHighway-v1",
     entry_point="fogsim_envs.task.highway:FogHighwayV1Env",
     max_episode_steps=375,

@@ -58,7 +58,7 @@ def main() -> None:
     """Run it from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--policy", default="rule", help=f"one of {', '.join(BASELINES)}")
-    parser.add_argument("--env", default="fogsim_envs:fogsim/FogAdvisoryFast-v1")
+    parser.add_argument("--env", default="fogsim_envs:fogsim/FogAdvisoryFast-v2")
     parser.add_argument("--episodes", type=int, default=100)
     parser.add_argument("--id", default="", help="id of the data set [fogsim/advisory/POLICY-v1]")
     asked = parser.parse_args()

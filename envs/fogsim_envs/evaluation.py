@@ -14,10 +14,13 @@ from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
 from fogsim_envs.baselines import Info, Policy, baseline
-from fogsim_envs.infos import reward_terms_of, word_of
+from fogsim_envs.infos import reward_terms_of, row_of, word_of
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
+
+_BATCH = "fogsim/FogAdvisoryBatch-"
+"""How the ids begin that are vector environments alone."""
 
 _CORRIDOR = "fogsim/FogCorridor-v1"
 """The id that is PettingZoo's, not Gymnasium's."""
@@ -150,6 +153,8 @@ def evaluate(
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
+    if env_id.rpartition(":")[2].startswith(_BATCH):
+        return summarise(_batch_episodes(policy, env_id, numbers, discount, arguments))
     env = _made(env_id, arguments)
     try:
         return summarise([_episode_of(policy, env, seed, discount) for seed in numbers])
@@ -275,6 +280,37 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: 
         sums.add(float(reward), info)
         over = terminated or truncated
     return sums.result(seed, info, word_of(info, "fault") == "ego")
+
+
+def _batch_episodes(
+    policy: AnyPolicy, env_id: str, seeds: Sequence[int], discount: float, arguments: Mapping[str, Any]
+) -> list[EpisodeResult]:
+    """All episodes at once."""
+    envs: Any = gymnasium.make_vec(env_id, num_envs=len(seeds), **{"split": "test", **arguments})
+    if isinstance(policy, Predictor):
+        together, policies = _policy(policy, envs.single_action_space), []
+    else:
+        policies = [_policy(policy, envs.single_action_space) for _ in seeds]
+        for one, seed in zip(policies, seeds, strict=True):
+            one.reset(seed)
+    observations, infos = envs.reset(seed=list(seeds))
+    sums, results = [_Sums(discount) for _ in seeds], dict[int, EpisodeResult]()
+    while len(results) < len(seeds):
+        running = [i for i in range(len(seeds)) if i not in results]
+        if policies:
+            actions = np.stack([envs.single_action_space.sample()] * len(seeds))
+            for i in running:
+                actions[i] = policies[i](observations[i], row_of(infos, i))
+        else:
+            actions = together(observations, infos)
+        observations, rewards, terminated, truncated, infos = envs.step(actions)
+        ends = infos.get("final_info", infos)
+        for i in running:
+            info = row_of(ends, i)
+            sums[i].add(rewards[i], info)
+            if terminated[i] or truncated[i]:
+                results[i] = sums[i].result(seeds[i], info, info["fault"] == "ego")
+    return [results[i] for i in range(len(seeds))]
 
 
 def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -> EpisodeResult:

@@ -39,3 +39,8 @@ def reward_terms_of(info: Mapping[str, Any]) -> dict[str, float]:
     """Terms of the reward of an info, nested or flat."""
     flat = {key.removeprefix(f"{_TERMS}/"): value for key, value in info.items() if key.startswith(f"{_TERMS}/")}
     return flat or dict(info.get(_TERMS, {}))
+
+
+def row_of(infos: Mapping[str, Any], row: int) -> dict[str, Any]:
+    """Info of one environment of a vector, in which all are nested arrays or numbers."""
+    return {key: row_of(one, row) if isinstance(one, Mapping) else one[row] for key, one in infos.items()}

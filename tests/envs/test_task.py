@@ -1,4 +1,4 @@
-"""The task of version 1: episodes that differ, a reward that cannot be farmed, and what stands in for frames."""
+"""The task of versions 1 and 2: episodes that differ, a reward that cannot be farmed, and what stands in for frames."""
 
 import dataclasses
 import importlib
@@ -18,10 +18,18 @@ from fogsim.advice.agent import AGENT_STATE, agent_state, clipped, scaled_visibi
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.scenario.fog import Fog
-from fogsim.values import Collision, Command, Ending, Leader, SignSighting, Step
+from fogsim.values import Collision, Command, Ending, Estimate, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.observation import STATE_FEATURES, task_observation, task_space, task_state
+from fogsim_envs.task.fast import FAST_FOG, FAST_ROAD, FAST_SCENARIO
+from fogsim_envs.task.observation import (
+    STATE_FEATURES,
+    first_valid_estimate,
+    leading_estimate,
+    task_observation,
+    task_space,
+    task_state,
+)
 from fogsim_envs.task.rewards import Way, fault, task_terms
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
@@ -141,9 +149,13 @@ def test_gymnasiums_checker_finds_nothing(fast: gymnasium.Env[Any, Any]) -> None
 def test_every_version_1_takes_the_same_keywords() -> None:
     keywords = {
         name: set(inspect.signature(_class_of(name)).parameters)
-        for name in ("fogsim/FogAdvisory-v1", FAST, "fogsim/FogHighway-v1", "fogsim/FogDrive-v1")
+        for name in (
+            FAST,
+            *(f"fogsim/Fog{one}" for one in ("Advisory-v1", "Advisory-v2", "Highway-v1", "Drive-v1", "Drive-v2")),
+        )
     }
     shared = keywords["fogsim/FogAdvisory-v1"]
+    assert shared == keywords["fogsim/FogAdvisory-v2"] == keywords["fogsim/FogDrive-v2"]
     assert shared == keywords["fogsim/FogDrive-v1"] == keywords[FAST] - {"surrogate"}
     # Roads and traffic are highway-env's.
     assert shared - {"scenario"} <= keywords["fogsim/FogHighway-v1"]
@@ -154,15 +166,18 @@ def _class_of(name: str) -> Any:
     return getattr(importlib.import_module(module), own)
 
 
-@pytest.mark.parametrize("name", ["FogAdvisory", "FogAdvisoryFast", "FogDrive", "FogHighway"])
+@pytest.mark.parametrize(
+    "name",
+    ["FogAdvisory-v1", "FogAdvisoryFast-v1", "FogHighway-v1", "FogAdvisory-v2", "FogAdvisoryFast-v2", "FogDrive-v2"],
+)
 def test_a_version_says_when_it_is_over_and_solved_and_what_has_changed(name: str) -> None:
-    spec = gymnasium.spec(f"fogsim/{name}-v1")
+    spec = gymnasium.spec(f"fogsim/{name}")
     assert spec.max_episode_steps is not None
     # Of 40 points, which a drive at the limit with nothing amiss is worth.
     assert spec.reward_threshold is not None
     assert 0.0 < spec.reward_threshold < 40.0
     kind = gymnasium.envs.registration.load_env_creator(str(spec.entry_point))
-    assert "### Version history\n    * v1: " in (kind.__doc__ or "")
+    assert f"### Version history\n    * {name[-2:]}: " in (kind.__doc__ or "")
 
 
 @pytest.mark.parametrize(("mode", "size"), [("state", 22), ("camera", 64 * 48 * 3)])
@@ -323,11 +338,11 @@ def test_the_map_rides_along_as_a_channel_or_an_entry(step: Step) -> None:
     sign = SignSighting("a", "stop", 0.0, 30.0, -3.0, 0.9)
     seen = dataclasses.replace(step, observation=dataclasses.replace(step.observation, signs=(sign,)))
     camera = step.truth.camera
-    channel = task_observation(seen, "camera+sign_map", Command(), 100.0, 500.0)
+    channel = task_observation(seen, None, "camera+sign_map", Command(), 100.0, 500.0)
     assert task_space("camera+sign_map", camera).contains(channel)
     np.testing.assert_array_equal(channel[:, :, :3], step.observation.image)
     assert set(np.unique(channel[:, :, 3])) == {0, 225}
-    whole = task_observation(seen, "dict+sign_map", Command(), 100.0, 500.0)
+    whole = task_observation(seen, None, "dict+sign_map", Command(), 100.0, 500.0)
     assert task_space("dict+sign_map", camera).contains(whole)
     np.testing.assert_array_equal(whole["sign_map"][:, :, 1], channel[:, :, 3])
 
@@ -337,10 +352,54 @@ def _illuminance(step: Step) -> float:
     return step.observation.light.illuminance
 
 
+def test_version_2_drives_by_day_and_night_with_signs() -> None:
+    env: Any = gymnasium.make(
+        "fogsim/FogAdvisory-v2",
+        fog_distribution=FogDistribution(visibility=(100.0, 100.0), clear_share=0.0, even_share=1.0),
+        scenario_distribution=ScenarioDistribution(light={"night": 1.0}, scripts={"free": 1.0}),
+        overrides=["actors.ego.position_m=450"],
+    )
+    valid, signs = 0, 0
+    observation, _ = env.reset(seed=0)
+    for _ in range(10):
+        valid += int(observation["state"][9])
+        signs += int(observation["signs_mask"].sum())
+        observation, *_ = env.step([12, 0])
+    env.close()
+    assert valid >= 5
+    assert signs >= 1
+
+
+def test_the_observed_estimate_of_version_2_is_the_first_valid_one() -> None:
+    silent, one, other = Estimate.invalid("a", "dark"), Estimate("b", 0.02, 0.002), Estimate("c", 0.03, 0.001)
+    assert first_valid_estimate((silent, one, other)) is one
+    assert first_valid_estimate((silent,)) is None
+    assert leading_estimate((silent, one)) is silent
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("policy", ["rule", "fixed", "oracle"])
+def test_returns_without_frames_are_those_with_frames(policy: str) -> None:
+    """Version 2 with frames and without, in the same fog, light and traffic: means within each other's intervals."""
+    alike: dict[str, Any] = {
+        "fog_distribution": FAST_FOG,
+        "scenario_distribution": FAST_SCENARIO,
+        "observation": "state",
+    }
+    overrides = (*FAST_ROAD, "camera.width=160", "camera.height=120")
+    real = fogsim_envs.evaluate(policy, "fogsim/FogAdvisory-v2", range(40), overrides=overrides, **alike)
+    drawn = fogsim_envs.evaluate(policy, "fogsim/FogAdvisoryFast-v2", range(40))
+    assert real.low <= drawn.mean <= real.high
+    assert drawn.low <= real.mean <= drawn.high
+
+
 def test_state_says_nothing_of_the_truth(step: Step) -> None:
     other = dataclasses.replace(step.truth, extinction=0.5, extinction_ahead=0.4)
-    mine = task_state(step, Command(), 100.0, 500.0)
-    np.testing.assert_array_equal(mine, task_state(dataclasses.replace(step, truth=other), Command(), 100.0, 500.0))
+    mine = task_state(step, leading_estimate(step.estimates), Command(), 100.0, 500.0)
+    np.testing.assert_array_equal(
+        mine,
+        task_state(dataclasses.replace(step, truth=other), leading_estimate(step.estimates), Command(), 100.0, 500.0),
+    )
     told = dict(zip(STATE_FEATURES, mine.tolist(), strict=True))
     assert told["speed_limit"] == pytest.approx(130.0 / 3.6 / 25.0 - 1.0, rel=1e-4)
     assert told["distance_to_go"] == pytest.approx(500.0 / 2500.0 - 1.0)
@@ -349,7 +408,7 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     assert belief == sorted(belief)
     assert told["ambient_light"] == pytest.approx(math.log10(_illuminance(step)) / 3.0 - 2.0 / 3.0, abs=1e-6)
     sensorless = dataclasses.replace(step, observation=dataclasses.replace(step.observation, light=None))
-    assert task_state(sensorless, Command(), 100.0, 500.0)[-1] == 1.0
+    assert task_state(sensorless, None, Command(), 100.0, 500.0)[-1] == 1.0
     known = [STATE_FEATURES.index(name) for name in AGENT_STATE]
     np.testing.assert_array_equal(mine[known], clipped(agent_state(step.observation, step.belief)))
     assert [scaled_visibility(one) for one in (0.0, 10.0, 100.0, 1000.0, math.inf)] == [-1.0, -1.0, 0.0, 1.0, 1.0]

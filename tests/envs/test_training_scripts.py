@@ -14,8 +14,8 @@ import fogsim_envs  # noqa: F401 - registers
 from fogsim.errors import InputError
 from fogsim_envs.corridor import parallel_env
 
-VERSION_1 = ("FogAdvisoryFast-v1", "FogAdvisory-v1", "FogDrive-v1", "FogHighway-v1")
-ALL = (*VERSION_1, "FogAdvisory-v0", "FogHighway-v0")
+LATEST = ("FogAdvisoryFast-v2", "FogAdvisory-v2", "FogDrive-v2", "FogHighway-v1")
+ALL = (*LATEST, "FogAdvisoryFast-v1", "FogAdvisory-v1", "FogDrive-v1", "FogAdvisory-v0", "FogHighway-v0")
 RESERVED = {"episode", "final_obs", "final_info", "TimeLimit.truncated", "terminal_observation", "is_success"}
 
 
@@ -32,7 +32,7 @@ def tree(info: Any) -> Any:
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
 @pytest.mark.parametrize(
-    ("name", "mode"), [*((name, AutoresetMode.NEXT_STEP) for name in ALL), (VERSION_1[0], AutoresetMode.SAME_STEP)]
+    ("name", "mode"), [*((name, AutoresetMode.NEXT_STEP) for name in ALL), (LATEST[0], AutoresetMode.SAME_STEP)]
 )
 def test_statistics_of_episodes_in_a_vector(name: str, mode: AutoresetMode) -> None:
     envs = SyncVectorEnv([lambda: RecordEpisodeStatistics(made(name))], autoreset_mode=mode)
@@ -47,7 +47,7 @@ def test_statistics_of_episodes_in_a_vector(name: str, mode: AutoresetMode) -> N
     assert lengths[:2] == [2, 2]
 
 
-@pytest.mark.parametrize("name", VERSION_1)
+@pytest.mark.parametrize("name", LATEST)
 def test_infos_have_one_tree_and_are_numbers_on_request(name: str) -> None:
     env = made(name, 4)
     _, first = env.reset(seed=1)

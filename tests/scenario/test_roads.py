@@ -9,6 +9,8 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved
 from fogsim.scenario.roads.files import road_layout, traffic_files
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import structures
 from fogsim.traffic.templates import ROAD_TEMPLATES, net_text
 
@@ -131,6 +133,23 @@ def test_what_stands_beside_a_road_is_drawn_where_it_is_said_to_be(tmp_path: Pat
     np.testing.assert_allclose(wall.line[-1, :2], 70.0 * along - (3.5 + 3.0 + 0.15) * left, atol=0.02)
     np.testing.assert_allclose(roof.line[[0, -1], :2], [200.0 * along, 600.0 * along], atol=0.02)
     assert roof.bottom == 5.2
+
+
+def test_signs_repeat_the_limit_but_in_a_tunnel(tmp_path: Path) -> None:
+    setup = build.traffic_setup(loaded(tmp_path, BESIDE.replace("tunnel_at", "sign_spacing: 450 m\n  tunnel_at")))
+    assert setup.net is not None
+    found = {one.sign_id: one for one in sign_map(read_net(setup.net), setup.additional).signs}
+    repeated = {name: one for name, one in found.items() if name[-1].isdigit()}
+    # One would be 450 m along, in the tunnel from 200 to 600 m.
+    assert list(repeated) == ["limit.2", "limit.3", "limit.4"]
+    along = np.array([np.cos(np.radians(20.0)), np.sin(np.radians(20.0))])
+    right = np.array([along[1], -along[0]])
+    for name, at in (("limit.2", 900.0), ("limit.4", 1800.0)):
+        one = repeated[name]
+        # Crossings between the edges of a tunnel's road are 0.1 m long.
+        np.testing.assert_allclose(one.position[:2], at * along + (3.5 + 3.9) * right, atol=0.25)
+        assert (one.kind, one.heading) == ("speed_limit", pytest.approx(np.radians(20.0), abs=1e-4))
+        assert one.value == pytest.approx(80.0 / 3.6)
 
 
 def test_what_does_not_fit_beside_a_road_is_told(tmp_path: Path) -> None:

@@ -27,9 +27,9 @@ from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
-from fogsim_envs.task.observation import task_observation, task_space
+from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
-from fogsim_envs.task.sampling import AnyScenario, EpisodeChoice, EpisodeSource
+from fogsim_envs.task.sampling import MOTORWAY, MOTORWAY_2, AnyScenario, EpisodeChoice, EpisodeSource
 
 
 class OwnDriver:
@@ -127,6 +127,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    _default_motorway = MOTORWAY
+    _observed_estimate = staticmethod(leading_estimate)
 
     def __init__(
         self,
@@ -151,7 +153,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             raise UnknownNameError("render_mode", render_mode, self.metadata["render_modes"])
         self._timeout = timeout
         size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
-        self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
+        every = (*size, *overrides)
+        self._source = EpisodeSource(
+            scenario, scenario_distribution, fog_distribution, every, split, self._default_motorway
+        )
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._is_measured, self._measured = metrics, RunMetrics()
         self._weights = reward_weights or TaskWeights()
@@ -312,7 +317,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         return step
 
     def _observe(self) -> Any:
-        return task_observation(self._current, self._mode, self._own, self._way.duration, self._way_end)
+        step, estimate = self._current, self._observed_estimate(self._current.estimates)
+        return task_observation(step, estimate, self._mode, self._own, self._way.duration, self._way_end)
 
     @property
     def _current(self) -> Step:
@@ -375,6 +381,21 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         if self._simulation is not None:
             self._simulation.close()
         self._simulation, self._step, self._running = None, None, None
+
+
+class FogAdvisoryV2Env(FogAdvisoryV1Env):
+    """Advise a vehicle's speed and lamps in fog that only its camera can judge, by day and by night.
+
+    As `FogAdvisoryV1Env`, but for its default task: estimators for day and night (joint_road, night_road and
+    lead_contrast) instead of negru2013, which is silent by night; signs every 500 m; a radar that sees 20° wide and a
+    position that errs by 1 m. In ``state``, the estimate is that of the first of them that answers.
+
+    ### Version history
+    * v2: as above
+    """
+
+    _default_motorway = MOTORWAY_2
+    _observed_estimate = staticmethod(first_valid_estimate)
 
 
 def _limit(step: Step) -> float:

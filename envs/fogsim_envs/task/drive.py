@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from fogsim.advice.agent import pedal_acceleration
 from fogsim.values import Command, EgoControl
-from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.advisory import FogAdvisoryV1Env, FogAdvisoryV2Env
 
 _ACCELERATIONS = (-8.0, -4.0, -2.0, 0.0, 1.0, 2.0)
 """Acceleration of each level [m/s²]: an emergency, hard and gentle braking, none, and a car's usual ones."""
@@ -49,3 +49,11 @@ class FogDriveEnv(FogAdvisoryV1Env):
             level, choice = action.tolist()
             acceleration, lanes = _ACCELERATIONS[level], _LANE_CHANGES[choice]
         return Command(lamps=self._built_in.lamps, control=EgoControl(acceleration, lanes))
+
+
+class FogDriveV2Env(FogDriveEnv, FogAdvisoryV2Env):
+    """Drive in fog that only the camera can judge, by day and by night: `FogDriveEnv` in the task of version 2.
+
+    ### Version history
+    * v2: estimators, signs and sensors of `FogAdvisoryV2Env`
+    """

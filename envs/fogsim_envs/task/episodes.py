@@ -1,11 +1,13 @@
 """What differs from episode to episode: fog, light, traffic, script, the ego's own driver, and the calibration."""
 
+import bisect
+import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from fogsim.traffic import SPEED_CHOICES
 _LIGHT = {"day": (2000.0, 40_000.0), "dusk": (10.0, 2000.0), "night": (0.1, 0.3)}
 """Illuminance of the sky [lx]: overcast or foggy day; sun below the horizon to civil twilight's end; no moon."""
 
-_SCRIPTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+SCRIPTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "free": (),
         "lead": ("actors.lead={ahead_of: ego, gap_m: 70, speed_kmh: 110}",),
@@ -188,6 +190,43 @@ def _placed(
     return placed
 
 
+VAN_SHARE = 0.1
+"""Share of vans in the traffic."""
+
+
+class Scene(NamedTuple):
+    """What is drawn of an episode but for its fog."""
+
+    light: str
+    script: str
+    driver: str
+    lanes: int
+    demand: float  # [1/h]
+    trucks: float  # Share of trucks
+    illuminance: float  # [lx]
+    braking: tuple[float, float, float]  # Where a braking lead brakes [m], how hard [m/s²], and how long it stands [s]
+    pitch: float  # Error of the camera's pitch in the calibration [rad]
+    focal_length: float  # Error of its focal length, as a share
+
+    def as_episode(self) -> Episode:
+        """The episode, as settings of a scenario."""
+        settings = [
+            f"road.lanes={self.lanes}",
+            f"demand.same_way_vph={self.demand!r}",
+            f"demand.mix={json.dumps({'truck': self.trucks, 'van': VAN_SHARE})}",
+            f"light.illuminance_lx={self.illuminance!r}",
+            f"camera.told.pitch_error_deg={math.degrees(self.pitch)!r}",
+            f"camera.told.focal_length_error_percent={100.0 * self.focal_length!r}",
+            *SCRIPTS[self.script],
+        ]
+        if self.script == "braking_lead":
+            brakes_at, deceleration, hold = self.braking
+            brake = {"to_kmh": 0.0, "deceleration_mps2": deceleration, "hold_s": hold}
+            rule = {"when": f"lead.position > {brakes_at:.1f} m", "do": {"lead": {"brake": brake}}}
+            settings.append(f"timeline={json.dumps([rule])}")
+        return Episode(tuple(settings), self.driver, self.light, self.script)
+
+
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class ScenarioDistribution:
@@ -231,7 +270,7 @@ class ScenarioDistribution:
     focal_length_error: float = 0.01
 
     def __post_init__(self) -> None:
-        for name, known in (("light", _LIGHT), ("scripts", _SCRIPTS), ("drivers", SPEED_CHOICES)):
+        for name, known in (("light", _LIGHT), ("scripts", SCRIPTS), ("drivers", SPEED_CHOICES)):
             _check_weights(f"ScenarioDistribution.{name}", getattr(self, name), list(known))
         for name in ("lanes", "demand", "truck_shares"):
             if not getattr(self, name):
@@ -250,25 +289,24 @@ class ScenarioDistribution:
         rng : numpy.random.Generator
             Random numbers; as many are drawn whatever comes out.
         """
+        return self.draw_scene(rng).as_episode()
+
+    def draw_scene(self, rng: np.random.Generator) -> Scene:
+        """What `draw` draws, as values.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            See `draw`.
+        """
         light, script, driver = (_choice(rng, weights) for weights in (self.light, self.scripts, self.drivers))
         lanes, demand, trucks = (values[int(rng.integers(len(values)))] for values in self._values())
         illuminance = _log_uniform(rng, _LIGHT[light])
-        brakes_at, deceleration, hold = rng.uniform(500.0, 2000.0), rng.uniform(3.0, 7.0), rng.uniform(5.0, 30.0)
+        braking = rng.uniform(500.0, 2000.0), rng.uniform(3.0, 7.0), rng.uniform(5.0, 30.0)
         pitch, focal = rng.normal(0.0, (self.pitch_error, self.focal_length_error)).tolist()
-        settings = [
-            f"road.lanes={int(lanes)}",
-            f"demand.same_way_vph={float(demand)!r}",
-            f"demand.mix={json.dumps({'truck': float(trucks), 'van': 0.1})}",
-            f"light.illuminance_lx={illuminance!r}",
-            f"camera.told.pitch_error_deg={math.degrees(pitch)!r}",
-            f"camera.told.focal_length_error_percent={100.0 * focal!r}",
-            *_SCRIPTS[script],
-        ]
-        if script == "braking_lead":
-            brake = {"to_kmh": 0.0, "deceleration_mps2": deceleration, "hold_s": hold}
-            rule = {"when": f"lead.position > {brakes_at:.1f} m", "do": {"lead": {"brake": brake}}}
-            settings.append(f"timeline={json.dumps([rule])}")
-        return Episode(tuple(settings), driver, light, script)
+        return Scene(
+            light, script, driver, int(lanes), float(demand), float(trucks), illuminance, braking, pitch, focal
+        )
 
     def _values(self) -> tuple[Sequence[float], ...]:
         return self.lanes, self.demand, self.truck_shares
@@ -285,8 +323,14 @@ def _log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float
 
 
 def _choice(rng: np.random.Generator, weights: Mapping[str, float]) -> str:
-    names, values = list(weights), np.array(list(weights.values()), dtype=float)
-    return names[int(np.searchsorted(np.cumsum(values) / values.sum(), rng.random(), side="right"))]
+    return list(weights)[bisect.bisect_right(_cumulative(tuple(weights.values())), rng.random())]
+
+
+@functools.cache
+def _cumulative(weights: tuple[float, ...]) -> list[float]:
+    values = np.array(weights, dtype=float)
+    shares: list[float] = (np.cumsum(values) / values.sum()).tolist()
+    return shares
 
 
 def _check_range(name: str, limits: Sequence[float], least: float) -> None:

@@ -20,19 +20,19 @@ from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT, Timeout
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.spaces import ImageSize
-from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.advisory import FogAdvisoryV1Env, FogAdvisoryV2Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import is_own_motorway
-from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
+from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, EstimatorSurrogate, SurrogateTable
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
-_DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
+FAST_ROAD = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
 
-_FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
+FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
 """The ego starts 300 m before the bank."""
 
-_FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
+FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
 
 
 @checked_parameters
@@ -60,6 +60,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    _measured = MEASURED
 
     def __init__(
         self,
@@ -86,15 +87,15 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
                 f"{observation!r} and {image_size!r}; fogsim/FogAdvisory-v1 draws frames"
             )
         is_own = is_own_motorway(scenario, scenario_distribution)
-        table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(Path(surrogate))
+        table = SurrogateTable.load(self._measured if surrogate is None else Path(surrogate))
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,
-            scenario_distribution=_FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
-            fog_distribution=_FAST_FOG if is_own and fog_distribution is None else fog_distribution,
+            scenario_distribution=FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
+            fog_distribution=FAST_FOG if is_own and fog_distribution is None else fog_distribution,
             split=split,
             observation="state",
-            overrides=(*(_DEFAULT if is_own else ()), *_WITHOUT_FRAMES, *overrides),
+            overrides=(*(FAST_ROAD if is_own else ()), *_WITHOUT_FRAMES, *overrides),
             image_size=None,
             continuous=continuous,
             discrete=discrete,
@@ -124,6 +125,19 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
         belief = self._fusion.update_at(estimates, step.time, step.route_position, step.observation.reports)
         return dataclasses.replace(step, estimates=estimates, belief=belief)
+
+
+class FogAdvisoryFastV2Env(FogAdvisoryFastEnv, FogAdvisoryV2Env):
+    """Advise a vehicle's speed and lamps in fog, by day and by night, without frames: for fast learning.
+
+    As `FogAdvisoryFastEnv`, but in the task of `FogAdvisoryV2Env`: estimates are drawn from how its estimators were
+    measured to err. So a policy that was learnt here can be evaluated on ``fogsim/FogAdvisory-v2``.
+
+    ### Version history
+    * v2: as above
+    """
+
+    _measured = MEASURED_2
 
 
 def _panel_beside_view_from_above() -> FramePanel:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.advice.agent import SPEED_SCALE, agent_state, clipped, scaled_visibility
 from fogsim.errors import UnknownNameError
-from fogsim.values import Camera, Command, Lamp, Step
+from fogsim.values import Camera, Command, Estimate, Lamp, Step
 from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs
 
 _OBSERVATIONS = ("dict", "state", "camera", "camera+sign_map", "dict+sign_map")
@@ -69,14 +69,26 @@ def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
     }[mode]
 
 
-def task_observation(step: Step, mode: str, own: Command, duration: float, way_end: float) -> Any:
+def leading_estimate(estimates: Sequence[Estimate]) -> Estimate | None:
+    """Estimate of the scenario's first estimator, perhaps invalid."""
+    return estimates[0] if estimates else None
+
+
+def first_valid_estimate(estimates: Sequence[Estimate]) -> Estimate | None:
+    """First valid estimate, in the order of the scenario's estimators."""
+    return next((one for one in estimates if one.valid), None)
+
+
+def task_observation(
+    step: Step, estimate: Estimate | None, mode: str, own: Command, duration: float, way_end: float
+) -> Any:
     """Observation of a step. Every array is the caller's own (`duration` [s], `way_end` [m])."""
     if mode == "camera":
         return step.observation.image.copy()
     if mode == "camera+sign_map":
         nearness = step.observation.sign_map[:, :, 1:2]
         return np.concatenate([step.observation.image, nearness], axis=2, dtype=step.observation.image.dtype)
-    state = task_state(step, own, duration - step.time, way_end - step.route_position)
+    state = task_state(step, estimate, own, duration - step.time, way_end - step.route_position)
     if mode == "state":
         return state
     signs, mask = observed_signs(step)
@@ -84,7 +96,9 @@ def task_observation(step: Step, mode: str, own: Command, duration: float, way_e
     return {**whole, "sign_map": step.observation.sign_map} if mode == "dict+sign_map" else whole
 
 
-def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:
+def task_state(
+    step: Step, estimate: Estimate | None, own: Command, time_left: float, to_go: float
+) -> NDArray[np.float32]:
     """Entries of ``state`` (`STATE_FEATURES`), float32 in −1 … 1 (`time_left` [s], `to_go` [m])."""
     known, advice = agent_state(step.observation, step.belief), own.advice.speed
     lane, lanes = _lane(step)
@@ -96,7 +110,7 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
         lane / _LANE_SCALE,
         lanes / _LANE_SCALE,
         *known[1:4],
-        *_estimate(step),
+        *_estimate(estimate),
         *known[4:10],
         advice / SPEED_SCALE - 1.0 if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in own.lamps),
@@ -106,10 +120,9 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
     return clipped(values)
 
 
-def _estimate(step: Step) -> tuple[float, float, float]:
-    if not step.estimates or not step.estimates[0].valid:
+def _estimate(estimate: Estimate | None) -> tuple[float, float, float]:
+    if estimate is None or not estimate.valid:
         return 0.0, 1.0, 1.0
-    estimate = step.estimates[0]
     deviation = estimate.standard_deviation / estimate.extinction if estimate.extinction > 0.0 else 1.0
     return 1.0, scaled_visibility(estimate.visibility), deviation
 

@@ -14,8 +14,8 @@ from fogsim.scenario import Scenario, load_scenario, override
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting
 
-MOTORWAY = Path(__file__).with_name("motorway.yaml")
-"""The road of the default task."""
+MOTORWAY, MOTORWAY_2 = (Path(__file__).with_name(name) for name in ("motorway.yaml", "motorway_2.yaml"))
+"""The road of the default task, in version 1 and in version 2."""
 
 _SPLITS = ("train", "test")
 """Streams of random numbers that never overlap."""
@@ -69,6 +69,19 @@ def is_own_motorway(
     return scenario is None and (distribution is None or isinstance(distribution, ScenarioDistribution))
 
 
+def numbered(rng: np.random.Generator, split: int) -> tuple[int, np.random.Generator]:
+    """Seed of an episode, even in one split and odd in the other, and what all else is drawn by."""
+    seed = 2 * int(rng.integers(2**30)) + split
+    return seed, np.random.default_rng(seed)
+
+
+def split_number(split: str) -> int:
+    """Number of a split by its name."""
+    if split not in _SPLITS:
+        raise UnknownNameError("split", split, _SPLITS)
+    return _SPLITS.index(split)
+
+
 class EpisodeSource:
     """What the episodes of an environment are drawn from."""
 
@@ -79,15 +92,14 @@ class EpisodeSource:
         fog: FogDistribution | None,
         overrides: tuple[str, ...],
         split: str,
+        motorway: Path = MOTORWAY,
     ) -> None:
-        if split not in _SPLITS:
-            raise UnknownNameError("split", split, _SPLITS)
-        self._split = _SPLITS.index(split)
+        self._split = split_number(split)
         self._drawn = ScenarioDistribution() if scenario is None and distribution is None else distribution
         self._fog = FogDistribution() if fog is None and is_own_motorway(scenario, distribution) else fog
         self._overrides = overrides
         if isinstance(self._drawn, ScenarioDistribution) or self._drawn is None:
-            self._scenarios: tuple[AnyScenario, ...] = (MOTORWAY if scenario is None else scenario,)
+            self._scenarios: tuple[AnyScenario, ...] = (motorway if scenario is None else scenario,)
         elif scenario is not None:
             raise InputError("scenario and scenario_distribution: give one scenario or several to draw from, not both")
         else:
@@ -105,10 +117,7 @@ class EpisodeSource:
 
     def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
         """Draw an episode; as many random numbers are used whatever is fixed."""
-        number = int(rng.integers(2**30))
-        # The seeds of one split are even, of the other odd, and so are what all else is drawn by.
-        seed = 2 * number + self._split
-        own = np.random.default_rng(seed)
+        seed, own = numbered(rng, self._split)
         named = self._scenarios[int(own.integers(len(self._scenarios)))]
         episode = choice.stated_episode or self._episode(own, choice.visibility)
         if choice.driver is not None:

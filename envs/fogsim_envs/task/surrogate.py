@@ -21,8 +21,9 @@ from fogsim.errors import InputError, shown
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Estimate
 
-MEASURED = Path(__file__).with_name("surrogate.json")
-"""The table that comes with FogSim: negru2013 in 160×120 pixels, two frames a second."""
+MEASURED, MEASURED_2 = (Path(__file__).with_name(name) for name in ("surrogate.json", "surrogate_2.json"))
+"""The tables that come with FogSim, in 160×120 pixels, two frames a second: of negru2013, and of version 2's estimators
+(the first that answers)."""
 
 LIGHTS = ("day", "dusk", "night")
 _DAY, _DUSK = 1000.0, 10.0

@@ -20,12 +20,12 @@ from fogsim.estimators.night.own_light import (
     HeadLamps,
     OwnLight,
     Seen,
+    calibrated_view,
     cell_luminance,
     cells_of,
     lit_head_lamps,
     setback_of,
     without_cut_noise,
-    without_noise,
 )
 from fogsim.estimators.protocol import Calibrations
 from fogsim.units import extinction_from_visibility
@@ -155,7 +155,8 @@ class NightRoad:
         self._lamps, self._frames = head_lamps, int(frames)
         self._source: Calibrations | None = None
         self._own: tuple[tuple[Lamp, float], OwnLight] | None = None
-        self._cells = cells_of(camera)
+        self._view = calibrated_view(camera)
+        self._cells = cells_of(self._view)
         rays = self._cells.rays.mean(axis=1)
         self._depth = np.where(self._cells.is_sky, np.inf, camera.mount_height / np.maximum(-rays[:, 2], 1e-3))
         self._up = np.where(self._cells.is_sky, np.arcsin(rays[:, 2]) / SKY[0][-1], 0.0)
@@ -210,7 +211,7 @@ class NightRoad:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
         wanted = lit, setback_of(observation)
         if self._own is None or self._own[0] != wanted:
-            self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
+            self._own = wanted, self._source.own_light(self._view, *wanted, self._lamps)
         return self._estimate(
             self._measured(seen, used, light, np.ascontiguousarray(others[:, used])),
             _of_cells(self._own[1], used),

@@ -43,6 +43,9 @@ _ROAD = np.radians(np.geomspace(0.55, 10.5, 13)), (-0.9, 0.0, 0.9), 0.35
 SUB_ROWS = 3
 """Rows of a cell for which the model is computed: near the horizon neither veil nor road is linear in a cell."""
 
+_PITCH_STEP, _HALF_FIELD_STEP = math.radians(0.25), math.radians(0.5)
+"""Steps of the pitch and of half the field of view, so that cameras that differ little share a calibration [rad]."""
+
 _LEAST_DARK, _MOST_DARK = 0.01, 0.95
 """Share of a cell's pixels that read no light from which on noise is cut off, and the largest that is used [-]."""
 
@@ -82,6 +85,16 @@ def setback_of(observation: Observation) -> float:
 def without_noise(camera: Camera) -> Camera:
     """What of a camera decides where it sees what."""
     return replace(camera, bits=8, black_level=0.0, response=Response.LINEAR)
+
+
+def calibrated_view(camera: Camera) -> Camera:
+    """The camera that a calibration is made for, by steps within the deviations that a calibration draws from."""
+    pitch, half = round(camera.pitch / _PITCH_STEP) * _PITCH_STEP, math.atan(0.5 * camera.width / camera.focal_length)
+    steps, focal_length = round(half / _HALF_FIELD_STEP), camera.focal_length
+    # In a narrower view a step would be too much.
+    if steps >= 20:
+        focal_length = 0.5 * camera.width / math.tan(steps * _HALF_FIELD_STEP)
+    return replace(without_noise(camera), pitch=pitch, focal_length=focal_length)
 
 
 @functools.lru_cache(maxsize=8)

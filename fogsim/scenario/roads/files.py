@@ -71,7 +71,8 @@ def traffic_files(scenario: ScenarioFile) -> TrafficFiles:
     walkers = [_walker(name, section) for name, section in scenario.actors.items() if section.is_person]
     footfall = _footfall(scenario, layout)
     texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed, walkers, footfall)}
-    beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
+    obstructions = [_obstruction(one) for one in scenario.road.obstructions]
+    beside = additional_text(layout, obstructions, scenario.road.sign_spacing_m)
     made = write_generated("roads", {**texts, **({_BESIDE: beside} if beside else {})})
     return TrafficFiles(made / _NET, (made / _ROUTES, *routes), (*([made / _BESIDE] if beside else []), *additional))
 

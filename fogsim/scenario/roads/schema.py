@@ -6,7 +6,20 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, WrapValidator, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError, suggest
-from fogsim.scenario.section import Distance, Flag, Id, Length, NewId, Number, Section, Share, SpeedKmh, Time, Whole
+from fogsim.scenario.section import (
+    Distance,
+    Flag,
+    Id,
+    Length,
+    NewId,
+    Number,
+    Reach,
+    Section,
+    Share,
+    SpeedKmh,
+    Time,
+    Whole,
+)
 from fogsim.scenario.timeline.lamps import LampActions, lamp_mistake
 from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
 from fogsim.units.quantities import is_quantity, parse_quantity
@@ -26,7 +39,7 @@ Flow = Annotated[Number, Field(ge=0, le=20_000)]
 """A flow of traffic [veh/h]."""
 
 
-NO_MEASURES = frozenset({"template", "obstructions"})
+NO_MEASURES = frozenset({"template", "obstructions", "sign_spacing_m"})
 """Keys of a road that every template has, and that are none of its measures."""
 
 _SIZES = {"wall": (0.3, 3.0, 60.0), "hedge": (1.2, 2.2, 60.0), "building": (9.0, 7.0, 20.0), "truck": (2.5, 3.8, 12.0)}
@@ -146,6 +159,9 @@ class Road(Section):
 
     tunnel_height_m: Annotated[Length, Field(ge=4)] | None = None
     """Its height."""
+
+    sign_spacing_m: Annotated[Reach, Field(ge=20)] = math.inf
+    """Distance between signs that repeat the speed limit on the right of the ego's way; inf for none."""
 
     obstructions: tuple[ObstructionSection, ...] = ()
     """What stands next to the road and hides what is behind it from the camera; drivers see through it."""

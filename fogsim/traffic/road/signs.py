@@ -15,9 +15,9 @@ from fogsim.traffic.road.structures import MarkedShape, marked_shapes
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 
-_SPEED_LIMIT = "speed_limit"
+SPEED_LIMIT = "speed_limit"
 """Type of the signs."""
-_SIGN_CLEARANCE = 3.9
+SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
 _OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
 """Alternative distances where the usual one is on another road; the first free one is used [m]."""
@@ -46,13 +46,13 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
     x, y, z = points[0] + along / math.hypot(*along) * min(10.0, 0.5 * lane.getLength())
     places = [
         (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
-        for left in (side * (lane.getWidth() / 2 + away) for away in (_SIGN_CLEARANCE, *_OTHER_CLEARANCES))
+        for left in (side * (lane.getWidth() / 2 + away) for away in (SIGN_CLEARANCE, *_OTHER_CLEARANCES))
     ]
     # Another road may be next to it, where roads part or meet.
     x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])
     return Sign(
         f"limit.{edge.getID()}",
-        _SPEED_LIMIT,
+        SPEED_LIMIT,
         float(limit),
         (x, y, float(z) + _SIGN_HEIGHT),
         heading,
@@ -71,10 +71,10 @@ def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:
     )
 
 
-_SIGN_TYPE = "fogsim.sign."
+SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
-_LIMITS = frozenset((_SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
+_LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Types whose value is a speed, in km/h in additional files."""
 _GANTRY_HEIGHT = 6.2
 """Height of the middle of a face above a lane [m]: vehicles up to 4.5 m pass below."""
@@ -92,7 +92,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
         if is_opendrive(path):
             signs += opendrive_signs(path, _net_offset(roads))
         else:
-            signs += [_marked_sign(shape, pieces) for shape in marked_shapes(path, _SIGN_TYPE)]
+            signs += [_marked_sign(shape, pieces) for shape in marked_shapes(path, SIGN_TYPE)]
     return SignMap(tuple(signs))
 
 

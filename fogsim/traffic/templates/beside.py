@@ -1,17 +1,20 @@
-"""What stands next to a road by template, and tunnels over it: lines of structures, and their file."""
+"""What stands next to a road by template, and tunnels over it: lines of structures, signs, and their file."""
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fogsim.errors import InputError
+from fogsim.traffic.road.signs import SIGN_CLEARANCE, SIGN_TYPE, SPEED_LIMIT
 from fogsim.traffic.road.structures import STRUCTURE_TYPE
 from fogsim.traffic.templates.alignment import Axis, Points
 from fogsim.traffic.templates.layout import Layout
-from fogsim.traffic.templates.placement import way_length
+from fogsim.traffic.templates.placement import edge_at, way_length
 from fogsim.traffic.templates.xml_text import element, opening
+from fogsim.units import KMH_PER_MPS
 
 _WALL, _ROOF = 0.6, 0.8  # thickness of a tunnel's walls and roof [m]
 _KERB = 1.0  # between a tunnel's carriageway and its walls [m]
@@ -33,9 +36,9 @@ class Obstruction:
     height: float
 
 
-def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
-    """Text of an additional file with all that stands next to a road; "" if nothing does."""
-    lines = list[str]()
+def additional_text(layout: Layout, obstructions: Sequence[Obstruction], sign_spacing: float) -> str:
+    """Text of an additional file with all that stands next to a road, "" if nothing does (`sign_spacing` [m])."""
+    lines = _limit_signs(layout, sign_spacing)
     for number, one in enumerate(obstructions):
         name = f"obstruction.{number}"
         if not layout.way(one.way):
@@ -52,6 +55,26 @@ def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
     if not lines:
         return ""
     return '<?xml version="1.0" encoding="UTF-8"?>\n<additional>\n' + "\n".join(lines) + "\n</additional>\n"
+
+
+def _limit_signs(layout: Layout, spacing: float) -> list[str]:
+    """Signs that repeat the limit on the right of the ego's way, but in a tunnel (`spacing` [m])."""
+    lines = list[str]()
+    for number in range(1, math.ceil(way_length(layout, "same_way") / spacing)):
+        name, along = edge_at(layout, "same_way", number * spacing)
+        edge = layout.edge(name)
+        station = float(edge.axis.stations[0]) + along
+        if layout.tunnel is not None and layout.tunnel[0].stations[0] <= station <= layout.tunnel[0].stations[-1]:
+            continue
+        ahead = edge.axis.part(station, station + 1.0)
+        (x, y), heading = ahead.beside(-edge.width - SIGN_CLEARANCE)[0, :2].tolist(), float(ahead.headings[0])
+        place = {"x": f"{x:.2f}", "y": f"{y:.2f}", "angle": f"{90.0 - math.degrees(heading):.3f}"}
+        lines += [
+            opening("poi", id=f"limit.{number}", type=f"{SIGN_TYPE}{SPEED_LIMIT}", **place),
+            f"    {element('param', key='value', value=f'{edge.limit * KMH_PER_MPS:g}')}",
+            "</poi>",
+        ]
+    return lines
 
 
 def _line(layout: Layout, one: Obstruction) -> Points:

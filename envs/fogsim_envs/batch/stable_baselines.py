@@ -1,0 +1,79 @@
+"""The vector environment for Stable-Baselines3, an extra: ``BatchVecEnv(gymnasium.make_vec(…))``."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
+
+
+class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
+    """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps.
+
+    Rewards are less by `multiplier` times ``info["cost"]``, 0 at first, for constrained learning. At its end an episode's
+    info has what it ``earned`` without that, and the sum of its ``cost``.
+    """
+
+    def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:
+        self.envs, self._repeat, self.multiplier = envs, repeat, 0.0
+        self._earned, self._cost = np.zeros(envs.num_envs), np.zeros(envs.num_envs)
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in each, with the seed that `seed` has set."""
+        first = self._seeds[0]
+        self._earned[:] = self._cost[:] = 0.0
+        self._reset_seeds()
+        return self.envs.reset(seed=first)[0]
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep the actions for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Step all; an info has what Stable-Baselines3 reads at an episode's end."""
+        shown: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        total, over = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
+        for _ in range(self._repeat):
+            observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+            costs = infos.get("final_info", infos)["cost"]
+            # What the action earns in the next episode is nothing that the agent chose there.
+            self._earned += np.where(over, 0.0, rewards)
+            self._cost += np.where(over, 0.0, costs)
+            total += np.where(over, 0.0, rewards - self.multiplier * costs)
+            for i in np.flatnonzero((terminated | truncated) & ~over).tolist():
+                shown[i] = {
+                    "terminal_observation": infos["final_obs"][i],
+                    "TimeLimit.truncated": bool(truncated[i]),
+                    "earned": float(self._earned[i]),
+                    "cost": float(self._cost[i]),
+                }
+            over |= terminated | truncated
+        self._earned[over] = self._cost[over] = 0.0
+        return observations, total, over, shown
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Attribute, the same for each."""
+        return [getattr(self.envs, attr_name)] * len(self._named(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ARG002 - there is one for all
+        """Set an attribute of all."""
+        setattr(self.envs, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method once for all."""
+        return [getattr(self.envs, method_name)(*args, **kwargs)] * len(self._named(indices))
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002 - none is
+        """Whether each is wrapped: it is not."""
+        return [False] * len(self._named(indices))
+
+    def _named(self, indices: Any) -> Sequence[int]:
+        return list(self._get_indices(indices))

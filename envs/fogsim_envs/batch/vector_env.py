@@ -1,0 +1,207 @@
+"""The vector environment."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME
+from fogsim.core.parameters import Range, checked_parameters
+from fogsim.errors import InputError
+from fogsim_envs.actions import checked_action
+from fogsim_envs.batch.beginning_kernels import begin
+from fogsim_envs.batch.drawing import draw_numbers
+from fogsim_envs.batch.drive_kernels import LIMIT, advance
+from fogsim_envs.batch.layout import DRAWN, ENDINGS, TERMS, Episodes, RuleConstants, SurrogateArrays
+from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_space
+from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
+from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
+from fogsim_envs.task.observation import task_space
+from fogsim_envs.task.rewards import TaskWeights
+from fogsim_envs.task.sampling import split_number
+from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable
+
+Infos = dict[str, Any]
+_SPEEDS = np.array([*ADVISED_SPEEDS, np.inf])
+_SHOWN = (
+    "time", "position", "speed", "struck", "ending", "rule_speed", "rule_lamps",
+    "quantile_5", "quantile_50", "quantile_95", "visibility", "visibility_ahead",
+)  # fmt: skip
+_LAMPS = np.array([int(one) for one in LAMP_MODES])
+
+
+@checked_parameters
+class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
+    """Many episodes of ``fogsim/FogAdvisoryFast-v1`` in one kernel, without SUMO: for training.
+
+    Spaces, reward, ``info`` and baselines are those of `FogAdvisoryFastEnv`, and episodes are drawn as there: the same
+    seed gives the same fog, light, script and driver. Traffic is simpler than SUMO's: Krauss' drivers who see only
+    through the fog, of whom the ego alone changes lanes; who leaves the road enters it again. An episode that is over
+    is followed by the next in the same step (`AutoresetMode.SAME_STEP`); ``infos["final_obs"]`` and
+    ``infos["final_info"]`` have its end.
+
+    ### Arguments
+    num_envs : how many episodes at once
+    fog_distribution, scenario_distribution, split, continuous, discrete, reward_weights, surrogate : as in
+        `FogAdvisoryFastEnv`
+    rule : `RuleConstants` of the built-in adviser
+
+    ### Version history
+    * v1: first version
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+    _measured = MEASURED
+
+    def __init__(
+        self,
+        num_envs: Annotated[int, Range(1, 1_000_000)] = 256,
+        *,
+        fog_distribution: FogDistribution | None = None,
+        scenario_distribution: ScenarioDistribution | None = None,
+        split: str = "train",
+        continuous: bool = False,
+        discrete: bool = False,
+        reward_weights: TaskWeights | None = None,
+        surrogate: str | Path | None = None,
+        rule: RuleConstants | None = None,
+    ) -> None:
+        if continuous and discrete:
+            raise InputError("continuous and discrete: expected one of them at most")
+        self.num_envs = num_envs
+        self.single_observation_space = task_space("state", None)
+        self.single_action_space = (
+            spaces.Discrete(int(np.prod(ACTION_LEVELS))) if discrete else action_space(continuous)
+        )
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._split, self._fog = split_number(split), fog_distribution or FAST_FOG
+        self._scenes = scenario_distribution or FAST_SCENARIO
+        weights = reward_weights or TaskWeights()
+        self._weights = np.array([getattr(weights, name) for name in TERMS])
+        table = SurrogateTable.load(self._measured if surrogate is None else Path(surrogate))
+        self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
+        self._rule = rule or RuleConstants()
+        self._episodes = Episodes.empty(num_envs)
+        self._has_begun = False
+
+    @checked_parameters
+    def reset(
+        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], Infos]:
+        """Begin all episodes.
+
+        Parameters
+        ----------
+        seed : int, or sequence of int
+            Seed of each environment; a single one is that of the first, and the others have the following ones.
+        options : None
+            There are none.
+
+        Raises
+        ------
+        InputError
+            If there are options, or not as many seeds as environments.
+        """
+        if options:
+            raise InputError(f"reset(): expected no options, got {sorted(options)}")
+        if seed is not None or not self._has_begun:
+            first = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else seed
+            seeds = range(first, first + self.num_envs) if isinstance(first, int) else first
+            if len(seeds) != self.num_envs:
+                raise InputError(f"seed: expected {self.num_envs} seeds, one for each environment, got {len(seeds)}")
+            self._generators = [gymnasium.utils.seeding.np_random(int(one))[0] for one in seeds]
+        self._has_begun = True
+        self._begin(np.arange(self.num_envs))
+        return self._episodes.state.copy(), self._infos()
+
+    def _begin(self, rows: NDArray[np.int64]) -> None:
+        drawn = (draw_numbers(self._generators[i], self._split, self._scenes, self._fog) for i in rows.tolist())
+        draws = np.array(list(drawn), DRAWN)
+        begin(self._episodes, rows, draws, self._table, self._rule)
+
+    def step(
+        self, actions: Any
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
+        """Let an action be in force in each environment for one decision period.
+
+        Parameters
+        ----------
+        actions : array_like
+            A member of the action space.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            If no episode has begun.
+        InputError
+            If the actions are no member of the action space.
+        """
+        if not self._has_begun:
+            raise gymnasium.error.ResetNeeded("no episode has begun: call reset() before step()")
+        ego = self._episodes.ego
+        ego["advised"], ego["lamps"] = self._commanded(checked_action(actions, self.action_space, type(self).__name__))
+        advance(self._episodes, self._weights, self._table, self._rule)
+        rewards, ending = self._episodes.terms.sum(axis=1), ego["ending"]
+        truncated = ending == ENDINGS.index("time")
+        terminated = (ending > 0) & ~truncated
+        over = np.flatnonzero(ending)
+        if not len(over):
+            return self._episodes.state.copy(), rewards, terminated, truncated, self._infos()
+        final = {"final_obs": self._episodes.state.copy(), "final_info": self._infos()}
+        self._begin(over)
+        mask = terminated | truncated
+        ends = {**final, "_final_obs": mask, "_final_info": mask.copy()}
+        return self._episodes.state.copy(), rewards, terminated, truncated, {**self._infos(), **ends}
+
+    def _commanded(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Advised speed [m/s] and number of the lamp mode of each."""
+        if isinstance(self.single_action_space, spaces.Box):
+            share = np.clip((actions.astype(float) + 1.0) / 2.0, 0.0, 1.0)
+            speed = _SPEEDS[0] + share[:, 0] * (_SPEEDS[-2] - _SPEEDS[0])
+            modes = np.minimum((share[:, 1] * len(LAMP_MODES)).astype(np.int64), len(LAMP_MODES) - 1)
+            return np.where(share[:, 0] == 1.0, np.inf, speed), modes
+        if isinstance(self.single_action_space, spaces.Discrete):
+            level, modes = np.unravel_index(actions, ACTION_LEVELS)
+            return _SPEEDS[level], modes
+        return _SPEEDS[actions[:, 0]], actions[:, 1]
+
+    def _infos(self) -> Infos:
+        """The Fast task's, an array for each number; agents must not use ``truth``."""
+        ego, terms = {name: self._episodes.ego[name].copy() for name in _SHOWN}, self._episodes.terms.copy()
+        needed = ego["speed"] * REACTION_TIME + ego["speed"] ** 2 / (2.0 * DECELERATION)
+        unseen = np.maximum(0.0, 1.0 - ego["visibility_ahead"] / np.maximum(needed, 1e-9))
+        return {
+            "time_s": ego["time"],
+            "route_position_m": ego["position"],
+            "speed_mps": ego["speed"],
+            "speed_limit_mps": np.full(self.num_envs, LIMIT),
+            "fault": np.where(ego["struck"] == 1, "ego", ""),
+            "ending": np.array(ENDINGS)[ego["ending"]],
+            "built_in_advice_mps": ego["rule_speed"],
+            "built_in_lamps": _LAMPS[ego["rule_lamps"]],
+            "belief": {
+                "visibility_m": ego["quantile_50"],
+                "visibility_low_m": ego["quantile_5"],
+                "visibility_high_m": ego["quantile_95"],
+            },
+            "cost": ego["struck"] + unseen,
+            "truth": {"visibility_m": ego["visibility"], "visibility_ahead_m": ego["visibility_ahead"]},
+            "reward_terms": {name: terms[:, i] for i, name in enumerate(TERMS)},
+        }
+
+
+class FogAdvisoryBatchV2Env(FogAdvisoryBatchEnv):
+    """Many episodes of ``fogsim/FogAdvisoryFast-v2`` in one kernel, without SUMO: see `FogAdvisoryBatchEnv`.
+
+    ### Version history
+    * v2: estimates are drawn as those of the estimators for day and night err
+    """
+
+    _measured = MEASURED_2

@@ -85,7 +85,7 @@ def trained(minutes: float, seed: int, cost_limit: float) -> tuple[PPO, list[tup
     )  # fmt: skip
     agent.learn(10**9, callback=clock)
     agent.learning_rate = LAST_RATE  # The file need not hold the clock, and with it all episodes.
-    agent._setup_lr_schedule()  # noqa: SLF001 - it has no public way
+    agent._setup_lr_schedule()
     return agent, clock.curve
 
 

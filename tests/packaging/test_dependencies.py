@@ -22,6 +22,7 @@ OPTIONAL = {
     "osi3": ("osi", "osi-python"),
     "pettingzoo": ("rl", "pettingzoo"),
     "ray": ("ray", "ray"),
+    "stable_baselines3": ("rl", "stable-baselines3"),
 }
 """Imports that only some of the work needs: the extra that brings each along, and the distribution."""
 

@@ -13,8 +13,8 @@ from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
     """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps.
 
-    Rewards are less by `multiplier` times ``info["cost"]``, 0 at first, for constrained learning. At its end an episode's
-    info has what it ``earned`` without that, and the sum of its ``cost``.
+    Rewards are less by `multiplier` times ``info["cost"]``, 0 at first, for constrained learning. The info of an
+    episode's last step has what it ``earned`` without that, and the sum of its ``cost``.
     """
 
     def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:

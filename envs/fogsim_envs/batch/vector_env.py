@@ -57,7 +57,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
-    _measured = MEASURED
+    _measured_errors = MEASURED
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         self._scenes = scenario_distribution or FAST_SCENARIO
         weights = reward_weights or TaskWeights()
         self._weights = np.array([getattr(weights, name) for name in TERMS])
-        table = SurrogateTable.load(self._measured if surrogate is None else Path(surrogate))
+        table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()
         self._episodes = Episodes.empty(num_envs)
@@ -204,4 +204,4 @@ class FogAdvisoryBatchV2Env(FogAdvisoryBatchEnv):
     * v2: estimates are drawn as those of the estimators for day and night err
     """
 
-    _measured = MEASURED_2
+    _measured_errors = MEASURED_2

@@ -60,7 +60,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
-    _measured = MEASURED
+    _measured_errors = MEASURED
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
                 f"{observation!r} and {image_size!r}; fogsim/FogAdvisory-v1 draws frames"
             )
         is_own = is_own_motorway(scenario, scenario_distribution)
-        table = SurrogateTable.load(self._measured if surrogate is None else Path(surrogate))
+        table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,
@@ -137,7 +137,7 @@ class FogAdvisoryFastV2Env(FogAdvisoryFastEnv, FogAdvisoryV2Env):
     * v2: as above
     """
 
-    _measured = MEASURED_2
+    _measured_errors = MEASURED_2
 
 
 def _panel_beside_view_from_above() -> FramePanel:

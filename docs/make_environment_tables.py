@@ -2,13 +2,12 @@
 
 What each baseline is worth:
 
-    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v2 …] [--density]
+    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v2 …]
 
 ``--agent NAME=FILE`` adds a row for an agent of Stable-Baselines3 (a .zip file of its PPO).
 """
 
 import argparse
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import Any
@@ -25,7 +24,6 @@ from fogsim_envs.spaces import action_of
 
 PAGE = "reference/environments.md"
 DISCOUNTS = (1.0, 0.99)
-DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
 CRAWLING = "crawling"
 """Name of 20 km/h always, the least that can be advised: what an agent would do that found standing to pay."""
 
@@ -67,29 +65,17 @@ def _mean_term(found: Evaluation, term: str) -> float:
     return float(np.mean([episode.terms[term] for episode in found.episodes]))
 
 
-def density_rows(env_id: str, episodes: int) -> Iterator[list[str]]:
-    """A row for each baseline, a column for each density."""
-    for name in BASELINES:
-        settings = ([f"demand.same_way_vph={demand!r}"] for demand in DENSITIES)
-        found = [evaluate(name, env_id, seeds=range(episodes), overrides=one) for one in settings]
-        yield [name, *(_interval(one.mean, one.low, one.high) for one in found)]
-
-
 def main() -> None:
     """Write the tables that the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v2", "fogsim/FogAdvisoryFast-v2"])
-    parser.add_argument("--density", action="store_true", help="the table over densities, too")
     parser.add_argument("--agent", action="append", default=[], help="NAME=FILE of an agent of Stable-Baselines3's PPO")
     asked = parser.parse_args()
     agents = {name: path for name, _, path in (one.partition("=") for one in asked.agent)}
     heads = ("policy", "return, γ = 1", "γ = 0.99", "arrived", "struck", "time", "overdriving", "rear lamp", "duration")
     for env_id in asked.ids:
         write_table(PAGE, f"returns {env_id}", lines_of(heads, rows(env_id, asked.episodes, agents)))
-    if asked.density:
-        found = density_rows("fogsim/FogAdvisoryFast-v2", asked.episodes)
-        write_table(PAGE, "densities", lines_of(("policy", *DENSITIES.values()), found))
 
 
 def _loaded(path: str) -> Any:

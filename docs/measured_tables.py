@@ -174,13 +174,12 @@ MEASUREMENTS = (
         "advisory",
         5,
         ("returns fogsim/FogAdvisory-v2",),
-        "fogsim/FogAdvisory-v2 --episodes 30",
+        "fogsim/FogAdvisory-v2 --episodes 12",
         "fogsim/simulation/loop.py",
         cores=2,
     ),
     environment("advisory_fast", 2, ("returns fogsim/FogAdvisoryFast-v2",), "fogsim/FogAdvisoryFast-v2", cores=2),
-    environment("densities", 5, ("densities",), "--density"),
-    benchmark("surrogate", 3, options=" --episodes 90"),
+    benchmark("surrogate", 5, options=" --episodes 30"),
     benchmark("corridor", 6, ("returns fogsim/FogCorridor-v1",), " --episodes 8"),
 )
 """All of them; a round measures the longest first."""

@@ -17,7 +17,7 @@ from fogsim_envs.batch.belief_kernels import update_belief
 from fogsim_envs.batch.layout import CELLS, EPISODE
 from fogsim_envs.infos import row_of
 
-BATCH, FAST = "fogsim/FogAdvisoryBatch-v1", "fogsim/FogAdvisoryFast-v1"
+BATCH, FAST = "fogsim/FogAdvisoryBatch-v2", "fogsim/FogAdvisoryFast-v2"
 
 
 def made(number: int, **arguments: Any) -> gymnasium.vector.VectorEnv:

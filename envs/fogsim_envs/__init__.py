@@ -60,27 +60,27 @@ gymnasium.register(
     id="fogsim/FogAdvisory-v2",
     entry_point="fogsim_envs.task:FogAdvisoryV2Env",
     max_episode_steps=600,
-    reward_threshold=25.0,
+    reward_threshold=29.1,
 )
 
 gymnasium.register(
     id="fogsim/FogAdvisoryFast-v2",
     entry_point="fogsim_envs.task:FogAdvisoryFastV2Env",
     max_episode_steps=520,
-    reward_threshold=21.0,
+    reward_threshold=26.0,
 )
 
 gymnasium.register(
     id="fogsim/FogAdvisoryBatch-v2",
     vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchV2Env",
-    reward_threshold=21.0,
+    reward_threshold=26.0,
 )
 
 gymnasium.register(
     id="fogsim/FogDrive-v2",
     entry_point="fogsim_envs.task:FogDriveV2Env",
     max_episode_steps=600,
-    reward_threshold=25.0,
+    reward_threshold=29.1,
 )
 
 gymnasium.register(

@@ -28,7 +28,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 from fogsim_envs import Evaluation, evaluate
-from fogsim_envs.batch.layout import RuleConstants
+from fogsim_envs.batch import RuleConstants
 from fogsim_envs.batch.stable_baselines import BatchVecEnv
 
 BATCH = "fogsim/FogAdvisoryBatch-v2"

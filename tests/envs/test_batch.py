@@ -13,9 +13,11 @@ from fogsim.errors import InputError
 from fogsim.fusion import GridFilter
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
+from fogsim_envs.batch import RuleConstants
 from fogsim_envs.batch.belief_kernels import update_belief
 from fogsim_envs.batch.layout import CELLS, EPISODE
 from fogsim_envs.infos import row_of
+from fogsim_envs.task import ScenarioDistribution
 
 BATCH, FAST = "fogsim/FogAdvisoryBatch-v2", "fogsim/FogAdvisoryFast-v2"
 
@@ -135,3 +137,7 @@ def test_what_does_not_fit_is_refused() -> None:
         envs.step(np.zeros(2, int))
     with pytest.raises(InputError, match="at most"):
         made(2, continuous=True, discrete=True)
+    with pytest.raises(InputError, match=r"demand: expected at most 1200 vehicles/h"):
+        made(2, scenario_distribution=ScenarioDistribution(demand=(500.0, 2100.0)))
+    with pytest.raises(InputError, match=r"rule\.quantile: expected one of"):
+        made(2, rule=RuleConstants(quantile=0.1))

@@ -22,8 +22,8 @@ CELLS = 160
 LOG_EXTINCTION = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
 """Cells of the belief: the grid filter's, half as fine."""
 
-OTHERS = 16
-"""Other vehicles of an episode at most."""
+OTHERS, MOST_DEMAND = 16, 1200.0
+"""Other vehicles of an episode at most, and the demand that is taken [1/h], for which on SUMO some more are on the road."""
 
 DRIVERS = ("unaffected", "observed", "too_fast", "within_sight")
 """Drivers' choices of speed by number."""
@@ -120,11 +120,29 @@ class SurrogateArrays(NamedTuple):
     persistence: float
 
 
-class RuleConstants(NamedTuple):
-    """Constants of the built-in adviser, those of `StoppingSightDistance`."""
+KNOWN_QUANTILES = (0.05, 0.25, 0.5, 0.75)
+"""Quantiles of the believed visibility by which the built-in adviser can go."""
 
-    quantile: float = 0.25  # Quantile of the believed visibility: one of 0.05, 0.25, 0.5, 0.75, 0.95
-    fallback: float = np.inf  # Speed while the belief says too little [m/s]; inf keeps the advice in force
-    widest: float = 0.7  # Deviation of ln k above which it says too little
-    sight_share: float = 1.0  # Share of the visibility that may be needed to stop
-    hold: float = 3.0  # Time before the advice rises [s]
+
+class RuleConstants(NamedTuple):
+    """Constants of the built-in adviser, those of `fogsim.advice.StoppingSightDistance`.
+
+    Attributes
+    ----------
+    quantile : float
+        Quantile of the believed visibility that counts: 0.05, 0.25, 0.5 or 0.75.
+    fallback : float
+        Speed while the belief says too little [m/s]; inf keeps the advice in force.
+    widest : float
+        Standard deviation of ln k above which the belief says too little [-].
+    sight_share : float
+        Share of the visibility that may be needed to stop [-].
+    hold : float
+        Time before the advice rises [s].
+    """
+
+    quantile: float = 0.25
+    fallback: float = np.inf
+    widest: float = 0.7
+    sight_share: float = 1.0
+    hold: float = 3.0

@@ -18,7 +18,17 @@ from fogsim_envs.actions import checked_action
 from fogsim_envs.batch.beginning_kernels import begin
 from fogsim_envs.batch.drawing import draw_numbers
 from fogsim_envs.batch.drive_kernels import LIMIT, advance
-from fogsim_envs.batch.layout import DRAWN, ENDINGS, TERMS, Episodes, RuleConstants, SurrogateArrays
+from fogsim_envs.batch.layout import (
+    DRAWN,
+    ENDINGS,
+    KNOWN_QUANTILES,
+    MOST_DEMAND,
+    OTHERS,
+    TERMS,
+    Episodes,
+    RuleConstants,
+    SurrogateArrays,
+)
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_space
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
@@ -83,11 +93,18 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._split, self._fog = split_number(split), fog_distribution or FAST_FOG
         self._scenes = scenario_distribution or FAST_SCENARIO
+        if (most := max(self._scenes.demand)) > MOST_DEMAND:
+            raise InputError(
+                f"scenario_distribution.demand: expected at most {MOST_DEMAND:g} vehicles/h, since an episode has at most "
+                f"{OTHERS - 1} vehicles in traffic, got {most:g}; fogsim/FogAdvisoryFast-v2 takes more"
+            )
         weights = reward_weights or TaskWeights()
         self._weights = np.array([getattr(weights, name) for name in TERMS])
         table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()
+        if self._rule.quantile not in KNOWN_QUANTILES:
+            raise InputError(f"rule.quantile: expected one of {KNOWN_QUANTILES}, got {self._rule.quantile!r}")
         self._episodes = Episodes.empty(num_envs)
         self._has_begun = False
 

@@ -23,7 +23,7 @@ LOG_EXTINCTION = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
 """Cells of the belief: the grid filter's, half as fine."""
 
 OTHERS, MOST_DEMAND = 16, 1200.0
-"""Other vehicles of an episode at most, and the demand that is taken [1/h], for which on SUMO some more are on the road."""
+"""Most other vehicles of an episode, and most demand, for which SUMO has some more on the road [1/h]."""
 
 DRIVERS = ("unaffected", "observed", "too_fast", "within_sight")
 """Drivers' choices of speed by number."""

@@ -95,8 +95,8 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         self._scenes = scenario_distribution or FAST_SCENARIO
         if (most := max(self._scenes.demand)) > MOST_DEMAND:
             raise InputError(
-                f"scenario_distribution.demand: expected at most {MOST_DEMAND:g} vehicles/h, since an episode has at most "
-                f"{OTHERS - 1} vehicles in traffic, got {most:g}; fogsim/FogAdvisoryFast-v2 takes more"
+                f"scenario_distribution.demand: expected at most {MOST_DEMAND:g} vehicles/h, since at most "
+                f"{OTHERS - 1} vehicles are in traffic, got {most:g}; fogsim/FogAdvisoryFast-v2 takes more"
             )
         weights = reward_weights or TaskWeights()
         self._weights = np.array([getattr(weights, name) for name in TERMS])

@@ -207,6 +207,6 @@ UNWRITTEN = (
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
     Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
     Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
-    Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_ppo.py`"),
+    Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_agent.py`"),
 )
 """Tables of figures that are written by hand."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import NormalDist
 
 import numpy as np
@@ -20,6 +20,8 @@ OLDEST = 60.0
 
 NO_FOG = 1000.0
 """Visibility from which on there is no fog (WMO) [m]; how clear the air is beyond that changes no decision."""
+
+_LOG_NO_FOG = math.log(extinction_from_visibility(NO_FOG))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +108,8 @@ class Belief:
     denser: DenserFog | None = None
     profile: FogProfile | None = None
     age: float = 0.0
+    # Quantiles that were asked for; for None the deviation that `is_informed` needs. Several decisions ask for the same
+    _known: dict[float | None, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def is_informed(self, widest: float = WIDEST) -> bool:
         """Whether the belief says enough to act on: recent evidence has narrowed it down.
@@ -119,8 +123,10 @@ class Belief:
         """
         if self.age > OLDEST:
             return False
-        in_fog = np.maximum(np.array(self.log_extinction, float), math.log(extinction_from_visibility(NO_FOG)))
-        return _moments(in_fog, np.array(self.probability, float))[1] <= widest
+        if None not in self._known:
+            in_fog = np.maximum(np.array(self.log_extinction, float), _LOG_NO_FOG)
+            self._known[None] = _moments(in_fog, np.array(self.probability, float))[1]
+        return self._known[None] <= widest
 
     def known_visibility(self, share: float, widest: float = WIDEST) -> float | None:
         """Quantile of the visibility to act on [m]; None if the belief says too little: every decision asks here.
@@ -140,7 +146,9 @@ class Belief:
         share : float
             Probability in 0 … 1; 0.05 is a cautious visibility, 0.5 the median.
         """
-        return self.visibility_quantiles((share,))[0]
+        if share not in self._known:
+            self._known[share] = self.visibility_quantiles((share,))[0]
+        return self._known[share]
 
     def visibility_quantiles(self, shares: Sequence[float]) -> tuple[float, ...]:
         """Several of these together, which cost hardly more than one [m].

@@ -42,7 +42,7 @@ KNOWN: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[att
 PARSED_ONLY = ("reproduce", "recover", "compile", "calibrate", "explore")
 """Commands that take minutes or run until interrupted, that need a run that was killed, or that `make test` has run."""
 TRAINS = "stable_baselines3"
-"""What takes a quarter of an hour and an extra: examples/train_ppo.py is that, tried by hand."""
+"""What takes a quarter of an hour and an extra: examples/train_agent.py is that, tried by hand."""
 SERVES = "serve_forever"
 """What runs until it is ended; tests/advice/test_osi_controller.py starts it."""
 TRUTH = "sut.advice={method: stopping_sight_distance, informed_by: truth}"

@@ -85,7 +85,7 @@ def test_episodes_are_those_of_the_fast_task() -> None:
 
 
 def test_the_belief_is_the_grid_filters() -> None:
-    one, belief, scratch = np.zeros(1, EPISODE)[0], np.full(CELLS, 1.0 / CELLS), np.empty(CELLS)
+    one, belief, scratch = np.zeros(1, EPISODE)[0], np.full(CELLS, 1.0 / CELLS), np.empty((2, CELLS))
     theirs, rng, place = GridFilter(), np.random.default_rng(1), 0.0
     for step in range(60):
         k = 0.04 * math.exp(0.2 * rng.standard_normal()) if step < 40 else 0.0

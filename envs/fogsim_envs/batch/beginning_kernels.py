@@ -127,7 +127,7 @@ def begin(
     rule: RuleConstants,
 ) -> None:
     """Begin episodes in some rows (`draws` (rows,) of `DRAWN`)."""
-    scratch = np.empty(CELLS)
+    scratch = np.empty((2, CELLS))
     for r in range(len(rows)):
         i, drawn = rows[r], draws[r]
         one = episodes.ego[i]

@@ -20,6 +20,7 @@ _EXTINCTION = np.exp(LOG_EXTINCTION)
 _IN_FOG = np.maximum(LOG_EXTINCTION, math.log(extinction_from_visibility(NO_FOG)))
 _SHARES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _FADING = math.exp(-_WIDTH / _LEAP_SCALE)
+_FADED = _FADING ** np.arange(1.0, CELLS + 1.0)
 _CLEAR = 3e-5
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -79,7 +80,7 @@ def draw_estimate(one: Any, table: SurrogateArrays) -> None:
 
 @kernel
 def update_belief(one: Any, belief: NDArray[np.float64], scratch: NDArray[np.float64]) -> None:
-    """Let time pass and an estimate count, as `fogsim.fusion.GridFilter` does (`scratch` (CELLS,))."""
+    """Let time pass and an estimate count, as `fogsim.fusion.GridFilter` does (`scratch` (2, CELLS))."""
     if one.time > 0.0:
         moving = min(max(round(10.0 * one.speed / _SLOW) / 10.0, _STILL), 1.0)
         _diffuse(belief, STEP * moving, scratch)
@@ -144,26 +145,27 @@ def _put_quantile(one: Any, place: int, visibility: float) -> None:
 
 @kernel
 def _diffuse(belief: NDArray[np.float64], elapsed: float, scratch: NDArray[np.float64]) -> None:
-    """Random walk and leaps of ln k, reflected at both ends of the grid (`elapsed` [s])."""
+    """Random walk and leaps of ln k, reflected at both ends of the grid (`elapsed` [s], `scratch` (2, CELLS))."""
     kept = math.exp(-_LEAP_RATE * elapsed)
     leaps = (1.0 - kept) * (1.0 - _FADING) / (1.0 + _FADING)
     aside = 0.5 * _DRIFT * _DRIFT * elapsed / (_WIDTH * _WIDTH)
-    # A sum over exponentials to either side is two running sums; what is reflected at the end of one begins the other.
-    forward = 0.0
+    # A sum over exponentials to either side is two running sums, of which the processor makes both at once; what is
+    # reflected at the end of one begins the other.
+    forward = backward = 0.0
     for i in range(CELLS):
-        scratch[i] = _FADING * forward
-        forward = belief[i] + scratch[i]
-    backward = forward
-    for i in range(CELLS - 1, -1, -1):
-        backward = belief[i] + _FADING * backward
-        scratch[i] += backward
-    before, reflected = belief[0], backward
+        last = CELLS - 1 - i
+        scratch[0, i] = _FADING * forward
+        forward = belief[i] + scratch[0, i]
+        backward = belief[last] + _FADING * backward
+        scratch[1, last] = backward
+    backward += _FADED[CELLS - 1] * forward
     for i in range(CELLS):
-        here, after = belief[i], belief[min(i + 1, CELLS - 1)]
-        walked = (1.0 - 2.0 * aside) * here + aside * (before + after)
-        reflected *= _FADING
-        belief[i] = kept * walked + leaps * (scratch[i] + reflected)
-        before = here
+        before, after = belief[max(i - 1, 0)], belief[min(i + 1, CELLS - 1)]
+        walked = (1.0 - 2.0 * aside) * belief[i] + aside * (before + after)
+        reflected = _FADED[i] * backward + _FADED[CELLS - 1 - i] * forward
+        scratch[0, i] = kept * walked + leaps * (scratch[0, i] + scratch[1, i] + reflected)
+    for i in range(CELLS):
+        belief[i] = scratch[0, i]
 
 
 @kernel

@@ -216,10 +216,10 @@ def _lead_speed(one: Any, lead: Any, wanted: float) -> float:
 
 
 @kernel
-def _leader_of(one: Any, others: Any, j: int) -> tuple[float, float]:
+def _leader_of(one: Any, others: Any, number: int, j: int) -> tuple[float, float]:
     """Gap to whom another vehicle follows, the ego included, and the leader's speed [m, m/s]."""
     it, gap, leader_speed = others[j], math.inf, 0.0
-    for k in range(OTHERS):
+    for k in range(number):
         far = others[k].position - it.position
         if k != j and others[k].lane == it.lane and 0.0 <= far - others[k].length < gap and far < _REACH:
             gap, leader_speed = far - others[k].length, others[k].speed
@@ -230,7 +230,7 @@ def _leader_of(one: Any, others: Any, j: int) -> tuple[float, float]:
 
 
 @kernel
-def _other_speed(one: Any, others: Any, j: int, depth: NDArray[np.float64]) -> float:
+def _other_speed(one: Any, others: Any, number: int, j: int, depth: NDArray[np.float64]) -> float:
     """Speed of another vehicle after the step [m/s]."""
     it = others[j]
     desired = it.wanted
@@ -240,7 +240,7 @@ def _other_speed(one: Any, others: Any, j: int, depth: NDArray[np.float64]) -> f
     if j == 0:
         desired = _lead_speed(one, it, desired)
     desired = min(desired, it.speed + it.power * STEP)
-    gap, leader_speed = _leader_of(one, others, j)
+    gap, leader_speed = _leader_of(one, others, number, j)
     if gap < _REACH:
         safe = _followed_speed(it.speed, gap, leader_speed, it.headway, it.braking)
         if safe < desired and _is_seen(one, depth, it.position, gap):
@@ -251,10 +251,13 @@ def _other_speed(one: Any, others: Any, j: int, depth: NDArray[np.float64]) -> f
 @kernel
 def _move_others(one: Any, others: Any, depth: NDArray[np.float64], speeds: NDArray[np.float64]) -> None:
     """Move the other vehicles, each by what it saw before the step; who leaves the road enters it again."""
-    for j in range(OTHERS):
+    number = OTHERS
+    while number > 0 and others[number - 1].length == 0.0:
+        number -= 1
+    for j in range(number):
         if others[j].length > 0.0 and others[j].position <= LENGTH:
-            speeds[j] = _other_speed(one, others, j, depth)
-    for j in range(OTHERS):
+            speeds[j] = _other_speed(one, others, number, j, depth)
+    for j in range(number):
         it = others[j]
         if it.length > 0.0 and it.position <= LENGTH:
             it.speed = speeds[j]
@@ -319,7 +322,7 @@ def perceive(
 @kernel
 def advance(episodes: Episodes, weights: NDArray[np.float64], table: SurrogateArrays, rule: RuleConstants) -> None:
     """Let the advice and lamps of each episode be in force for one decision period (`weights` (9,) [points])."""
-    scratch, speeds = np.empty(CELLS), np.zeros(OTHERS)
+    scratch, speeds = np.empty((2, CELLS)), np.zeros(OTHERS)
     for i in range(len(episodes.ego)):
         one, others, depth = episodes.ego[i], episodes.others[i], episodes.depth[i]
         speed = _ego_speed(one, others, depth)

@@ -86,22 +86,16 @@ _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
 
-_SLACK = 1.15
-"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
-
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
 
-_A_ROAD, _LIKELY_A_ROAD, _SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
-"""Logarithms of the evidence of a road over that of none from which on there is one, it is believed where another
-method has no answer, and against another one's [-]."""
+_A_ROAD, _LIKELY_A_ROAD = math.log(10.0), 10.0
+"""Logarithms of the evidence of a road over that of none from which on there is one, and it counts against another
+method [-]."""
 
-_EVEN_SURFACES, _USUAL_SURFACES, _LEAST_USUAL, _LEAST_SKY = 2, 3, 0.8, 0.5
-"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; the next
-lies in shade; least probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
-
-_CLIPPING = 0.4
-"""Probability that the airlight is not even, where a clipped sky does not show it [-]."""
+_EVEN_SURFACES, _USUAL_SURFACES, _MOSTLY = 2, 3, 0.5
+"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; the next lies in
+shade; and the probability from which on something is likelier than not [-]."""
 
 _DENSEST = 13.5
 """Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
@@ -119,9 +113,6 @@ _LEAST_CONTRAST = 0.08
 _DARK = 6.0 / 255.0
 """Light of the brightest rows below which it is no day, over full scale [-]."""
 
-_MOSTLY_CLIPPED = 0.5
-"""Share of the sky's bins beyond which clipping is a reason [-]."""
-
 DISAGREE = "how the road fades and how its image brightens disagree"
 
 
@@ -137,9 +128,9 @@ class DayVerdict:
     reason: str  # Why it is no answer; empty if it is
     shows_fog: bool  # Whether there surely is fog on a road, however dense
     is_sure: bool  # Whether it counts against another method: a road under a sky, neither hidden nor in shade
-    is_even: bool  # Whether the road is surely one, as even as roads mostly are, and the response may be the stated one
-    # Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
-    # airlight that is not even; 0 where the road is not sure [-]
+    is_even: bool  # Whether the road is as even as roads mostly are, and the response may be the stated one
+    # Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where the
+    # road is not sure [-]
     outside: float
     # doubt, response_deviation: see `DayFit`
     doubt: float
@@ -177,18 +168,16 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
     by_light = fit.lights
     usual = float(fit.surfaces[:_USUAL_SURFACES].sum())
-    outside = max(float(by_light[LIGHTS.is_unusual].sum()), _CLIPPING if fit.clipped > 0.0 else 0.0)
     shows = fit.below(_FOG) > _LEAST_FOG and fit.contrast > _LEAST_CONTRAST
     answers = is_clear or (shows and high < WIDEST * low)
     is_stated = fit.responses[0] > _HARDLY_STATED
-    is_lane = lines >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _LEAST_USUAL and is_stated
+    is_lane = lines >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
     is_road = fit.fog_over_none > _A_ROAD or is_lane
     sky = float(by_light[LIGHTS.sky == 1].sum())
-    is_sky = sky > _LEAST_SKY or fit.clipped > 0.0
-    is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _LEAST_USUAL) or is_lane
+    is_sky = sky > _MOSTLY or fit.clipped > 0.0
+    is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane
     is_sure = is_sure and is_sky and low > _DENSEST
-    even = float(fit.surfaces[:_EVEN_SURFACES].sum())
-    is_even = fit.fog_over_none > _SURELY_A_ROAD and even > _LEAST_USUAL and is_stated
+    is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY and is_stated
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
@@ -198,7 +187,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         shows_fog=shows and is_road,
         is_sure=is_sure,
         is_even=is_even,
-        outside=outside if is_sure and is_even else 0.0,
+        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even else 0.0,
         doubt=fit.doubt,
         response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
         is_road=is_road,
@@ -207,11 +196,11 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
 
 def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     """Why a posterior is no answer."""
-    hidden = sky < _LEAST_SKY or float(fit.surfaces[_USUAL_SURFACES + 1 :].sum()) > _LEAST_SKY
-    wet = float(fit.lights[LIGHTS.is_wet].sum()) > _LEAST_SKY
+    hidden = sky < _MOSTLY or float(fit.surfaces[_USUAL_SURFACES + 1 :].sum()) > _MOSTLY
+    wet = float(fit.lights[LIGHTS.is_wet].sum()) > _MOSTLY
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
-        (fit.clipped > _MOSTLY_CLIPPED, "the sky is clipped, and the airlight not known: expose for the sky"),
+        (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
         (fit.contrast < _LEAST_CONTRAST, "the road is nearly as bright as the airlight, or brighter"),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
@@ -223,16 +212,12 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two intervals of visibility have something in common, or almost (`one`, `other` (float, float) [m])."""
-    return one[0] <= _SLACK * other[1] and other[0] <= _SLACK * one[1]
+    """Whether two intervals of visibility have something in common (`one`, `other` (float, float) [m])."""
+    return one[0] <= other[1] and other[0] <= one[1]
 
 
 _ALIKE = 0.1
 """Difference of ln k up to which two answers are the same [-]."""
-
-_POSSIBLY, _MOSTLY = 0.35, 0.6
-"""Probabilities of a wet road, local tone mapping or a clipped sky from which on an estimate that knows none of them
-does not count against the day model's answer, and against its silence [-]."""
 
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
@@ -291,7 +276,7 @@ class SecondOpinion:
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
-        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
+        self._response = verdict.response_deviation if verdict.is_sure else 0.0
         if own.valid and lines is None:
             # It follows no bend: there it shows what responses change, not how dense the fog is.
             return own
@@ -322,7 +307,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
     middle = own.extinction if keeps else 0.5 * (own.extinction + verdict.extinction)
     if (spanning := _spanning(own, middle, verdict)) is not None:
         return spanning
-    if verdict.outside > _POSSIBLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
+    if verdict.outside > _MOSTLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
         return _of_day(own, verdict)
     if keeps:
         return own

@@ -86,6 +86,9 @@ _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
 
+_SLACK = 1.15
+"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
+
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
 
@@ -212,8 +215,8 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two intervals of visibility have something in common (`one`, `other` (float, float) [m])."""
-    return one[0] <= other[1] and other[0] <= one[1]
+    """Whether two intervals of visibility have something in common, or almost (`one`, `other` (float, float) [m])."""
+    return one[0] <= _SLACK * other[1] and other[0] <= _SLACK * one[1]
 
 
 _ALIKE = 0.1

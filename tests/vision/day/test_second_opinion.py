@@ -43,6 +43,9 @@ def test_an_estimate_that_is_agreed_with_stays_with_the_calibration_in_its_inter
     common = math.hypot(SCALE, 0.1)
     assert found.common_deviation == pytest.approx(common)
     assert found.standard_deviation == pytest.approx(math.hypot(0.0015, 0.03 * common))
+    assert said(OWN, replace(AGREES, response_deviation=0.1, is_even=False))[0] == found
+    unsure, _ = said(OWN, replace(AGREES, response_deviation=0.1, is_sure=False))
+    assert unsure.common_deviation == pytest.approx(SCALE)
 
 
 def test_in_a_drive_it_is_looked_at_again_from_time_to_time(said):

@@ -6,6 +6,8 @@ the same process, so that what else the machine does slows both: their ratio hol
 another scenario is one after an episode with other options (``--other``); it goes back and forth between the two.
 Workers are processes; their ratio is two workers' steps a second over one's.
 
+An id that makes vectors only is one of 256 environments, whose steps are counted each, and whose resets are by one.
+
     python benchmarks/environments.py [--json] [--env ID …] [--kwargs JSON] [--steps 100] [--repeat 3] [--resets 5]
                                       [--other JSON] [--no-workers]
 """
@@ -25,8 +27,10 @@ from harness import Row, parse_options, publish
 import fogsim_envs  # noqa: F401 - registers the environments
 
 PEER_ID = "highway-fast-v0"
+BATCH = 256
 
 Env = gymnasium.Env[Any, Any]
+Vector = gymnasium.vector.VectorEnv[Any, Any, Any]
 
 
 def middle(space: spaces.Space[Any]) -> Any:
@@ -49,8 +53,8 @@ def camera_of(space: spaces.Space[Any]) -> str:
     return "none" if not sizes else f"{sizes[0][1]}x{sizes[0][0]}"
 
 
-def steps_per_second(env: Env, steps: int, action: Any) -> tuple[float, float]:
-    """Steps a second by the clock and by the processor's time, resets not counted."""
+def steps_per_second(env: Env | Vector, steps: int, action: Any) -> tuple[float, float]:
+    """Steps a second by the clock and by the processor's time, resets not counted but in a vector."""
     env.reset(seed=1)
     spent = worked = 0.0
     for _ in range(steps):
@@ -58,12 +62,13 @@ def steps_per_second(env: Env, steps: int, action: Any) -> tuple[float, float]:
         *_, terminated, truncated, _ = env.step(action)
         spent += time.perf_counter() - started
         worked += time.process_time() - begun
-        if terminated or truncated:
+        if not isinstance(env, gymnasium.vector.VectorEnv) and (terminated or truncated):
             env.reset()
-    return steps / spent, steps / worked
+    number = steps * getattr(env, "num_envs", 1)
+    return number / spent, number / worked
 
 
-def reset_ms(env: Env, options: list[dict[str, Any] | None], repeat: int) -> float:
+def reset_ms(env: Env | Vector, options: list[dict[str, Any] | None], repeat: int) -> float:
     """Time of a reset with each of some options in turn, the first ones not counted [ms]."""
     times = []
     for number in range(repeat + 1):
@@ -71,7 +76,7 @@ def reset_ms(env: Env, options: list[dict[str, Any] | None], repeat: int) -> flo
             started = time.perf_counter()
             env.reset(seed=number, options=option)
             times.append(1e3 * (time.perf_counter() - started))
-    return round(statistics.median(times[len(options) :]), 2)
+    return round(statistics.median(times[len(options) :]) / getattr(env, "num_envs", 1), 3)
 
 
 def worker_ratio(env_id: str, kwargs: dict[str, Any], steps: int, action: Any, repeat: int) -> float:
@@ -98,7 +103,12 @@ def worker_ratio(env_id: str, kwargs: dict[str, Any], steps: int, action: Any, r
 
 def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> Row:
     """One record for one environment."""
-    env: Env = gymnasium.make(env_id, **arguments.kwargs)
+    is_batch = gymnasium.spec(env_id).entry_point is None
+    env: Env | Vector = (
+        gymnasium.make_vec(env_id, BATCH, **arguments.kwargs)
+        if is_batch
+        else gymnasium.make(env_id, **arguments.kwargs)
+    )
     action, peer_action = middle(env.action_space), middle(peer.action_space)
     own, peers = [], []
     for _ in range(arguments.repeat):
@@ -117,10 +127,12 @@ def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> Row:
         "peer_steps_per_s": round(statistics.median(peers), 2),
         "ratio": round(statistics.median(a / b for (a, _), b in zip(own, peers, strict=True)), 3),
         "reset_ms": reset_ms(env, [None], arguments.resets),
-        "reset_other_ms": reset_ms(env, [None, arguments.other], arguments.resets) if arguments.other else None,
+        "reset_other_ms": reset_ms(env, [None, arguments.other], arguments.resets)
+        if arguments.other and not is_batch
+        else None,
     }
     env.close()
-    if not arguments.no_workers:
+    if not (arguments.no_workers or is_batch):
         record["worker_ratio"] = worker_ratio(env_id, arguments.kwargs, arguments.steps, action, arguments.repeat)
     return record
 

@@ -2,6 +2,7 @@
 
 Each shipped scenario runs once (its first case), and its frame at the most telling moment is kept: the one that MOMENTS
 has, otherwise a second after the first thing that its script does, at its first collision, or where the least is seen.
+Of those in LOOPS all frames within `AROUND` of it are kept, as a moving picture.
 Without names all are drawn (some minutes); ``--table`` writes the table alone.
 """
 
@@ -14,6 +15,7 @@ from PIL import Image
 
 import fogsim
 from fogsim.recorders.panel.camera_picture import scale_image, shown_image
+from fogsim.values import Step
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "pictures" / "gallery"
@@ -23,7 +25,7 @@ MOMENTS: dict[str, float] = {
     "camera_blackout": 6.8,
     "city_fog": 12.0,
     "cut_in_at_15_m": 6.8,
-    "emergency_brake_in_fog": 9.4,
+    "emergency_brake_in_fog": 11.4,
     "highway_99_corridor": 41.0,
     "motorcycle_at_dusk": 15.0,
     "patchy_fog": 35.4,
@@ -33,33 +35,51 @@ MOMENTS: dict[str, float] = {
     "single_lane_behind_truck": 22.4,
     "stopped_queue_behind_curve": 37.0,
     "tail_lamp_failure": 18.4,
-    "tunnel_exit_into_fog": 17.0,
+    "tunnel_exit_into_fog": 17.4,
+    "unsignalised_crossing": 14.5,
 }
 """Time of the picture of a scenario whose telling moment is another [s]."""
+
+LOOPS = {
+    "camera_blackout", "cut_in_at_15_m", "emergency_brake_in_fog", "motorcycle_at_dusk", "pedestrian_crossing_fog",
+    "ramp_merge", "stopped_queue_behind_curve", "tail_lamp_failure", "tunnel_exit_into_fog", "unsignalised_crossing",
+}  # fmt: skip
+AROUND = 2.5
+"""Time before and after its moment that a moving picture shows [s]."""
 
 BEGIN, END = "<!-- table: gallery -->", "<!-- end of table -->"
 
 
-def telling_frame(name: str) -> Image.Image:
-    """Frame of a scenario at its most telling moment."""
-    scenario, best = fogsim.load_scenario(name), None
+def telling_frames(name: str) -> list[Image.Image]:
+    """Frame of a scenario at its most telling moment, or those about it."""
+    scenario = fogsim.load_scenario(name)
     if scenario.renderer == "none":
         scenario = fogsim.load_scenario(name, ["renderer=auto", "estimators=[joint_road]"])
-    wanted, least = MOMENTS.get(name), float("inf")
-    begun: float | None = None
+    around, moment = (AROUND if name in LOOPS else 0.0), MOMENTS.get(name)
+    steps: list[Step] = []
     for step in fogsim.run(scenario, seed=0):
-        if begun is None and (step.begun or step.collisions):
-            begun = step.time + (0.0 if step.collisions else 1.0)
-        moment = begun if wanted is None else wanted
-        if moment is not None:
-            best = step
-            if step.time >= moment:
-                break
-        elif step.time >= 1.0 and step.truth.visibility_ahead < least:
-            best, least = step, step.truth.visibility_ahead
-        elif best is None:
-            best = step
-    return scale_image(shown_image(best.observation), *SIZE)
+        steps.append(step)
+        if moment is None and (step.begun or step.collisions):
+            moment = step.time + (0.0 if step.collisions else 1.0)
+        if moment is not None and step.time >= moment + around:
+            break
+    if moment is None:
+        moment = min(steps[1:], key=lambda one: (one.time < 1.0, one.truth.visibility_ahead)).time
+    shown = [one for one in steps if abs(one.time - moment) <= around] or [steps[-1]]
+    return [scale_image(shown_image(one.observation), *SIZE).convert("RGB") for one in shown]
+
+
+def picture_of(name: str) -> Path:
+    """File of the picture of a scenario."""
+    return PICTURES / f"{name}.{'webp' if name in LOOPS else 'jpg'}"
+
+
+def draw(name: str) -> None:
+    """Draw the picture of a scenario."""
+    first, *others = telling_frames(name)
+    duration = 2e3 * AROUND / max(len(others), 1)
+    more = {"save_all": True, "append_images": others, "duration": round(duration), "loop": 0}
+    first.save(picture_of(name), quality=60 if others else 80, **(more if others else {}))
 
 
 def table() -> str:
@@ -67,7 +87,8 @@ def table() -> str:
     rows = ["| | scenario |", "|---|---|"]
     for name in fogsim.catalogue():
         scenario = fogsim.load_scenario(name)
-        picture = f"![{name}](pictures/gallery/{name}.jpg)" if (PICTURES / f"{name}.jpg").is_file() else ""
+        file = picture_of(name)
+        picture = f"![{name}](pictures/gallery/{file.name})" if file.is_file() else ""
         expected = ", ".join(f"`{one}`" for one in scenario.expect)
         told = f"**[{name}](../scenarios/{name}/README.md)**: {' '.join(scenario.description.split())}"
         rows.append(f"| {picture} | {told}{f' Expects {expected}.' if expected else ''} |")
@@ -89,9 +110,8 @@ def main() -> None:
     warnings.simplefilter("ignore")
     PICTURES.mkdir(exist_ok=True)
     for name in () if arguments.table else arguments.names or fogsim.catalogue():
-        picture = telling_frame(name)
-        picture.convert("RGB").save(PICTURES / f"{name}.jpg", quality=80)
-        sys.stdout.write(f"{name}: {picture.width} × {picture.height}\n")
+        draw(name)
+        sys.stdout.write(f"{picture_of(name).name}: {picture_of(name).stat().st_size / 1e6:.2f} MB\n")
     PAGE.write_text(page(), encoding="utf-8")
 
 

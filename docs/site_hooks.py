@@ -110,11 +110,11 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 def with_picture(markdown: str, scenario: str) -> str:
     """Put the gallery's picture of a scenario below the title of its page, if there is one."""
-    picture = f"docs/pictures/gallery/{scenario}.jpg"
-    if not (ROOT / picture).is_file():
+    pictures = sorted((ROOT / "docs" / "pictures" / "gallery").glob(f"{scenario}.*"))
+    if not pictures:
         return markdown
     title, _, rest = markdown.partition("\n")
-    return f"{title}\n\n![What the ego's camera sees](../../{picture})\n{rest}"
+    return f"{title}\n\n![What the ego's camera sees](../../docs/pictures/gallery/{pictures[0].name})\n{rest}"
 
 
 def led_to_pages(text: str, folder: str, place: str) -> str:

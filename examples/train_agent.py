@@ -179,6 +179,7 @@ def trained(asked: argparse.Namespace, seed: int) -> tuple[BaseAlgorithm, list[t
     agent.learn(MOST, callback=clock)
     agent.learning_rate = LAST_RATE  # The file need not hold the clock, and with it all episodes.
     agent._setup_lr_schedule()
+    scaled.close()  # A process runs one task on SUMO; a second one would be in another, whose time is not counted.
     return agent, clock.curve
 
 

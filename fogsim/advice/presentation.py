@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
+import numpy as np
+
 from fogsim.core.parameters import Range
 from fogsim.values import Belief, FogProfile, SpeedAdvice
 from fogsim.values.belief import OLDEST, WIDEST
@@ -125,10 +127,10 @@ class PresentedAdviser(ABC):
         """Speed that a visibility here asks for, and denser fog ahead [m/s]."""
         speed = self.speed_at(visibility)
         if profile is not None:
-            for distance in profile.distance[profile.distance > 0.0].tolist():
-                visibility_there = profile.known_visibility(distance, self.quantile, self.widest_belief)
-                if visibility_there is None:
-                    continue
+            known = profile.known_visibilities(self.quantile, self.widest_belief)
+            is_ahead = (profile.distance > 0.0) & ~np.isnan(known)
+            places = zip(profile.distance[is_ahead].tolist(), known[is_ahead].tolist(), strict=True)
+            for distance, visibility_there in places:
                 there = self.speed_at(visibility_there)
                 # v² = v_there² + 2 a (d − v T)
                 lost = self.slowing * self.lead_time

@@ -94,6 +94,6 @@ def _likely_visibilities(belief: Belief, reach: float) -> Iterator[float]:
         yield seen
     if belief.profile is None or belief.age > OLDEST:
         return
-    for distance in belief.profile.distance.tolist():
-        if 0.0 <= distance <= reach and (there := belief.profile.known_visibility(distance, _LIKELY)) is not None:
-            yield there
+    distances = belief.profile.distance
+    # Where it is not known it is NaN, which is less than nothing.
+    yield from belief.profile.known_visibilities(_LIKELY)[(distances >= 0.0) & (distances <= reach)].tolist()

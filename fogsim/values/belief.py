@@ -84,6 +84,18 @@ class FogProfile:
             return None
         return OPTICAL_DEPTH_AT_VISIBILITY * math.exp(NormalDist().inv_cdf(share) * deviation - mean)
 
+    def known_visibilities(self, share: float, widest: float = WIDEST) -> NDArray[np.float64]:
+        """Quantiles of the visibility at all its places to act on [m]; NaN where the profile says too little.
+
+        Parameters
+        ----------
+        share, widest : float
+            See `known_visibility`.
+        """
+        deviate = NormalDist().inv_cdf(share)
+        visibilities = OPTICAL_DEPTH_AT_VISIBILITY * np.exp(deviate * self.standard_deviation - self.log_extinction)
+        return np.where(self.standard_deviation > widest, np.nan, visibilities)
+
 
 @dataclass(frozen=True, slots=True)
 class Belief:

@@ -97,6 +97,10 @@ class Camera:
         for name in ("width", "height", "bits"):
             object.__setattr__(self, name, int(getattr(self, name)))
 
+    def __hash__(self) -> int:
+        """Of the numbers in which cameras mostly differ: what is remembered by camera is looked up for each frame."""
+        return hash((self.width, self.focal_length, self.pitch))
+
     def _check_kinds(self) -> None:
         """Take a response by its name and any pair of numbers for the principal point."""
         try:

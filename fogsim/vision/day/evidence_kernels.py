@@ -11,7 +11,6 @@ from fogsim.vision.day.row_kernels import (
     AIRLIGHT,
     COLUMNS,
     COMMON,
-    DARKENING,
     FARTHEST,
     OTHER_SKY,
     ROAD,
@@ -325,7 +324,7 @@ def _of_lights(
     room: Factor, out: Floats,
 ) -> None:  # fmt: skip
     """Evidence of one response and surface under each light, and of a road that ends at a cut (`out` (m,))."""
-    many, last, before = laws.number.size, rows.cuts.size - 1, -1.0
+    many, last, before = laws.number.size, rows.cuts.size - 1, -1
     gram = grams[last] + sky_gram
     for j in range(out.size):
         cut, which = (last, j) if j < many else (j - many, 0)
@@ -334,9 +333,9 @@ def _of_lights(
         used = laws.used[which, : laws.number[which]]
         law = Law(laws.mean[response, which], laws.deviation[response, which], used)
         least = rows.least_airlight[response] if law.deviation[OTHER_SKY] == 0.0 else 0.0
-        # What lights have in common is factored once.
-        first = COMMON if j < many and law.mean[DARKENING] == before else 0
-        before = law.mean[DARKENING]
+        # What lights of the same means have in common is factored once.
+        is_alike = before >= 0 and j < many and np.array_equal(law.mean, laws.mean[response, before])
+        first, before = COMMON if is_alike else 0, which
         out[j] = rows.free[cut] + evidence(gram, halves[cut] + sky_half, law, least, first, room)
 
 

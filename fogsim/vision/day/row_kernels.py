@@ -180,8 +180,8 @@ def _lights() -> Lights:
     rows = []
     for darkening, likely in ((False, 0.45), (True, 0.55)):
         rows += [
-            (darkening, False, 1, False, likely * 0.68),
-            (darkening, True, 1, False, likely * 0.12),
+            (darkening, False, 1, False, likely * 0.76),
+            (darkening, True, 1, False, likely * 0.04),
             (darkening, False, 0, False, likely * 0.15),
             (darkening, False, 1, True, likely * 0.05),
         ]
@@ -196,7 +196,7 @@ def _lights() -> Lights:
         if not sky:
             deviation[i, OTHER_SKY] = _AIRLIGHT_DEVIATION
         if wet:
-            deviation[i, WET] = 0.5
+            mean[i, WET], deviation[i, WET] = 0.5, 0.5
         if tone:
             deviation[i, _TONE], deviation[i, _NEAR_TONE] = 0.12, 0.06
     return Lights(

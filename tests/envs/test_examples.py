@@ -12,6 +12,7 @@ OF_THE_EXTRAS = (
     "onnx",
     "stable_baselines3",
     "stable_baselines3.common",
+    "stable_baselines3.common.base_class",
     "stable_baselines3.common.callbacks",
     "stable_baselines3.common.vec_env",
     "torch",

@@ -149,7 +149,7 @@ def _diffuse(belief: NDArray[np.float64], elapsed: float, scratch: NDArray[np.fl
     kept = math.exp(-_LEAP_RATE * elapsed)
     leaps = (1.0 - kept) * (1.0 - _FADING) / (1.0 + _FADING)
     aside = 0.5 * _DRIFT * _DRIFT * elapsed / (_WIDTH * _WIDTH)
-    # A sum over exponentials to either side is two running sums, of which the processor makes both at once; what is
+    # A sum over exponentials to either side is two running sums, which the processor makes both at once; what is
     # reflected at the end of one begins the other.
     forward = backward = 0.0
     for i in range(CELLS):

@@ -95,5 +95,5 @@ def _likely_visibilities(belief: Belief, reach: float) -> Iterator[float]:
     if belief.profile is None or belief.age > OLDEST:
         return
     distances = belief.profile.distance
-    # Where it is not known it is NaN, which is less than nothing.
+    # NaN, where too little is known, is below no distance.
     yield from belief.profile.known_visibilities(_LIKELY)[(distances >= 0.0) & (distances <= reach)].tolist()

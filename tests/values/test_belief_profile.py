@@ -20,3 +20,11 @@ def test_quantiles_are_those_of_a_normal_distribution_of_ln_k():
     low, high = (PROFILE.visibility_quantile(0.0, share) for share in (0.05, 0.95))
     assert low == pytest.approx(OPTICAL_DEPTH_AT_VISIBILITY / 0.02 * math.exp(-1.6448536 * 0.2))
     assert low * high == pytest.approx((OPTICAL_DEPTH_AT_VISIBILITY / 0.02) ** 2)
+
+
+def test_all_places_together_have_what_each_has_by_itself():
+    known = PROFILE.known_visibilities(0.25, 0.3)
+    one_by_one = [PROFILE.known_visibility(distance, 0.25, 0.3) for distance in PROFILE.distance.tolist()]
+    assert one_by_one[2] is None
+    assert np.isnan(known[2])
+    assert known[:2].tolist() == pytest.approx(one_by_one[:2], rel=1e-12)

@@ -310,11 +310,8 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
     middle = own.extinction if keeps else 0.5 * (own.extinction + verdict.extinction)
     if (spanning := _spanning(own, middle, verdict)) is not None:
         return spanning
-    if verdict.outside > _MOSTLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
-        return _of_day(own, verdict)
-    if keeps:
-        return own
-    return refused(own, DISAGREE)
+    # A vehicle that no sensor reports darkens far road as a wet one that mirrors the sky does: neither answer counts.
+    return own if keeps else refused(own, DISAGREE)
 
 
 def _are_alike(own: Estimate, verdict: DayVerdict) -> bool:

@@ -39,7 +39,15 @@ CLOSEST: Column = ("minimum_time_to_collision_s", "least time to collision of th
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
     "message_sign": SIGNS,
-    "motorway_policies": SIGNS,
+    "motorway_policies": (OVERDRIVEN, CONFLICTS, DELAY),
+    "highway_99": (
+        ("traffic_collisions", "collisions a run", 1.0, 2),
+        ("ego_collisions", "of the ego", 1.0, 2),
+        ("traffic_conflicts_per_vehicle_h", "conflicts per vehicle-hour", 1.0, 1),
+        OVERDRIVEN,
+        EGO,
+        CLOSEST,
+    ),
     "estimators_in_the_loop": (
         ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
         ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
@@ -87,6 +95,9 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
+SPREAD: Mapping[str, str] = {"motorway_policies": "visibility"}
+"""Studies with a table for each metric, and the factor whose levels are its columns."""
+
 FIGURES: Mapping[str, Sequence[str]] = {
     "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road")
 }
@@ -112,6 +123,19 @@ def table(folder: Path, columns: Sequence[Column]) -> list[Cells]:
     return [(*factors, *(name for _, name, _, _ in columns)), *rows]
 
 
+def spread(rows: Sequence[Cells], factor: str, factors: int) -> list[Cells]:
+    """A table of one metric with a column for each level of a factor (`factors`: how many columns are factors)."""
+    heading, *cells = rows
+    at = heading.index(factor)
+    levels = list(dict.fromkeys(cell[at] for cell in cells))
+    found: dict[Cells, dict[str, str]] = {}
+    for cell in cells:
+        others = (*cell[:at], *cell[at + 1 : factors])
+        found.setdefault(others, {})[cell[at]] = cell[factors]
+    names = (*heading[:at], *heading[at + 1 : factors])
+    return [(*names, *levels), *((*others, *(one[level] for level in levels)) for others, one in found.items())]
+
+
 def _cell(runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: Column) -> str:
     metric, _, factor, digits = column
     values = [factor * float(run[metric]) for run in runs if run.get(metric)]
@@ -132,8 +156,14 @@ def main() -> None:
     for folder in parser.parse_args().folders:
         if folder.name not in COLUMNS:
             parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
-        heading, *rows = table(folder, COLUMNS[folder.name])
-        write_table(PAGES.get(folder.name, PAGE), folder.name, lines_of(heading, rows))
+        page = PAGES.get(folder.name, PAGE)
+        if folder.name not in SPREAD:
+            heading, *rows = table(folder, COLUMNS[folder.name])
+            write_table(page, folder.name, lines_of(heading, rows))
+        for column in COLUMNS[folder.name] if folder.name in SPREAD else ():
+            one = table(folder, (column,))
+            heading, *rows = spread(one, SPREAD[folder.name], len(one[0]) - 1)
+            write_table(page, f"{folder.name}: {column[1]}", lines_of(heading, rows))
         for name in FIGURES.get(folder.name, ()):
             shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
 

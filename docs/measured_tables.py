@@ -45,13 +45,13 @@ def benchmark(
     return Measurement(name, commands, minutes, (f"benchmarks/{name}.py",), tables, times, cores)
 
 
-def study(name: str, minutes: float) -> Measurement:
+def study(name: str, minutes: float, tables: tuple[str, ...] = ()) -> Measurement:
     """A study of scenarios/studies."""
     file, folder = f"scenarios/studies/{name}.yaml", f"runs/tables/{name}"
     commands = (f"fogsim study {file} -j 2 --out {folder}", f"python docs/make_study_tables.py {folder}")
     rests_on = (file, "fogsim/cli/study.py", "docs/make_study_tables.py")
     rests_on = (*rests_on, *SIMULATIONS.get(name, ()))
-    return Measurement(name, commands, minutes, rests_on, cores=2, is_study=True)
+    return Measurement(name, commands, minutes, rests_on, tables, cores=2, is_study=True)
 
 
 def paper(name: str, minutes: float, *more: str, module: str = "", times: str = "") -> Measurement:
@@ -83,6 +83,10 @@ ACCURACY_KEPT = " --keep runs/tables/estimator_accuracy.kept"
 WARNINGS_KEPT = " --keep runs/tables/driver_warnings.kept"
 TARGETS_KEPT = " --keep runs/tables/estimator_targets.kept"
 
+POLICIES = tuple(
+    f"motorway_policies: {metric}"
+    for metric in ("overdriven in fog [m per vehicle-km]", "conflicts per 100 vehicles", "delay [s per vehicle]")
+)
 NIGHT = ("directions", "veils", "gallen2014", "lobes", "lamps", "glows", "limits")
 DEVIATIONS = "benchmarks/night_deviations.py"
 AIRLIGHT = "fogsim/reproduce/airlight/__init__.py"
@@ -117,6 +121,7 @@ MEASUREMENTS = (
         times="ms",
     ),
     benchmark("frames", 2, times="all"),
+    benchmark("growth", 4, times="all"),
     benchmark("photograph_roads", 1, ("photographs",)),
     benchmark("camera_kinds", 3, ("camera kinds",), " --images 5"),
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
@@ -163,7 +168,8 @@ MEASUREMENTS = (
         "surroundings", ("python docs/make_airlight_tables.py",), 0.1, (PHOTONS, "docs/make_airlight_tables.py")
     ),
     study("message_sign", 2),  # 80 runs of 2.5 s on one core
-    study("motorway_policies", 15),  # 600 runs of 3 s
+    study("motorway_policies", 40, POLICIES),  # 1280 runs of 3.5 s
+    study("highway_99", 8),  # 100 runs of 9 s
     study("field_sizes", 10),  # 160 runs of 7 s
     study("which_sensor", 9),  # 140 runs of 4 to 12 s
     study("who_tells_of_the_bank", 7),  # 70 runs of 6 to 27 s

@@ -3,8 +3,8 @@
 Cameras stand every 60 m along the routes of three shipped scenarios, and each takes one image per seed: with other
 traffic, trees and noise. For each road and fog: images, share of them that are reported, median and 95th percentile of
 the error of V_met [%], and how often its 90 % interval held the truth, which is the mean extinction of the stretch from
-the camera on in whose middle a report is. Then come dusk, and the bank of highway_99_corridor itself: 60 m between 500
-and 1700 m, 1 km elsewhere. The time is that of drawing, taking and reading an image by day [ms].
+the camera on in whose middle a report is. Then come dusk, and the bank of highway_99_corridor itself: 60 m between
+1500 and 2700 m, 1 km elsewhere. The time is that of drawing, taking and reading an image by day [ms].
 
 Mount, view and position of the cameras were chosen on ``motorway_fog_bank``, which is not among the roads.
 

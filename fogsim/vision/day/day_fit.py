@@ -11,7 +11,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.day.evidence_kernels import evidence_grid
-from fogsim.vision.day.row_data import RowBins, curves_of, read_rows, row_bins
+from fogsim.vision.day.row_data import RowBins, curves_of, free_depth, read_rows, row_bins
 from fogsim.vision.day.row_kernels import (
     AIRLIGHT,
     COLUMNS,
@@ -123,6 +123,7 @@ def fit_day(
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
+    free = min(free, free_depth(pixels, bins, camera, horizon.row))
     if math.isfinite(free):
         bins = _without_vehicle(bins, camera, horizon.row, free)
         if int((bins.first > horizon.row).sum()) < _FEWEST_BINS:

@@ -178,6 +178,76 @@ def _bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int,
         out[2, i] = seen[count - 1 - tail] - seen[tail]
 
 
+_MIDDLE, _SIDE, _SIDE_END = 0.6, 1.3, 2.6
+"""Half the width of the middle of the own lane, and where its sides begin and end, from its axis [m]."""
+
+_MOST_APART, _STANDS = 10.0 / 255.0, 1.5 / 255.0
+"""Difference of signals between middle and sides that counts at most, and mean one of what stands in the lane [-]."""
+
+_TALLEST, _BEFORE, _FEWEST = 1.3, 4, 2
+"""Height up to which it is looked at [m], bins of free road before it, and fewest bins that show it."""
+
+
+@kernel
+def _apart(image: NDArray[Any], row: int, scale: float, axis: float, channel: int) -> float:
+    """How much the middle of the own lane differs from the side that it is more like [pixel values].
+
+    Takes `image` (rows, cols, channels) uint8, `scale` [px/m], `axis` [px].
+    """
+    values, medians = np.empty(_MOST_COLUMNS), np.empty(3)
+    spans = ((-_MIDDLE, _MIDDLE), (-_SIDE_END, -_SIDE), (_SIDE, _SIDE_END))
+    for part in range(3):
+        left, right = axis + spans[part][0] * scale, axis + spans[part][1] * scale
+        left, right = max(left, 0.0), min(right, image.shape[1] - 1.0)
+        if right < left:
+            return 0.0
+        count = min(int(right - left) + 1, _MOST_COLUMNS)
+        for b in range(count):
+            values[b] = image[row, even_column(b, count, left - 0.5, right + 0.5), channel]
+        medians[part] = np.median(values[:count])
+    return float(min(abs(medians[0] - medians[1]), abs(medians[0] - medians[2])))
+
+
+@kernel
+def _obstacle_foot(
+    image: NDArray[Any], bins: RowBins, mount_height: float, place: tuple[float, float], full: float
+) -> float:
+    """Row in which something begins that stands in the own lane and is unlike the road on both sides; NaN if none.
+
+    Takes `image` (rows, cols, channels) uint8, `mount_height` [m], `place`: the axis' column and the horizon's row
+    [px], `full` [pixel values].
+    """
+    axis, horizon = place
+    sky = np.searchsorted(bins.first, horizon, "right")
+    count = bins.first.size - sky
+    rows, apart = np.empty(count), np.empty(count)
+    for i in range(count):
+        rows[i] = (bins.first[sky + i] + bins.last[sky + i]) // 2
+        scale = (rows[i] - horizon) / mount_height
+        apart[i] = min(_apart(image, int(rows[i]), scale, axis, image.shape[2] // 2), _MOST_APART * full)
+    most, foot = _STANDS * full, np.nan
+    for i in range(_FEWEST + 1, count - _BEFORE + 1):
+        end = float(bins.first[sky + i])
+        stands, number = 0.0, 0
+        for j in range(i):
+            if mount_height * (end - rows[j]) < _TALLEST * (end - horizon):
+                stands += apart[j]
+                number += 1
+        if number >= _FEWEST and stands / number - apart[i : i + _BEFORE].mean() > most:
+            most, foot = stands / number - apart[i : i + _BEFORE].mean(), end
+    return foot
+
+
+def free_depth(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float) -> float:
+    """Depth up to which nothing stands in the own lane that is unlike the road on both sides [m].
+
+    Takes `image` (rows, cols, channels) uint8, `horizon` [px].
+    """
+    place = (camera.principal_point[0], horizon)
+    foot = _obstacle_foot(image, bins, camera.mount_height, place, 2.0**camera.bits - 1.0)
+    return math.inf if math.isnan(foot) else camera.row_distance / (foot - horizon)
+
+
 _NOISE, _OF_SCATTER, _OF_SLOPE = 0.45 / 255.0, 0.25, 0.15
 """Noise of a bin's signal: of full scale, of its pixels' scatter, and of its change by row [-]."""
 

@@ -7,11 +7,14 @@ the baseline; a star says that 0 is not in it and that the paired test has p ≤
 
 import argparse
 import csv
+import math
 import shutil
 import statistics
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import matplotlib as mpl
+from matplotlib.figure import Figure
 from page_tables import ROOT, lines_of, write_table
 
 DOCS = ROOT / "docs"
@@ -149,6 +152,37 @@ def _cell(runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | Non
     return f"{told} [{low:+.{digits}f}, {high:+.{digits}f}]{star}"
 
 
+def charts(folder: Path, columns: Sequence[Column]) -> None:
+    """Draw the metrics of every policy by visibility, by day and by night."""
+    runs = read(folder / "study.csv")
+    levels = {name: list(dict.fromkeys(run[name] for run in runs)) for name in ("policy", "visibility", "light")}
+    figure = Figure(figsize=(8.0, 2.6 * len(columns)), layout="constrained")
+    axes = figure.subplots(len(columns), 2, sharex=True, sharey="row")
+    for row, (metric, name, factor, _) in zip(axes, columns, strict=True):
+        for axis, light in zip(row, levels["light"], strict=True):
+            for number, policy in enumerate(levels["policy"]):
+                places = [i + 0.08 * (number - 3.5) for i in range(len(levels["visibility"]))]
+                means, errors = zip(
+                    *(_mean(runs, metric, factor, policy, v, light) for v in levels["visibility"]), strict=True
+                )
+                axis.errorbar(places, means, errors, fmt="o", ms=3.5, lw=1.0, color=f"C{number}", label=policy)
+            axis.set_xticks(range(len(levels["visibility"])), levels["visibility"])
+            axis.set_title(f"{name[0].upper()}{name[1:]}, by {light}", fontsize=8.5)
+            axis.set_ylim(bottom=0.0)
+            axis.spines[["top", "right"]].set_visible(False)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    with mpl.rc_context({"svg.hashsalt": folder.name}):
+        figure.savefig(DOCS / "pictures" / f"{folder.name}.svg", metadata={"Date": None})
+
+
+def _mean(runs: Sequence[Mapping[str, str]], metric: str, factor: float, *cell: str) -> tuple[float, float]:
+    """Mean over the seeds of a cell, and half its 95 % interval."""
+    inside = [factor * float(run[metric]) for run in runs if (run["policy"], run["visibility"], run["light"]) == cell]
+    half = 1.96 * statistics.stdev(inside) / math.sqrt(len(inside)) if len(inside) > 1 else 0.0
+    return statistics.fmean(inside), half
+
+
 def main() -> None:
     """Write the tables and copy the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -164,6 +198,8 @@ def main() -> None:
             one = table(folder, (column,))
             heading, *rows = spread(one, SPREAD[folder.name], len(one[0]) - 1)
             write_table(page, f"{folder.name}: {column[1]}", lines_of(heading, rows))
+        if folder.name in SPREAD:
+            charts(folder, COLUMNS[folder.name])
         for name in FIGURES.get(folder.name, ()):
             shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
 

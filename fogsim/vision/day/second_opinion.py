@@ -204,7 +204,7 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
         (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
-        (fit.contrast < _LEAST_CONTRAST, "the road is nearly as bright as the airlight, or brighter"),
+        (fit.contrast < _LEAST_CONTRAST, "far road is hardly brighter: there is little fog, or a road as bright as it"),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
         (wet, "the road may be wet: it mirrors the sky as fog would veil it"),

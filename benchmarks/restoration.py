@@ -18,7 +18,7 @@ Methods: ``foggy``, the picture as it is; ``planar`` with the extinction that jo
 camera, places); pool 1 is what is reported.
 
     OMP_NUM_THREADS=1 python benchmarks/restoration.py [--json] [--docs] [--pool 1] [--step 0.1] [--vehicles 3]
-        [--visibilities 60 …] [--picture docs/pictures/restoration.png]
+        [--visibilities 60 …] [--picture docs/pictures/restoration.jpg]
 """
 
 import argparse

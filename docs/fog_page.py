@@ -330,7 +330,7 @@ def glare() -> Figure:
     show(
         first,
         photograph(Shot("", (NIGHT, fog("300")), vehicles=coming), size=SIZE).image,
-        "high beams come, V_met 300 m",
+        "oncoming high beams, V_met 300 m",
     )
     angle = np.geomspace(1.0, 30.0, 60)
     for age, colour in zip((25.0, 50.0, 70.0), COLOURS, strict=False):
@@ -344,11 +344,9 @@ def glare() -> Figure:
         for candela, name, colour in ((500.0, "low", COLOURS[0]), (20_000.0, "high", COLOURS[1])):
             seen = [sight_against(candela, float(d), visibility) for d in apart]
             known = "clear" if math.isinf(visibility) else f"V_met {visibility:g} m"
-            third.plot(apart, seen, style, color=colour, label=f"{name} beams come, {known}")
+            third.plot(apart, seen, style, color=colour, label=f"{name}, {known}")
     third.set(xlabel="distance of the oncoming car [m]", ylabel="distance where VL = 7 [m]", ylim=(0, 42))
-    third.legend(
-        ncols=2, fontsize=6.5, loc="upper center", columnspacing=1.0, handlelength=1.5, bbox_to_anchor=(0.5, 1.03)
-    )
+    third.legend(ncols=3, title="oncoming beams", fontsize=6.5, title_fontsize=7, loc="upper center", columnspacing=1.0)
     return figure
 
 

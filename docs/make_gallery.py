@@ -36,7 +36,7 @@ MOMENTS: dict[str, float] = {
     "stopped_queue_behind_curve": 37.0,
     "tail_lamp_failure": 18.4,
     "tunnel_exit_into_fog": 17.4,
-    "unsignalised_crossing": 14.5,
+    "unsignalised_crossing": 14.6,
 }
 """Time of the picture of a scenario whose telling moment is another [s]."""
 

@@ -93,7 +93,8 @@ def shrunk(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def visibilities() -> Image.Image:
     """Six visibilities."""
-    seen = ((f"V_met {one} m".replace("inf", "∞"), step_at(one, index).observation.image) for one, index in SEEN)
+    titles = {"inf": "clear air"}
+    seen = ((titles.get(one, f"V_met {one} m"), step_at(one, index).observation.image) for one, index in SEEN)
     return sheet([(title, shrunk(image)) for title, image in seen], 3)
 
 

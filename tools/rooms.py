@@ -35,6 +35,11 @@ MOST_ROOMS = 6
 
 WIDTH, MARGIN, GAP, LINE, FLOOR = 1160, 20, 14, 15, 30
 BOX = 176
+LANES = 40
+"""Space to the right of the stages' frame, for arrows past it."""
+
+Span = tuple[float, float, float, float]
+"""Middle, width, top and bottom of what is drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +163,7 @@ def draw(rooms: dict[str, Room], floors: list[list[str]]) -> str:
     """SVG of the rooms, floor by floor, and of their direct arrows."""
     ground = next(number for number, floor in enumerate(floors) if FOUNDATIONS in floor)
     drawn = floors[:ground]
-    boxes: dict[str, tuple[float, float, float, float]] = {}
+    boxes: dict[str, Span] = {}
     shapes: list[str] = []
     top = float(MARGIN)
     for number, floor in enumerate(drawn):
@@ -183,18 +188,19 @@ def draw(rooms: dict[str, Room], floors: list[list[str]]) -> str:
     lines = ["foundations, on which all stand", " · ".join(names)]
     shapes.append(_box(MARGIN / 2, top, WIDTH - MARGIN, 12.0 + LINE * len(lines), lines, "#e9e9e9"))
     total = top + 12.0 + LINE * len(lines) + MARGIN
-    arrows = [_arrow(boxes[start], boxes[end]) for start, end in direct_arrows(rooms, drawn)]
+    blocks = list(boxes.values())
+    arrows = [_arrow(boxes[start], boxes[end], blocks) for start, end in direct_arrows(rooms, drawn)]
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {total:.0f}" font-family="sans-serif" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH + LANES} {total:.0f}" font-family="sans-serif" '
         f'font-size="11"><defs><marker id="head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" '
         f'markerHeight="7" orient="auto"><path d="M0 0 8 4 0 8z" fill="#56718c"/></marker></defs>'
-        f'<rect width="{WIDTH}" height="{total:.0f}" fill="white"/>'
+        f'<rect width="{WIDTH + LANES}" height="{total:.0f}" fill="white"/>'
     )
     return "\n".join([head, *shapes, *arrows, "</svg>", ""])
 
 
 def _caption(room: Room) -> list[str]:
-    return [room.name, *textwrap.wrap(room.purpose.replace("`", ""), 27), *textwrap.wrap(" · ".join(room.parts), 27)]
+    return [room.name, *textwrap.wrap(room.purpose.replace("`", ""), 25), *textwrap.wrap(" · ".join(room.parts), 25)]
 
 
 def _box(left: float, top: float, width: float, height: float, lines: list[str], colour: str) -> str:
@@ -210,18 +216,26 @@ def _box(left: float, top: float, width: float, height: float, lines: list[str],
     )
 
 
-def _arrow(start: tuple[float, float, float, float], end: tuple[float, float, float, float]) -> str:
-    """Straight down where the one is above the other, else down and to the nearer side, past the rooms between."""
-    (x, width, _, y), (x_end, width_end, top, bottom) = start, end
-    if abs(x_end - x) + width / 2 <= width_end / 2:
-        way = f"M{x:.0f} {y:.0f}V{top:.0f}"
-    elif top - y < 3 * FLOOR:
-        bend = (top - y) / 2
+def _arrow(start: Span, end: Span, blocks: list[Span]) -> str:
+    """From floor to floor straight down or in a bend; past other floors along a free lane, which then blocks others."""
+    (x, width, _, y), (x_end, width_end, top, _) = start, end
+    if top - y < 3 * FLOOR:
+        bend, x_end = (top - y) / 2, x if abs(x_end - x) + width / 2 <= width_end / 2 else x_end
         way = f"M{x:.0f} {y:.0f}C{x:.0f} {y + bend:.0f} {x_end:.0f} {top - bend:.0f} {x_end:.0f} {top:.0f}"
     else:
-        side = x_end + (width_end / 2 if x > x_end else -width_end / 2)
-        way = f"M{x:.0f} {y:.0f}V{(top + bottom) / 2:.0f}H{side:.0f}"
+        reach, reach_end = width / 2 - GAP, width_end / 2 - GAP
+        free = [at for at in range(MARGIN, WIDTH + LANES) if not _is_blocked(at, y, top, blocks)]
+        lane = min(free, key=lambda at: abs(at - x) + abs(at - x_end))
+        x, x_end = min(max(lane, x - reach), x + reach), min(max(lane, x_end - reach_end), x_end + reach_end)
+        way = f"M{x:.0f} {y:.0f}v{GAP}H{lane}V{top - GAP:.0f}H{x_end:.0f}v{GAP}"
+        blocks.append((lane, GAP, y, top))
     return f'<path d="{way}" fill="none" stroke="#56718c" stroke-width="1.3" marker-end="url(#head)"/>'
+
+
+def _is_blocked(lane: float, y: float, y_end: float, blocks: Iterable[Span]) -> bool:
+    return any(
+        abs(lane - middle) < width / 2 + 6 and top < y_end and bottom > y for middle, width, top, bottom in blocks
+    )
 
 
 def main() -> None:

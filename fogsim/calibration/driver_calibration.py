@@ -21,7 +21,7 @@ from scipy import optimize, stats
 
 from fogsim.core.files.readers import number_in_text, read_text
 from fogsim.core.linear_algebra import inverse_of, matrix_product
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE, Surroundings
 from fogsim.traffic.drivers.sight import DriverSight, leader_reach
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE, ObservedSpeed
@@ -106,6 +106,11 @@ def read_passages(path: Path) -> Passages:
                 f"{path}:1: expected columns visibility_m and either speed_kmh or speed_mps, and if known headway_s "
                 f"and session; got {', '.join(names) or 'none'}"
             )
+        for optional in ("headway_s", "session"):
+            # A column of the user's own is left out, but not one that was meant.
+            meant = [one for one in names if one.casefold().startswith(optional.removesuffix("_s"))]
+            if meant and optional not in meant:
+                raise InputError(f"{path}:1: column {shown(meant[0])}: did you mean {optional!r}?")
         for row in rows:
             where = f"{path}:{rows.line_num}"
             speed = number_in_text(where, speeds[0], row[speeds[0]] or "", 0.1, 500.0) / _SPEEDS[speeds[0]]

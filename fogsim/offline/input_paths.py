@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fogsim.errors import InputError, suggest
+from fogsim.core.files.readers import nearest_file
+from fogsim.errors import InputError
 from fogsim.offline.source import Animation, ImageFiles, Source
 from fogsim.offline.video_source import VideoFile
 
@@ -87,15 +88,7 @@ def _paths(given: str) -> list[Path]:
         if not found:
             raise InputError(f"{given}: no file fits this pattern")
         return found
-    raise InputError(f"{given}: there is no such file or folder{_nearest(path)}")
-
-
-def _nearest(path: Path) -> str:
-    """The nearest file name in the folder, if one is near."""
-    if not path.parent.is_dir():
-        return ""
-    suggestion = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
-    return f"; {suggestion.partition('?')[0]}?" if "?" in suggestion else ""
+    raise InputError(f"{given}: there is no such file or folder{nearest_file(path)}")
 
 
 def _ordered(paths: Iterable[Path]) -> list[Path]:

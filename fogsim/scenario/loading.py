@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from fogsim.core.files.readers import nearest_file
 from fogsim.core.parameters import checked_parameters
 from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
@@ -54,7 +55,7 @@ def scenario_file(name_or_path: str | Path) -> Path:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     if path.suffix in {".yaml", ".yml", ".xosc"} or len(path.parts) > 1:
-        raise InputError(f"{name_or_path}: there is no such scenario file")
+        raise InputError(f"{name_or_path}: there is no such scenario file{nearest_file(path)}")
     raise UnknownNameError("scenario", str(name_or_path), known)
 
 

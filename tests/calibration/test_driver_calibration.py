@@ -100,6 +100,7 @@ def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
         ("visibility,speed\n", "expected columns visibility_m and either speed_kmh or speed_mps"),
         ("visibility_m,speed_kmh\n60,fast\n", "data.csv:2.*speed_kmh"),
         ("visibility_m,speed_kmh,session\n60,80,a\n60,80,\n", "data.csv:3: session is empty"),
+        ("visibility_m,speed_kmh,headway\n60,80,2\n", "data.csv:1: column 'headway': did you mean 'headway_s'"),
         ("visibility_m,speed_kmh\n60,80\n", "at least 30 vehicles in fog .* got 1"),
     ]:
         (tmp_path / "data.csv").write_text(text)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
 from fogsim.recorders.panel.camera_picture import draw_camera_picture, scale_image
-from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
+from fogsim.recorders.panel.strip_chart import TITLE, Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, GROUND, TRUTH
 from fogsim.values import Collision, Command, DenserFog, DriverWarning, Ending, FogProfile, Frame, Lamp, Leader, Step
 from tests.recorders.synthetic import drive, estimate, make_step
@@ -118,17 +118,25 @@ def test_a_long_run_scrolls() -> None:
 
 
 def test_a_curve_stands_at_its_value_and_parts_where_it_is_missing() -> None:
-    chart = StripChart((130, 106), Axis(0.0, 100.0, ()), (Curve((255, 0, 0), (0,)),), "")
+    chart = StripChart((130, 119), Axis(0.0, 100.0, ()), (Curve((255, 0, 0), (0,)),), "")
     for second in range(61):
         chart.add(float(second), (75.0 if second < 20 or second > 40 else None,))
     pixels = np.asarray(chart.draw())
     red = (pixels == (255, 0, 0)).all(axis=-1)
     rows, columns = np.nonzero(red)
-    assert abs(rows.mean() - (106 - 3 - 75)) < 1.5
+    assert abs(rows.mean() - (119 - 3 - 75)) < 1.5
     assert not red[:, 40:60].any()
     assert red[:, 10].any()
     assert red[:, 95].any()
     assert columns.max() < 100
+
+
+def test_no_curve_crosses_the_title() -> None:
+    chart = StripChart((130, 119), Axis(0.0, 100.0, ()), (Curve((255, 0, 0), (0,)),), "title")
+    for second in range(61):
+        chart.add(float(second), (1e6,))
+    rows, _ = np.nonzero((np.asarray(chart.draw()) == (255, 0, 0)).all(axis=-1))
+    assert TITLE - 2 <= rows.min() <= TITLE
 
 
 def test_a_logarithmic_axis_has_equal_ratios_at_equal_distances_and_ends() -> None:

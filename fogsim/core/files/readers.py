@@ -1,5 +1,6 @@
 """Reading untrusted files: regular files only, of limited size, with one error for all faults."""
 
+import itertools
 import json
 import math
 import os
@@ -8,7 +9,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fogsim.errors import InputError, shown, suggest
+from fogsim.errors import InputError, nearest, shown, suggest
 
 MAPS = "FOGSIM_MAPS"
 """Environment variable with the user's folder of maps."""
@@ -61,9 +62,27 @@ def open_regular(path: Path) -> BufferedReader:
         os.close(descriptor)
     except ValueError as error:  # a NUL in the name
         raise InputError(f"{shown(str(path))}: {error}") from None
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}{nearest_file(path)}") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     raise InputError(f"{path}: cannot be read: not a regular file")
+
+
+_MOST_NAMES = 1000
+"""Files of a folder among which the nearest name is searched."""
+
+
+def nearest_file(path: Path) -> str:
+    """End of a message about a missing file: the nearest name in its folder, or the missing folder."""
+    try:
+        names = sorted(one.name for one in itertools.islice(path.parent.iterdir(), _MOST_NAMES))
+    except FileNotFoundError:
+        return f"; there is no folder {shown(str(path.parent))}"
+    except (OSError, ValueError):  # ValueError: a NUL in the name
+        return ""
+    near = nearest(path.name, names)
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def read_bytes(path: Path, most: int = _MOST_BYTES) -> bytes:

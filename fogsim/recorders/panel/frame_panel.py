@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders.panel import camera_picture
 from fogsim.recorders.panel.camera_picture import draw_camera_picture
-from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
+from fogsim.recorders.panel.strip_chart import TITLE, Axis, Curve, StripChart
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.style import (
     ADVICE,
@@ -66,7 +66,9 @@ def _draw_profile(
     for tick in axis.ticks:
         draw.line([(0, _up(tick, axis, height)), (width, _up(tick, axis, height))], fill=LINE, width=_OVERSAMPLING)
     draw.polygon(points(believed, 0.05) + points(believed, 0.95)[::-1], fill=BELIEF_BAND)
-    draw.line([(_across(0.0, width), 0), (_across(0.0, width), height)], fill=TEXT, width=_OVERSAMPLING)
+    draw.line(
+        [(_across(0.0, width), TITLE * _OVERSAMPLING), (_across(0.0, width), height)], fill=TEXT, width=_OVERSAMPLING
+    )
     draw.line(points(believed, 0.5), fill=BELIEF, width=2 * _OVERSAMPLING)
     if true is not None and true.distance.size > 1:
         told = points(true, 0.5)
@@ -91,8 +93,8 @@ def _across(distance: float, width: int) -> float:
 
 
 def _up(visibility: float, axis: Axis, height: int) -> float:
-    margin = 3 * _OVERSAMPLING
-    return height - margin - axis.height(visibility) * (height - 2 * margin)
+    margin, title = 3 * _OVERSAMPLING, TITLE * _OVERSAMPLING
+    return height - margin - axis.height(visibility) * (height - margin - title)
 
 
 _PANEL_WIDTH = 384
@@ -244,7 +246,8 @@ def _draw_background() -> Image.Image:
 
 def _draw_banner(draw: ImageDraw.ImageDraw, top: int, text: str, colour: Colour) -> None:
     draw.rectangle([(0, top), (camera_picture.WIDTH, top + 34)], fill=colour)
-    draw.text((camera_picture.WIDTH / 2, top + 17), text, fill=TEXT, font=font(15, bold=True), anchor="mm")
+    written = GROUND if colour == AMBER else TEXT
+    draw.text((camera_picture.WIDTH / 2, top + 17), text, fill=written, font=font(15, bold=True), anchor="mm")
 
 
 def _draw_speeds(draw: ImageDraw.ImageDraw, step: Step) -> None:

@@ -18,6 +18,9 @@ _SPACING = 0.25
 _GUTTER = 30
 """Space for the numbers to the right of the curves [px]."""
 
+TITLE = 16
+"""Space for the title above the curves [px]."""
+
 _OVERSAMPLING = 2
 """Curves are drawn this much larger and shrunk, since Pillow's own lines are jagged."""
 
@@ -135,5 +138,5 @@ class StripChart:
         return self._size[0] * (1.0 - (now - time) / _WINDOW)
 
     def _y(self, value: float) -> float:
-        margin = 3 * _OVERSAMPLING
-        return self._size[1] - margin - self._axis.height(value) * (self._size[1] - 2 * margin)
+        margin, title = 3 * _OVERSAMPLING, TITLE * _OVERSAMPLING
+        return self._size[1] - margin - self._axis.height(value) * (self._size[1] - margin - title)

@@ -84,7 +84,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     deadline = time.monotonic() + 120
     while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
         time.sleep(0.1)
-    time.sleep(1.0)
+    time.sleep(0.3)
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does: every process of the terminal's group
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
@@ -97,7 +97,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     table = parquet.read_table(out / "steps.parquet")
     assert 0 < table.num_rows < 2001
     assert table.schema.metadata[b"fogsim.complete"] == b"false"
-    assert imageio.imread(out / "video.mp4", plugin="FFMPEG", index=0).ndim == 3
+    assert len(imageio.imread(out / "video.mp4", plugin="FFMPEG")) == table.num_rows
     assert "PARTIAL" in (out / "report.html").read_text(encoding="utf-8")
 
 

@@ -4,6 +4,7 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
 from numba.core import codegen
 
 import fogsim.core.jit  # noqa: F401 - lets numba use LinkedLibrary
@@ -60,6 +61,7 @@ def test_what_one_process_compiled_the_next_one_loads_until_a_source_that_is_cal
         assert ask(tmp_path)[0] == answer
 
 
+@pytest.mark.nightly
 def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path: Path) -> None:
     module = tmp_path / "renamed.py"
     text = (

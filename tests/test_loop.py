@@ -178,8 +178,11 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
 
 
 def test_importing_starts_no_sumo_and_no_gl() -> None:
+    """Nor do runs load a reader of scenario files."""
     code = (
-        "import sys, fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop; "
+        "import sys, fogsim.simulation.plugin, fogsim.simulation.recording\n"
+        "assert not {'fogsim.scenario', 'pydantic'} & set(sys.modules)\n"
+        "import fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop\n"
         "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
     )
     run_python("-c", code)

@@ -20,7 +20,7 @@ CAMERAS = "sensors.reports.roadside={camera: {}, first_m: 300, every_m: 400, per
 
 
 def drive(*settings: str, seed: int = 1) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, "duration_s=1", *settings]), seed))
+    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, "duration_s=0.4", *settings]), seed))
 
 
 def reported(steps: list[Step]) -> list[FogReport]:

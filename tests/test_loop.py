@@ -121,17 +121,6 @@ def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_
     assert last.command.advice.speed < 110 / 3.6
 
 
-def test_estimators_never_see_the_truth(foggy: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Deleting the truth from every step changes no estimate, belief or command."""
-    monkeypatch.setattr("fogsim.simulation.ego.equipment.fog_truth", lambda *_: None)
-    blind = list(fogsim.run(small("fog.visibility_m=60"), seed=1))
-    for a, b in zip(foggy, blind, strict=True):
-        assert b.truth is None
-        assert [e.extinction for e in a.estimates] == [e.extinction for e in b.estimates]
-        assert np.array_equal(a.belief.probability, b.belief.probability)
-        assert a.command == b.command
-
-
 def test_a_vehicle_knows_which_of_its_lamps_are_switched_on(foggy: list[Step]) -> None:
     first, *_, last = foggy
     assert first.observation.lamps == Lamp.POSITION | Lamp.LOW_BEAM
@@ -189,8 +178,11 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
 
 
 def test_importing_starts_no_sumo_and_no_gl() -> None:
+    """Nor do runs load a reader of scenario files."""
     code = (
-        "import sys, fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop; "
+        "import sys, fogsim.simulation.plugin, fogsim.simulation.recording\n"
+        "assert not {'fogsim.scenario', 'pydantic'} & set(sys.modules)\n"
+        "import fogsim, fogsim_envs, fogsim.render, fogsim.scene, fogsim.simulation.loop\n"
         "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
     )
     run_python("-c", code)

@@ -46,13 +46,14 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             ("--seeds", "1", "--minutes", "2", "--visibility", "20"),
             {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},
         ),
-        (
+        pytest.param(
             "sign_detector.py",
             (
                 *("--pictures", "painted", "--kinds", "stop", "--visibilities", "100"),
                 *("--distances", "20", "40", "--draws", "1", "--frames", "0"),
             ),
             {"pictures", "kind", "operating_range_m", "recall_half_pct", "false_alarms_with", "false_alarms_without"},
+            marks=SLOW,
         ),
         (
             "metrics.py",
@@ -74,10 +75,11 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"error", "method", "visibility", "marks", "valid_share", "median_pct", "median_size_pct", "p95_size_pct"},
             marks=SLOW,
         ),
-        (
+        pytest.param(
             "lead_accuracy.py",
             ("--cameras", "1", "--vehicles", "1", "--step", "10", "--methods", "huang2015_lead"),
             {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
+            marks=SLOW,
         ),
         pytest.param(
             "restoration.py",

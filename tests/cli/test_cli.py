@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
 import imageio.v3 as imageio
 import pytest
 import typer
@@ -84,7 +85,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     deadline = time.monotonic() + 120
     while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
         time.sleep(0.1)
-    time.sleep(1.0)
+    time.sleep(0.3)
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does: every process of the terminal's group
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
@@ -98,6 +99,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     assert 0 < table.num_rows < 2001
     assert table.schema.metadata[b"fogsim.complete"] == b"false"
     assert imageio.imread(out / "video.mp4", plugin="FFMPEG", index=0).ndim == 3
+    assert cv2.VideoCapture(str(out / "video.mp4")).get(cv2.CAP_PROP_FRAME_COUNT) == table.num_rows
     assert "PARTIAL" in (out / "report.html").read_text(encoding="utf-8")
 
 

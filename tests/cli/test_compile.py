@@ -22,6 +22,7 @@ for kind in (np.float32, np.float64, np.int64):
 """
 
 
+@pytest.mark.nightly
 def test_a_first_run_says_once_that_it_compiles(tmp_path: Path) -> None:
     """On stderr, since stdout is for results; a process that finds everything compiled says nothing."""
     told = []

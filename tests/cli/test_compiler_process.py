@@ -101,16 +101,14 @@ def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(t
 def test_the_other_process_ends_where_no_scenario_comes_or_nothing_is_to_compile_and_with_an_interrupted_run(
     tmp_path: Path,
 ) -> None:
-    assert run(UNTOLD + NO_METHODS + FAIL, tmp_path) == ["1", "True", "2", "True", "3", "True"]
+    """Where no process can be started, a run compiles alone."""
+    said = run(UNTOLD + NO_METHODS + FAIL + NO_ROOM, tmp_path)
+    assert said == ["1", "True", "2", "True", "3", "True", "alone"]
 
 
 @pytest.mark.nightly
 def test_where_the_other_process_dies_a_run_compiles_alone(tmp_path: Path) -> None:
     assert run(DEAD, tmp_path) == ["4"]
-
-
-def test_where_there_is_no_room_for_it_a_run_compiles_alone(tmp_path: Path) -> None:
-    assert run(NO_ROOM, tmp_path) == ["alone"]
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks a process up in /proc")

@@ -25,15 +25,18 @@ def twice(x):
 """
 
 ASK = """
-import sys
+import importlib, sys
 from pathlib import Path
 from fogsim.core.compiling import shipped_code
-shipped_code.PACKAGE, shipped_code.FOLDER = Path("package").resolve(), Path("shipped").resolve()
-sys.path.insert(0, "package/part")
-from doubling import twice
 from fogsim.core.jit import is_kept
-kept = is_kept(twice)
-print(twice(10.0), kept, sum(twice.stats.cache_hits.values()))
+for folder in map(Path, sys.argv[1:] or ["."]):
+    shipped_code.PACKAGE, shipped_code.FOLDER = (folder / "package").resolve(), (folder / "shipped").resolve()
+    sys.path[0] = str(shipped_code.PACKAGE / "part")
+    sys.modules.pop("doubling", None)
+    importlib.invalidate_caches()
+    twice = importlib.import_module("doubling").twice
+    kept = is_kept(twice)
+    print(twice(10.0), kept, sum(twice.stats.cache_hits.values()))
 """
 
 COMPILED_FOR = compiled_for()
@@ -42,11 +45,11 @@ pytestmark = pytest.mark.skipif(COMPILED_FOR is None, reason="none are shipped f
 Ask = Callable[..., list[str]]
 
 
-def asked(folder: Path, environment: dict[str, str]) -> list[str]:
+def asked(folder: Path, environment: dict[str, str], *folders: str) -> list[str]:
     path = os.pathsep.join(path for path in sys.path if path)
     # Bytecode would be taken for that of a source of the same size written within a second.
     told = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": path, **environment}
-    return run_python("-c", ASK, cwd=folder, environment=told).stdout.split()
+    return run_python("-c", ASK, *folders, cwd=folder, environment=told).stdout.split()
 
 
 @pytest.fixture(scope="module")
@@ -91,25 +94,23 @@ def test_what_came_is_taken_where_nothing_can_be_kept(ask: Ask, tmp_path: Path) 
     assert ask(HOME=str(file), XDG_CACHE_HOME=str(file)) == ["20.0", "True", "1"]
 
 
-def test_a_changed_source_is_compiled(ask: Ask, tmp_path: Path) -> None:
-    (tmp_path / "package" / "part" / "doubling.py").write_text(SOURCE.format(factor=3.0))
-    assert ask()[0] == "30.0"
+def test_a_changed_source_is_compiled_and_a_damaged_file_is_as_none(shipped: Path, tmp_path: Path) -> None:
+    for name in ("changed", "nbc", "nbi"):
+        shutil.copytree(shipped, tmp_path / name)
+        for file in (tmp_path / name / "shipped").rglob(f"*.{name}"):
+            file.write_bytes(file.read_bytes()[:100])
+    (tmp_path / "changed" / "package" / "part" / "doubling.py").write_text(SOURCE.format(factor=3.0))
+    said = asked(tmp_path, {}, "changed", "nbc", "nbi")
+    assert said[::3] == ["30.0", "20.0", "20.0"]
+    assert said[2::3] == ["0", "0", "0"]
+    assert all(kept(tmp_path / name) for name in ("changed", "nbc", "nbi"))
+
+
+def test_who_tells_numba_how_to_compile_is_obeyed(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ask(NUMBA_CPU_NAME="generic") == ["20.0", "False", "0"]
     assert kept(tmp_path)
-
-
-@pytest.mark.parametrize("variable", [{"NUMBA_CPU_NAME": "generic"}, {"NUMBA_BOUNDSCHECK": "1"}])
-def test_who_tells_numba_how_to_compile_is_obeyed(ask: Ask, tmp_path: Path, variable: dict[str, str]) -> None:
-    assert ask(**variable) == ["20.0", "False", "0"]
-    assert kept(tmp_path)
-
-
-@pytest.mark.parametrize("suffix", ["nbc", "nbi"])
-def test_a_damaged_file_is_as_none(ask: Ask, tmp_path: Path, suffix: str) -> None:
-    (file,) = (tmp_path / "shipped").rglob(f"*.{suffix}")
-    file.write_bytes(file.read_bytes()[:100])
-    answer, _, hits = ask()
-    assert (answer, hits) == ("20.0", "0")
-    assert kept(tmp_path)
+    monkeypatch.setattr(shipped_code.config, "BOUNDSCHECK", 1)
+    assert usable_kind.__wrapped__() is None
 
 
 def test_an_older_processor_compiles_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:

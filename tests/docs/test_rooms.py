@@ -5,6 +5,8 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from tests.helpers.command import run_script
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -18,6 +20,7 @@ CONSTANTS_ONLY = CHECKOUT / "fogsim" / "render" / "shading" / "surfaces.py"
 """Kernels that take numbers of surfaces and of lamps' sides from where values define them."""
 
 
+@pytest.mark.nightly
 def test_the_drawing_is_of_today() -> None:
     done = run_script(CHECKOUT / "tools" / "rooms.py", "--check")
     assert done.returncode == 0, done.stderr

@@ -20,15 +20,15 @@ CAMERAS = "sensors.reports.roadside={camera: {}, first_m: 300, every_m: 400, per
 
 
 def drive(*settings: str, seed: int = 1) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, "duration_s=1", *settings]), seed))
+    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, "duration_s=0.4", *settings]), seed))
 
 
 def reported(steps: list[Step]) -> list[FogReport]:
     return [report for step in steps for report in step.observation.reports]
 
 
-@pytest.mark.parametrize("visibility", [60.0, 200.0])
-def test_they_report_the_fog_that_their_images_show(visibility: float) -> None:
+def test_they_report_the_fog_that_their_images_show() -> None:
+    visibility = 200.0
     steps = drive(f"fog.visibility_m={visibility}", CAMERAS)
     found = reported(steps)
     true = extinction_from_visibility(visibility)
@@ -42,7 +42,7 @@ def test_they_report_the_fog_that_their_images_show(visibility: float) -> None:
 
 
 def test_they_report_in_their_beats_and_the_first_image_was_reported_before_the_run() -> None:
-    steps = drive("fog.visibility_m=100", CAMERAS, "duration_s=3")
+    steps = drive("fog.visibility_m=100", CAMERAS, "duration_s=2.3")
     assert {one.time for one in steps[0].observation.reports} == {-0.5}
     first = [one for one in reported(steps) if one.source == "sensor 1"]
     assert [one.number for one in first] == list(range(first[0].number, first[0].number + len(first)))

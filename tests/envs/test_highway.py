@@ -32,7 +32,7 @@ def env() -> Iterator[gymnasium.Env[Any, Any]]:
     made.close()
 
 
-@pytest.mark.parametrize("continuous", [False, True])
+@pytest.mark.parametrize("continuous", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_gymnasiums_checker_finds_nothing(continuous: bool, caplog: pytest.LogCaptureFixture) -> None:
     env = gymnasium.make(ID, continuous=continuous, render_mode="rgb_array", **SMALL)
     with warnings.catch_warnings():

@@ -360,7 +360,7 @@ def test_version_2_drives_by_day_and_night_with_signs() -> None:
     )
     valid, signs = 0, 0
     observation, _ = env.reset(seed=0)
-    for _ in range(10):
+    for _ in range(6):
         valid += int(observation["state"][9])
         signs += int(observation["signs_mask"].sum())
         observation, *_ = env.step([12, 0])

@@ -18,8 +18,9 @@ def seen(scene, told, seed):
     return (found.extinction / truth - 1.0, found.standard_deviation / truth) if found.valid else None
 
 
-def test_country_roads_are_measured_or_refused_and_intervals_hold():
-    scenes = [(*random_country(seed), seed) for seed in range(300, 330)]
+@pytest.mark.parametrize("count", [12, pytest.param(30, marks=pytest.mark.nightly)])
+def test_country_roads_are_measured_or_refused_and_intervals_hold(count):
+    scenes = [(*random_country(seed), seed) for seed in range(300, 300 + count)]
     found = [one for one in (seen(*scene) for scene in scenes) if one is not None]
     assert len(found) >= 0.8 * len(scenes)
     error, deviation = np.abs(np.array(found)).T
@@ -47,6 +48,6 @@ def test_country_roads_are_measured_or_refused_and_intervals_hold():
     ids=str,
 )
 def test_each_of_it_costs_little(changes):
-    found = [seen(replace(PLAIN, **changes), PLAIN.camera, seed) for seed in range(2)]
-    assert all(one is not None for one in found)
-    assert np.abs(np.array(found)[:, 0]).max() < 0.12
+    found = seen(replace(PLAIN, **changes), PLAIN.camera, 0)
+    assert found is not None
+    assert abs(found[0]) < 0.12

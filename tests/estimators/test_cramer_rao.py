@@ -168,7 +168,7 @@ def test_patches_are_those_whose_edges_lie_anywhere():
     assert extinction_bound(SMALL, scene) == pytest.approx(np.linalg.inv(information)[0, 0] ** 0.5, rel=2e-3)
 
 
-@pytest.mark.parametrize("deviation", [0.0, TENTH])
+@pytest.mark.parametrize("deviation", [pytest.param(0.0, marks=pytest.mark.nightly), TENTH])
 def test_least_squares_are_as_good_as_the_bound(deviation):
     """Gauss–Newton on rows of the model, the pitch drawn from its prior; spreads of 2000 are known to 1.6 %."""
     rng, draws = np.random.default_rng(5), 2000

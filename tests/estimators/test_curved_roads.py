@@ -33,9 +33,8 @@ def errors(visibilities: tuple[float, ...], **course) -> tuple[np.ndarray, np.nd
     return np.abs(error), np.array(half)
 
 
-@pytest.mark.parametrize(
-    "course", [{"sag": SAG}, {"sag": CREST}, {"bend": BEND}, {"bend": -BEND}, {"bend": BEND, "sag": SAG}]
-)
+# A bend to the right is one to the left mirrored, which test_mirror compares.
+@pytest.mark.parametrize("course", [{"sag": SAG}, {"sag": CREST}, {"bend": BEND}, {"bend": BEND, "sag": SAG}])
 def test_curved_roads_are_read_as_well_as_straight_ones(course):
     error, half = errors((60.0, 120.0), **course)
     assert np.median(error) < 2.0

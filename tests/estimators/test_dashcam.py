@@ -39,14 +39,10 @@ def test_whatever_a_dashcam_sees_is_no_gross_error():
         assert np.median(error) < 0.06, method
 
 
-@pytest.mark.parametrize(
-    "changes",
-    IN_THE_WAY,
-    ids=str,
-)
+@pytest.mark.parametrize("changes", IN_THE_WAY, ids=str)
 def test_what_stands_in_the_way_costs_little(changes):
     scene = replace(PLAIN, **changes)
-    scenes = [(seed, scene, PLAIN.camera) for seed in range(2)]
+    scenes = [(0, scene, PLAIN.camera)]
     error, _ = relative_errors("joint_road", scenes, drawn(scenes))
-    assert len(error) == 2
+    assert len(error) == 1
     assert np.abs(error).max() < 0.15

@@ -37,8 +37,9 @@ def drive(render, road):
     return estimates
 
 
-@pytest.mark.parametrize("ranges", [AWAY, AWAY[::-1]], ids=["lost", "comes out of the fog"])
-@pytest.mark.parametrize("visibility", [50.0, 70.0])
+@pytest.mark.parametrize(
+    ("visibility", "ranges"), [(50.0, AWAY), (70.0, AWAY[::-1])], ids=["lost", "comes out of the fog"]
+)
 def test_a_vehicle_that_disappears_tells_the_fog(drive, visibility, ranges) -> None:
     found = drive(visibility, ranges)
     valid = [one for one in found if one.valid]

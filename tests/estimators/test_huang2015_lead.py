@@ -121,7 +121,7 @@ def exposed(chase: Chase, light: np.ndarray, rng: np.random.Generator) -> np.nda
     return np.clip(noisy, 0, most).astype(np.uint8 if camera.bits == 8 else np.uint16)
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=24)
 def chased(chase: Chase, seed: int, ranges: tuple[float, ...]) -> list[Observation]:
     rng = np.random.default_rng(seed)
     seen = []
@@ -142,7 +142,7 @@ def followed(chase: Chase, seed: int = 0, ranges: tuple[float, ...] = AWAY, **op
     return estimate
 
 
-@pytest.mark.parametrize(("visibility", "bound"), [(30, 12), (50, 5), (100, 4), (200, 5), (300, 7), (500, 10)])
+@pytest.mark.parametrize(("visibility", "bound"), [(30, 12), (100, 4), (500, 10)])
 def test_corrected_recovers_visibility(visibility, bound):
     chase = Chase(visibility=float(visibility))
     errors = [
@@ -165,7 +165,7 @@ def test_as_published_errs_either_way_of_100_m():
     assert followed(Chase(visibility=500.0), as_published=True).visibility < 420.0
 
 
-@pytest.mark.parametrize("visibility", [50.0, 150.0, 500.0])
+@pytest.mark.parametrize("visibility", [50.0, 500.0])
 def test_variances_follow_the_law_where_nothing_else_changes_them(visibility):
     # eq. 4.17: σ₂²/σ₁² = e^(−2k (d₂ − d₁)). Pixels on edges of a lamp or plate take up to 4 % of it, 12 bits nothing.
     # Beside the narrow roof there is sky; noise of the ranges would change its share of a window about the vehicle.
@@ -208,10 +208,9 @@ def test_a_vehicle_that_comes_nearer_says_the_same():
     assert followed(Chase(visibility=100.0), ranges=AWAY[::-1]).visibility == pytest.approx(100.0, rel=0.08)
 
 
-@pytest.mark.parametrize("visibility", [100.0, 300.0, 600.0])
-def test_the_window_on_the_way_back_is_that_of_the_way_away(visibility):
+def test_the_window_on_the_way_back_is_that_of_the_way_away():
     # The window found at 90 m is placed again as the vehicle comes nearer, or it would hold a strip of sky.
-    chase = Chase(visibility=visibility, across=0.0, range_noise=0.0)
+    chase = Chase(visibility=300.0, across=0.0, range_noise=0.0)
     away, back = (
         followed(chase, 1, ranges, as_published=True).diagnostics["variances"] for ranges in (AWAY, AWAY[::-1])
     )
@@ -219,9 +218,7 @@ def test_the_window_on_the_way_back_is_that_of_the_way_away(visibility):
     assert np.mean(np.divide(back[:5], away[:5])) == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("visibility", "width", "bound"), [(80.0, None, 0.1), (150.0, 1.8, 0.06), (300.0, None, 0.1), (300.0, 1.8, 0.06)]
-)
+@pytest.mark.parametrize(("visibility", "width", "bound"), [(80.0, None, 0.1), (300.0, 1.8, 0.06)])
 def test_without_a_radar_the_camera_gives_the_range(visibility, width, bound):
     estimator = make("huang2015_lead", Chase().camera, range_from="camera", vehicle_width=width)
     for seen in chased(Chase(visibility=visibility), 1, AWAY[:10]):
@@ -246,7 +243,7 @@ def test_what_the_camera_does_not_know_of_ranges_widens_the_interval():
 
 @pytest.mark.parametrize(
     ("distance", "bound", "visibility"),
-    [(90.0, 0.2, 200.0), (90.0, 0.2, 500.0), (60.0, 0.15, 120.0), (60.0, 0.15, 500.0), (30.0, 0.07, 120.0)],
+    [(90.0, 0.2, 500.0), (60.0, 0.15, 120.0), (30.0, 0.07, 120.0)],
 )
 def test_the_foot_is_found_as_well_as_the_pitch_is_known_or_better(distance, visibility, bound):
     errors = []
@@ -292,7 +289,7 @@ def test_another_vehicle_begins_another_track():
     assert estimator.update(Observation(seen.image)).diagnostics["reason"] == "no vehicle is tracked ahead"
 
 
-@pytest.mark.parametrize(("paint", "as_published"), [(40.0, False), (90.0, False), (40.0, True)])
+@pytest.mark.parametrize(("paint", "as_published"), [(90.0, False), (40.0, True)])
 def test_a_road_that_lamps_light_is_no_answer(paint, as_published):
     # At dusk the own head lamps make road and vehicle brighter than they are to the sky.
     dusk = Chase(visibility=100.0, airlight=60.0, asphalt=110.0, paint=paint)

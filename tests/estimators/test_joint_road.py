@@ -29,21 +29,21 @@ def errors(render, road, seeds, lead=None):
     return np.array([f.extinction * road.visibility / 3.0 - 1.0 for f in found]), found
 
 
-@pytest.mark.parametrize(("visibility", "median", "worst"), [(30, 3, 8), (100, 3, 8), (300, 3, 8), (1000, 5, 14)])
+@pytest.mark.parametrize(("visibility", "median", "worst"), [(30, 3, 8), (300, 3, 8), (1000, 5, 14)])
 def test_recovers_visibility_with_a_horizon_that_is_off(render, road, visibility, median, worst):
     error, _ = errors(render, road.but(visibility=visibility, camera=PAPER), range(5))
     assert 100 * np.median(np.abs(error)) < median
     assert 100 * np.abs(error).max() < worst
 
 
-@pytest.mark.parametrize("visibility", [60, 150, 300])
+@pytest.mark.parametrize("visibility", [60, 300])
 def test_albedo_that_drifts_costs_little(render, road, visibility):
     error, _ = errors(render, road.but(visibility=visibility, camera=PAPER, drift=0.15), range(6))
     assert 100 * np.median(np.abs(error)) < 10
     assert 100 * np.abs(error).max() < 20
 
 
-@pytest.mark.parametrize("visibility", [30.0, 50.0, 80.0])
+@pytest.mark.parametrize("visibility", [30.0, 80.0])
 def test_a_verge_in_place_of_the_neighbouring_lane_is_left_out(render, road, visibility):
     scene = road.but(visibility=visibility, verge=True)
     found = [estimate(render(scene, seed), road.camera).extinction for seed in range(3)]
@@ -62,15 +62,7 @@ def test_the_densest_fog_is_not_taken_for_a_ramp(render, road, visibility, respo
 
 
 @pytest.mark.parametrize(
-    ("visibility", "paint", "told"),
-    [
-        (50, 30.0, True),
-        (50, 170.0, False),
-        (150, 170.0, True),
-        (150, 30.0, False),
-        (400, 30.0, True),
-        (400, 170.0, False),
-    ],
+    ("visibility", "paint", "told"), [(50, 170.0, False), (150, 170.0, True), (150, 30.0, False), (400, 30.0, True)]
 )
 def test_a_lead_vehicle_is_left_out_tracked_or_not(render, road, visibility, paint, told):
     scene = road.but(visibility=visibility, camera=PAPER, lead_distance=25.0, lead_paint=paint)

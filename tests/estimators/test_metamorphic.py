@@ -123,7 +123,7 @@ def test_confirmation_makes_methods_of_the_road_less_sure(drive, reference, meth
 
 @pytest.mark.parametrize("method", METHODS)
 def test_thinner_fog_is_seen_farther(drive, method):
-    seen = [last(method, drive(visibility=visibility)) for visibility in (40.0, 80.0, 160.0, 320.0)]
+    seen = [last(method, drive(visibility=visibility)) for visibility in (40.0, 110.0, 320.0)]
     assert all(found.valid for found in seen)
     extinctions = [found.extinction for found in seen]
     assert extinctions == sorted(extinctions, reverse=True)
@@ -191,22 +191,15 @@ def test_a_pitch_that_is_told_is_undone(drive, reference, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("axis", [0, 1])
-def test_a_crop_that_is_told_changes_nothing(drive, method, axis):
+def test_a_crop_that_is_told_changes_nothing(drive, method):
     """Two windows of one picture, 24 px apart, with the principal point where it then is: sky and kerb differ only."""
     u0, v0 = CAMERA.principal_point
-    whole = replace(
-        CAMERA,
-        width=CAMERA.width + 24 * (axis == 1),
-        height=CAMERA.height + 24 * (axis == 0),
-        principal_point=(u0 + 12 * (axis == 1), v0 + 12 * (axis == 0)),
-    )
-    images, found = drive(whole), []
+    size = CAMERA.width + 24, CAMERA.height + 24
+    images, found = drive(replace(CAMERA, width=size[0], height=size[1], principal_point=(u0 + 12, v0 + 12))), []
     for first in (0, 24):
-        window = slice(first, first + (CAMERA.height, CAMERA.width)[axis])
-        cropped = [image[window] if axis == 0 else image[:, window] for image in images]
-        point = (u0 + (12 - first) * (axis == 1), v0 + (12 - first) * (axis == 0))
-        found.append(last(method, cropped, replace(CAMERA, principal_point=point)))
+        rows, cols = slice(first, first + CAMERA.height), slice(first, first + CAMERA.width)
+        told = replace(CAMERA, principal_point=(u0 + 12 - first, v0 + 12 - first))
+        found.append(last(method, [image[rows, cols] for image in images], told))
     assert close(*found)
 
 

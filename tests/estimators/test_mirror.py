@@ -29,6 +29,7 @@ and a scatterometer looks at no picture."""
 
 METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - OTHER_SENSORS - set(NIGHT_METHODS))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0)
+DRIVEN = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0), np.radians(-3.0))
 
 
 def pictures() -> Iterator[tuple[str, np.ndarray, Camera]]:
@@ -77,29 +78,32 @@ def test_a_mirrored_picture_of_a_mirrored_camera_says_the_same(drawn, method: st
     assert valid > 0.5 * len(drawn)
 
 
+@pytest.fixture(scope="module")
+def drive() -> list[tuple[np.ndarray, LeadMeasurement]]:
+    """Images behind a vehicle whose range is told."""
+    roads = [Road(camera=DRIVEN, lead_distance=distance + 1.7, verge=True) for distance in RANGES]
+    images = [photograph(road, scan(road, index, 1), index) for index, road in enumerate(roads)]
+    return [(image, LeadMeasurement(distance, 10.0)) for image, distance in zip(images, RANGES, strict=True)]
+
+
+def last_of_both(method: str, drive: list[tuple[np.ndarray, LeadMeasurement]]) -> tuple[Estimate, Estimate]:
+    """What is said at the end of a drive and of the mirrored one."""
+    one, two = make(method, DRIVEN), make(method, mirrored(DRIVEN))
+    for index, (image, lead) in enumerate(drive):
+        found = one.update(Observation(Frame(0.4 * index, image, DRIVEN), 25.0, lead))
+        other = two.update(Observation(Frame(0.4 * index, image[:, ::-1].copy(), mirrored(DRIVEN)), 25.0, lead))
+    return found, other
+
+
 @pytest.mark.parametrize("method", METHODS)
-def test_a_mirrored_drive_says_the_same(method: str) -> None:
-    """With a vehicle ahead whose range is told."""
-    camera = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0), np.radians(-3.0))
-    one, two = make(method, camera), make(method, mirrored(camera))
-    for index, distance in enumerate(RANGES):
-        road = Road(camera=camera, lead_distance=distance + 1.7, verge=True)
-        image, lead = photograph(road, scan(road, index, 1), index), LeadMeasurement(distance, 10.0)
-        time = 0.4 * index
-        found = one.update(Observation(Frame(time, image, camera), 25.0, lead))
-        other = two.update(Observation(Frame(time, image[:, ::-1].copy(), mirrored(camera)), 25.0, lead))
+def test_a_mirrored_drive_says_the_same(drive, method: str) -> None:
+    found, other = last_of_both(method, drive)
     assert found.valid
     assert same(found, other), (found, other)
 
 
-def test_a_mirrored_vehicle_that_stays_in_sight_bounds_the_fog_alike() -> None:
-    camera = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0))
-    one, two = make("gabb2014", camera), make("gabb2014", mirrored(camera))
-    for index, distance in enumerate(RANGES):
-        road = Road(camera=camera, lead_distance=distance + 1.7, verge=True)
-        image, lead = photograph(road, scan(road, index, 1), index), LeadMeasurement(distance, 10.0)
-        found = one.update(Observation(Frame(0.4 * index, image, camera), 25.0, lead))
-        other = two.update(Observation(Frame(0.4 * index, image[:, ::-1].copy(), mirrored(camera)), 25.0, lead))
+def test_a_mirrored_vehicle_that_stays_in_sight_bounds_the_fog_alike(drive) -> None:
+    found, other = last_of_both("gabb2014", drive)
     assert found.bounds is not None
     assert other.bounds is not None
     assert 0.0 < found.bounds.most < np.inf

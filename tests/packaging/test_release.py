@@ -6,6 +6,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -39,6 +40,7 @@ def test_no_text_installs_what_no_index_has() -> None:
     assert [path for path in texts if wrong.search(path.read_text(encoding="utf-8"))] == []
 
 
+@pytest.mark.nightly
 def test_an_extra_is_added_to_the_installation_without_an_index() -> None:
     command = [sys.executable, "-m", "pip", "install", "--no-index", "--dry-run", "--disable-pip-version-check"]
     done = subprocess.run([*command, "fogsim[test]"], capture_output=True, text=True, check=False)

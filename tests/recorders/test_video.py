@@ -1,9 +1,5 @@
 import dataclasses
 import itertools
-import os
-import signal
-import subprocess
-import sys
 from collections import deque
 from pathlib import Path
 
@@ -18,8 +14,6 @@ from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder, encoder_report
 from fogsim.recorders.video import Encoder, encoder_command
 from tests.recorders.synthetic import drive, make_step
-
-ROOT = Path(__file__).parents[2]
 
 
 def read_video(path: Path) -> list[NDArray[np.uint8]]:
@@ -89,40 +83,6 @@ def test_an_encoder_that_cannot_write_says_why(tmp_path: Path) -> None:
         deque(map(encoder.write, frames))
     with pytest.raises(FogSimError, match=r"missing.*No such file"):
         encoder.finish()
-
-
-CHILD = """
-import itertools, sys
-from pathlib import Path
-from fogsim.metrics import step_metrics
-from fogsim.recorders import VideoRecorder, encoder_report
-from tests.recorders.synthetic import make_step
-
-recorder = VideoRecorder(Path(sys.argv[1]), 0.1)
-try:
-    for index in itertools.count():
-        step = make_step(index, time=0.1 * index)
-        recorder.record(step, step_metrics(step))
-        if index == 7:
-            print("running", flush=True)
-except KeyboardInterrupt:
-    recorder.close(complete=False)
-    print("closed", flush=True)
-"""
-
-
-def test_ctrl_c_leaves_a_video_of_what_was_recorded(tmp_path: Path) -> None:
-    path = tmp_path / "video.mp4"
-    child = subprocess.Popen(
-        [sys.executable, "-c", CHILD, str(path)], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
-    )
-    assert child.stdout is not None
-    assert child.stdout.readline() == "running\n"
-    os.killpg(child.pid, signal.SIGINT)
-    output, _ = child.communicate(timeout=60)
-    assert output == "closed\n"
-    assert child.returncode == 0
-    assert len(read_video(path)) >= 8
 
 
 def test_the_last_step_once_more_is_one_more_frame(tmp_path: Path) -> None:

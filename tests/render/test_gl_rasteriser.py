@@ -1,4 +1,4 @@
-import functools
+import hashlib
 import math
 from ctypes.util import find_library
 from pathlib import Path
@@ -170,38 +170,36 @@ def test_a_size_can_change_and_a_closed_one_is_refused() -> None:
         rasteriser.triangle_ids(drawing, CAMERA, POSE)
 
 
-DRAW = """
-import hashlib, sys
-sys.path.insert(0, {folder!r})
-import numpy as np
-import test_gl_rasteriser as t
-rng = np.random.default_rng(9)
-table = t.soup(rng, (3, 40, 90))
-drawing = t.drawing_of(table, [0, 1, 2, 1, 1, 2] * 4, t.scattered(rng, 24, t.camera_axes(t.CAMERA, t.POSE)))
-triangle_ids = t.GLRasteriser(table).triangle_ids(drawing, t.CAMERA, t.POSE)
-print(t.context().version, t.context().description)
-print(len(np.unique(triangle_ids)), hashlib.sha256(triangle_ids.tobytes()).hexdigest())
-"""
+def here() -> tuple[str, str]:
+    """OpenGL's version and a digest of a picture."""
+    rng = np.random.default_rng(9)
+    table = soup(rng, (3, 40, 90))
+    drawing = drawing_of(table, [0, 1, 2, 1, 1, 2] * 4, scattered(rng, 24, camera_axes(CAMERA, POSE)))
+    triangle_ids = GLRasteriser(table).triangle_ids(drawing, CAMERA, POSE)
+    digest = hashlib.sha256(triangle_ids.tobytes()).hexdigest()
+    return f"{context().version} {context().description}", f"{len(np.unique(triangle_ids))} {digest}"
 
 
-@functools.cache
-def drawn(**environment: str) -> tuple[str, str]:
-    """OpenGL's version and a digest of a picture, drawn by another process."""
-    code = DRAW.format(folder=str(Path(__file__).parent))
-    version, digest = run_python("-c", code, environment=environment).stdout.splitlines()
+def elsewhere(**environment: str) -> tuple[str, str]:
+    """The same of another process."""
+    code = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\nimport test_gl_rasteriser as t"
+    version, digest = run_python(
+        "-c", f"{code}\nprint(*t.here(), sep='\\n')", environment=environment
+    ).stdout.splitlines()
     return version, digest
 
 
 def test_an_older_opengl_draws_the_same() -> None:
-    newer, old = drawn(), drawn(MESA_GL_VERSION_OVERRIDE="4.1")
+    newer, old = here(), elsewhere(MESA_GL_VERSION_OVERRIDE="4.1")
     if not old[0].startswith("(4, 1)"):
         pytest.skip("this OpenGL is not Mesa's, which can be told to be old")
     assert not newer[0].startswith("(4, 1)")
     assert newer[1] == old[1]
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(find_library("OSMesa") is None, reason="OSMesa is not installed here")
 def test_osmesa_draws_the_same_as_egl() -> None:
-    osmesa = drawn(PYOPENGL_PLATFORM="osmesa")
+    osmesa = elsewhere(PYOPENGL_PLATFORM="osmesa")
     assert "OSMesa" in osmesa[0]
-    assert osmesa[1] == drawn()[1]
+    assert osmesa[1] == here()[1]

@@ -40,6 +40,7 @@ def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None
     assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("_opengl")
 def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> None:
     said = run(str(WORKERS), "fork", "opengl", "--draw-first")

@@ -207,6 +207,7 @@ def test_without_lamps_and_vehicles_the_scene_is_that_of_the_day() -> None:
     np.testing.assert_allclose(dark.ambient_light, 0.0)
 
 
+@pytest.mark.nightly
 def test_pyrenders_own_renderer_draws_it_in_a_process_of_its_own() -> None:
     code = (
         "import os\nos.environ.setdefault('PYOPENGL_PLATFORM', 'egl')\n"

@@ -8,6 +8,7 @@ import pytest
 from fogsim.scene.vehicles import LIT_AREAS, bodies, body_of, body_shapes
 from fogsim.values import Surface
 from make_bodies import FILE, pack_bodies
+from vehicle_bodies import MODELS, body_meshes
 from vehicle_bodies.lamp_patches import lamp_patches, lamp_quads
 
 SHAPES = body_shapes()
@@ -16,6 +17,14 @@ DARK_BEHIND, DARK_AHEAD = {"tractor"}, {"trailer", "trailer_curtain"}
 ENDINGS = ("", ":far", ":tiny", ":speck")
 
 
+def test_a_body_of_the_data_is_what_its_model_makes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vehicle_bodies.MODELS", {"van": MODELS["van"]})
+    for name, made in body_meshes().items():
+        for field in fields(made):
+            assert np.array_equal(getattr(made, field.name), getattr(SHAPES[name], field.name)), field.name
+
+
+@pytest.mark.nightly
 def test_the_data_are_what_the_tool_makes_to_the_bit() -> None:
     made = pack_bodies()
     with np.load(FILE) as packed:

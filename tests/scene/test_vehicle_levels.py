@@ -17,12 +17,9 @@ ILLUMINANCE = 1e4
 SKY = ILLUMINANCE * 9 / (7 * math.pi) / 3
 """Luminance of the CIE overcast sky at the horizon [cd/m²]."""
 
-PAINTS = {
-    "black": (0.03, 0.03, 0.03),
-    "grey": (0.25, 0.25, 0.25),
-    "white": (0.78, 0.78, 0.78),
-    "red": (0.3, 0.03, 0.03),
-}
+PAINTS = {"red": (0.78, 0.03, 0.03), "cyan": (0.03, 0.78, 0.78)}
+"""The darkest and the brightest of each channel; contrast is linear in reflectance, so others lie between."""
+
 HEADINGS = {"rear": 0.0, "front": math.pi, "left": -0.5 * math.pi}
 TALL = 480
 """Side of the picture [px]; a vehicle is about a third of it."""

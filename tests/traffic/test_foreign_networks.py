@@ -10,12 +10,14 @@ import pytest
 from tests.helpers.command import run_script
 
 PROGRAM = Path(__file__).resolve().parents[2] / "benchmarks" / "networks.py"
-NETWORKS = ("grid", "spider", "random", "left_hand", "roundabout")
 RUNS = ["SUMO alone", "inf m", "30 m"]
 
 
 # The trains' network is large.
-@pytest.mark.parametrize("networks", [NETWORKS, pytest.param(("rail",), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    "networks",
+    [("left_hand", "roundabout"), pytest.param(("grid", "spider", "random", "rail"), marks=pytest.mark.nightly)],
+)
 def test_clear_air_changes_nothing_and_fog_only_trains_nothing(networks: tuple[str, ...]) -> None:
     arguments = ["--json", "--seconds", "40", "--step", "1", "--visibilities", "inf", "30", "--networks", *networks]
     done = run_script(PROGRAM, *arguments, "--one-process")

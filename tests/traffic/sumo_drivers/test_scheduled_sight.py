@@ -42,7 +42,9 @@ def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str
     return bool(depth <= sight.depth_limit(distance, contrast, rear_intensity(lit), head_lamps))
 
 
-@pytest.mark.parametrize(("field", "illuminance"), [(EVEN, 10_000.0), (BANKS, 3.0), (EVEN, 0.1)])
+@pytest.mark.parametrize(
+    ("field", "illuminance"), [(EVEN, 10_000.0), (BANKS, 0.1), pytest.param(BANKS, 3.0, marks=pytest.mark.nightly)]
+)
 def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
     """For every leader that has been the leader for as long as a look may wait."""
     api, fog = link.begin(CROWD), FieldAccess(field)

@@ -209,6 +209,8 @@ def test_a_car_stops_before_a_closed_crossing_and_sees_the_train_on_it(tmp_path:
         "advice=none",
         "clocks.camera_period_s=0.5",
         "renderer=cpu",
+        "camera.width=160",
+        "camera.height=120",
     )
     closed = passed = seen = 0
     for step in fogsim.run(scenario_from_config(alone(tmp_path), "ego", settings), seed=1):

@@ -99,7 +99,9 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     assert 0 < table.num_rows < 2001
     assert table.schema.metadata[b"fogsim.complete"] == b"false"
     assert imageio.imread(out / "video.mp4", plugin="FFMPEG", index=0).ndim == 3
-    assert cv2.VideoCapture(str(out / "video.mp4")).get(cv2.CAP_PROP_FRAME_COUNT) == table.num_rows
+    frames = cv2.VideoCapture(str(out / "video.mp4")).get(cv2.CAP_PROP_FRAME_COUNT)
+    # Ctrl-C reaches ffmpeg too, which may be writing the last one.
+    assert table.num_rows - 1 <= frames <= table.num_rows
     assert "PARTIAL" in (out / "report.html").read_text(encoding="utf-8")
 
 

@@ -92,7 +92,7 @@ class Confirmation:
         day = verdict_of(fit, self._scale)
         is_open = not day.shows_fog and _is_thin(own, day)
         reason = self._rejection_reason(own, level, day, is_open=is_open)
-        more = _added_deviation(own, day, is_open=is_open, is_behind=math.isfinite(free))
+        more = _added_deviation(own, day, is_open=is_open, is_behind=math.isfinite(min(free, day.free)))
         relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
         return _Outcome(time, own.visibility_interval, reason, relative, absolute)
 

@@ -87,6 +87,7 @@ class DayFit:
     # chances [-]
     doubt: float = 0.0
     images: int = 1  # Images of the drive up to this one
+    free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
 
     @property
     def response_deviation(self) -> float:
@@ -123,13 +124,15 @@ def fit_day(
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
-    free = min(free, free_depth(pixels, bins, camera, horizon.row))
+    if math.isinf(free):
+        free = free_depth(pixels, bins, camera, horizon.row)
     if math.isfinite(free):
         bins = _without_vehicle(bins, camera, horizon.row, free)
         if int((bins.first > horizon.row).sum()) < _FEWEST_BINS:
-            return _nothing_seen(camera) if earlier is None else earlier
+            return replace(_nothing_seen(camera) if earlier is None else earlier, free=free)
     rows = read_rows(pixels, bins, camera, horizon.row)
-    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_contradiction(rows, camera, horizon, claimed))
+    doubt = _contradiction(rows, camera, horizon, claimed)
+    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=doubt, free=free)
     if earlier is None:
         return fit
     tried = _left(earlier, fit.responses.size)[0]

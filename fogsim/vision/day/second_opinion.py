@@ -139,6 +139,7 @@ class DayVerdict:
     doubt: float
     response_deviation: float
     is_road: bool = True  # Whether a road is likelier than none
+    free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
 
     @property
     def is_clear(self) -> bool:
@@ -194,6 +195,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         doubt=fit.doubt,
         response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
         is_road=is_road,
+        free=fit.free,
     )
 
 
@@ -276,7 +278,7 @@ class SecondOpinion:
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
         self._fit, self._looked = fit, time
         verdict = verdict_of(fit, self._scale, lines or 0)
-        if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
+        if own.valid and math.isfinite(min(free, verdict.free)) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
         self._response = verdict.response_deviation if verdict.is_sure else 0.0

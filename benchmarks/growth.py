@@ -57,7 +57,7 @@ LINES = {
     "vehicles near": Line((10, 40, 160, 640), lambda _: (*DAY, *SMALL), int, near),
     "vehicles near, by night": Line((10, 40, 160, 640), lambda _: (*NIGHT, *SMALL), int, near),
     "cameras": Line(
-        (0, 10, 30, 90),
+        (0, 10, 90),
         lambda share: (*DAY, *SMALL, *((f"traffic.equipped={share:g} %", REPORTS) if share else ())),
         lambda _: 160,
         lambda _, step: 1.0 + len(step.equipped),

@@ -6,9 +6,9 @@ traffic's kinds) or none. Each picture is fogged with a visibility drawn evenly 
 exposed such that the airlight has 120, 200 or 255 levels of light. The stated pitch is off by a normal error that
 the estimators do not know.
 
-`lead`: `absent`, no vehicle in the own lane; `told`, one with a measured range is there; `untold`, the same picture
-without the range. Errors are |V_est − V| / V of estimates that are valid and see fog. `coverage` is the share of 90 %
-intervals of k that hold the truth, of valid ones. `class_share` is the share of the valid ones in the right of
+`lead`: `absent`, no vehicle in the own lane; `measured`, one with a measured range is there; `unmeasured`, the same
+picture without the range. Errors are |V_est − V| / V of estimates that are valid and see fog. `coverage` is the share
+of 90 % intervals of k that hold the truth, of valid ones. `class_share` is the share of the valid ones in the right of
 zhu2015's four classes, `class_off_edge_share` that of frames whose visibility is more than 5 % from an edge (100, 300,
 1000 m). `ms` is the fastest at 688×515, on one core.
 
@@ -94,14 +94,14 @@ def measure_unit(
         told = dataclasses.replace(true, pitch=true.pitch + math.radians(rng.normal(0.0, pitch)))
         occupied, measured = with_leader(free, rng)
         condition = {"visibility": visibility, "marks": marks, "levels": levels, "camera": number}
-        for lead, instant in (("absent", free), ("untold", occupied)):
+        for lead, instant in (("absent", free), ("unmeasured", occupied)):
             view = road(scenes, seed, surface, repairs).view(instant.state, instant.ego, true, marks=marks)
             seen = Observation(photograph(view, true, driven(scenes, seed).fog, visibility, levels, rng), 25.0)
             rows += [condition | {"lead": lead} | look(form, told, seen) for form in forms]
         seen = dataclasses.replace(seen, lead=measured)
         # The papers' own forms make nothing of a range.
         ranging = [form for form in forms if not form.endswith(PUBLISHED)]
-        rows += [condition | {"lead": "told"} | look(form, told, seen) for form in ranging]
+        rows += [condition | {"lead": "measured"} | look(form, told, seen) for form in ranging]
     return rows
 
 

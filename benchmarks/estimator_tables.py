@@ -14,7 +14,7 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 
 BINS = (25.0, 50.0, 100.0, 200.0, 400.0, 800.0, 1500.0)
 EDGES, OFF_EDGE = (100.0, 300.0, 1000.0), 0.05
-LEADS = ("absent", "untold", "told")
+LEADS = ("absent", "unmeasured", "measured")
 MIDDLE = (50.0, 400.0)  # visibilities of the table of conditions [m]
 TIMED = (688, 515)
 

@@ -30,11 +30,11 @@ EXCERPT = {
 
 
 def excerpt() -> Rows:
-    """Errors of some methods with an untold vehicle ahead, as the page on their accuracy has them, to two digits."""
+    """Errors of some methods before a vehicle of unmeasured range, as the page on accuracy has them, to two digits."""
     page = (ROOT / "docs" / "benchmarks" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
     heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
-    found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
+    found = {row[0]: row[2:] for row in rows if row[1] == "unmeasured"}
     ranges = [cell.partition(" ")[0].replace("-", "–") for cell in heading[2:]]
     return [
         ("V_met [m]", *ranges),

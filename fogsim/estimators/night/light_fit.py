@@ -10,7 +10,6 @@ from fogsim.core.jit import kernel
 
 Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
-Terms = NDArray[np.int64]
 
 _RATIOS = np.linspace(-1.8, 1.8, 7)
 """ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
@@ -24,8 +23,12 @@ _SOFTNESS = 0.25
 _SOFT, _HARD = 2.5, 3.5
 """Deviations from which on a cell that is too bright or too dark counts less: others' lamps, things on the road [-]."""
 
-_LAMPS, _PEDESTAL, _AIRLIGHT, _DAY_ROAD, _SLOPE, _OTHERS = range(6)
-"""Terms: lamplight, pedestal, airlight, the road by day, how the sky brightens upward, glow of others' lamps."""
+_LAMPS, _PEDESTAL, _AIRLIGHT, _DAY_ROAD, _SLOPE, _OTHERS, _TERMS = range(7)
+"""Terms that add up to the light: lamplight, pedestal, airlight, the road by day, how the sky brightens upward, glow of
+others' lamps; and how many they are. Sets of terms are bits."""
+
+_SLOPE_AT_TOP = 4.0
+"""How much brighter the highest cell of the sky is for each unit of the slope [-]."""
 
 _AIRLIGHT_MEAN, _AIRLIGHT_DEVIATION = 0.7, 0.5
 _DAY_ROAD_MEAN, _DAY_ROAD_DEVIATION = 0.15, 0.12
@@ -60,6 +63,23 @@ class Fit(NamedTuple):
     summary: Floats  # (2,): Mean squared deviation, and share of the light of all cells that is the lamps'
 
 
+class _Weighed(NamedTuple):
+    """What sums need that no draw changes. Cells of the sky come first, and see no road."""
+
+    sky: int  # How many cells are sky
+    one: Floats  # (cells,): Precision, which is weight over variance
+    seen: Floats  # (cells,): Luminance times precision
+    rise: Floats  # (cells,): How the sky brightens upward times precision
+    # one_sum, seen_sum, rise_sum, rise_square, rise_seen: sums of these, and of the products of rise, over all cells
+    one_sum: float
+    seen_sum: float
+    rise_sum: float
+    rise_square: float
+    rise_seen: float
+    glow: Floats  # (shapes, cells): Glow of others' lamps times precision
+    glow_sums: Floats  # (shapes, 4): Sums of that alone, and times itself, luminance and rise
+
+
 @kernel
 def log_likelihoods(
     measured: Measured,
@@ -76,75 +96,64 @@ def log_likelihoods(
     Lamps light `veil` and `road` (draws, extinctions, cells), which is `depth` (draws, cells) away [m]. `variance` and
     `weight` are those of cells, and `best` is written to.
     """
-    seen, independent, others = measured.seen, measured.independent, measured.others
     draws, count, cells = veil.shape
-    found, precision, total = np.empty((draws, count)), weight / variance, weight.sum()
-    power = (precision * seen * seen).sum()
+    independent, shapes, total = measured.independent, len(measured.others), weight.sum()
     is_day = measured.sky_scale > 0.0 or measured.lamp_scale > 0.0
-    terms = _terms(is_day, len(others) > 0)
-    even, gram, side = np.ones((4, cells)), np.zeros((_OTHERS + 2, _OTHERS + 2)), np.zeros(_OTHERS + 2)
-    matrix, right, used = np.zeros((len(terms), len(terms))), np.zeros(len(terms)), np.zeros(len(terms))
-    known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
-    highest = -np.inf
+    terms = (1 << _LAMPS | 1 << _PEDESTAL) + is_day * (1 << _AIRLIGHT | 1 << _DAY_ROAD | 1 << _SLOPE)
+    terms += (shapes > 0) << _OTHERS
+    weighed, factors = _weighed(measured, weight / variance), np.exp(_RATIOS)
+    power = (weighed.seen * measured.seen).sum()
+    kept, gram, known, used = (
+        np.zeros(cells),
+        np.zeros((_TERMS + 1, _TERMS + 2)),
+        np.zeros((2, _TERMS)),
+        np.zeros(_TERMS),
+    )
+    solved, found, highest = np.zeros((1 << (_TERMS - 1), _TERMS, _TERMS + 3)), np.empty((draws, count)), -np.inf
     for place in range(count):
         for draw in range(draws):
             if is_day or draw == 0:
-                _even_light(measured.up, depth[draw], extinction[place], even)
-                _sums_of_light(even, seen, precision, gram, side)
-                gram[2, 2] += 1.0 / measured.even**2
-            _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, is_day, gram, side)
-            if len(others) > 0:
-                glow = others[draw % len(others)]
-                _sums_of_others(glow, veil[draw, place], road[draw, place], even, seen, precision, gram, side)
-            if len(terms) > 2:
-                _combine(gram, side, 1.0, terms, matrix, right)
-                known[1, -1] = 1.0 / min(1.0, _GLOW_CLEAR + _GLOW_REACH * extinction[place]) ** 2
-                _set_known(terms, _daylight_scale(matrix, right, terms, measured, used, known, scratch), known)
+                _sums_of_light(weighed, depth[draw], extinction[place], measured.even, kept, gram)
+            _sums_of_lamps(weighed, veil[draw, place], road[draw, place], kept, gram)
+            if shapes > 0:
+                _sums_of_others(weighed, draw % shapes, veil[draw, place], road[draw, place], kept, gram)
+                known[1, _OTHERS] = 1.0 / min(1.0, _GLOW_CLEAR + _GLOW_REACH * extinction[place]) ** 2
+            if is_day:
+                _set_daylight(measured, gram, known, solved, terms, used)
+            solved[:, 0, 0] = np.nan
             likelihood = 0.0
-            for ratio in _RATIOS:
-                _combine(gram, side, math.exp(ratio), terms, matrix, right)
-                if len(terms) > 2:
-                    rest = power + _of_all_light(matrix, right, terms, known, used, scratch)
-                else:
-                    rest = power + _of_lamps_alone(matrix, right, used)
-                square = max(rest, 0.0) / total
+            for i, ratio in enumerate(_RATIOS):
+                square = max(power + _set_amplitudes(gram, known, solved, terms, factors[i], used), 0.0) / total
                 value = -0.5 * (independent * math.log(_SOFTNESS + square) + (ratio / _RATIO_DEVIATION) ** 2)
                 likelihood += math.exp(value)
                 if value > highest:
                     highest, best.summary[0] = value, square
-                    _model(
-                        used, terms, math.exp(ratio), veil[draw, place], road[draw, place], even, measured, draw, best
-                    )
+                    _model(used, factors[i], veil[draw, place], road[draw, place], kept, measured, draw, best)
             found[draw, place] = math.log(max(likelihood, 1e-300))
     return found
 
 
 @kernel
-def _terms(is_day: bool, has_others: bool) -> Terms:
-    """Terms that add up to the light."""
-    terms = np.arange(_OTHERS + 1)
-    if is_day:
-        return terms if has_others else terms[:_OTHERS].copy()
-    terms[2] = _OTHERS
-    return terms[:3].copy() if has_others else terms[:2].copy()
-
-
-@kernel
-def _even_light(up: Floats, depth: Templates, extinction: float, even: Floats) -> None:
-    """What daylight adds to cells, after the even light: airlight, the road behind it, and the brighter sky above."""
-    for cell in range(len(up)):
-        kept = math.exp(-extinction * depth[cell])
-        even[1, cell], even[2, cell], even[3, cell] = 1.0 - kept, kept, 4.0 * up[cell]
+def _weighed(measured: Measured, precision: Floats) -> _Weighed:
+    sky, up = 0, _SLOPE_AT_TOP * measured.up
+    while sky < len(up) and up[sky] > 0.0:
+        sky += 1
+    seen, rise, glow = precision * measured.seen, precision * up, measured.others * precision
+    sums = np.empty((len(glow), 4))
+    for shape in range(len(glow)):
+        sums[shape, 0], sums[shape, 1] = glow[shape].sum(), (glow[shape] * measured.others[shape]).sum()
+        sums[shape, 2], sums[shape, 3] = (glow[shape] * measured.seen).sum(), (glow[shape] * up).sum()
+    light = precision.sum(), seen.sum(), rise.sum(), (rise * up).sum(), (rise * measured.seen).sum()
+    return _Weighed(sky, precision, seen, rise, *light, glow, sums)
 
 
 @kernel
 def _model(
     used: Floats,
-    terms: Terms,
     factor: float,
     veil: Templates,
     road: Templates,
-    even: Floats,
+    kept: Floats,
     measured: Measured,
     draw: int,
     best: Fit,
@@ -152,13 +161,11 @@ def _model(
     """Set what amplitudes make of the cells."""
     by_lamps = total = 0.0
     for cell in range(len(veil)):
-        lit = used[0] * (factor * veil[cell] + road[cell])
-        rest = used[1]
-        for i in range(2, len(terms)):
-            if terms[i] == _OTHERS:
-                rest += used[i] * measured.others[draw % len(measured.others), cell]
-            else:
-                rest += used[i] * even[terms[i] - _PEDESTAL, cell]
+        lit = used[_LAMPS] * (factor * veil[cell] + road[cell])
+        rest = used[_PEDESTAL] + used[_AIRLIGHT] * (1.0 - kept[cell]) + used[_DAY_ROAD] * kept[cell]
+        rest += used[_SLOPE] * _SLOPE_AT_TOP * measured.up[cell]
+        if len(measured.others) > 0:
+            rest += used[_OTHERS] * measured.others[draw % len(measured.others), cell]
         best.luminance[cell] = lit + rest
         by_lamps += lit
         total += lit + rest
@@ -166,174 +173,147 @@ def _model(
 
 
 @kernel
-def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, side: Floats) -> None:
-    """Normal equations of what does not depend on the lamps."""
-    for i in range(4):
-        for j in range(i, 4):
-            total = 0.0
-            for cell in range(len(seen)):
-                total += precision[cell] * even[i, cell] * even[j, cell]
-            gram[2 + i, 2 + j] = total
-        total = 0.0
-        for cell in range(len(seen)):
-            total += precision[cell] * even[i, cell] * seen[cell]
-        side[2 + i] = total
+def _sums_of_light(of: _Weighed, depth: Templates, extinction: float, even: float, kept: Floats, gram: Floats) -> None:
+    """Normal equations of what does not depend on the lamps; sets the share of the road's light that is `kept`.
+
+    In `gram` veil and road come before the other terms, and the right side last.
+    """
+    k = kk = ky = 0.0
+    for cell in range(of.sky, len(kept)):
+        kept[cell] = math.exp(-extinction * depth[cell])
+        share = of.one[cell] * kept[cell]
+        k += share
+        kk += share * kept[cell]
+        ky += of.seen[cell] * kept[cell]
+    gram[2, 2], gram[2, 3], gram[2, 4], gram[2, 5] = of.one_sum + 1.0 / even**2, of.one_sum - k, k, of.rise_sum
+    gram[3, 3], gram[3, 4], gram[3, 5] = of.one_sum - 2.0 * k + kk, k - kk, of.rise_sum
+    gram[4, 4], gram[4, 5], gram[5, 5] = kk, 0.0, of.rise_square
+    gram[2, -1], gram[3, -1], gram[4, -1], gram[5, -1] = of.seen_sum, of.seen_sum - ky, ky, of.rise_seen
 
 
 @kernel
-def _sums_of_lamps(
-    veil: Templates,
-    road: Templates,
-    even: Floats,
-    seen: Floats,
-    precision: Floats,
-    is_day: bool,
-    gram: Floats,
-    side: Floats,
-) -> None:
+def _sums_of_lamps(of: _Weighed, veil: Templates, road: Templates, kept: Floats, gram: Floats) -> None:
     """Normal equations of veil and road."""
-    vv = vr = rr = v1 = r1 = vy = ry = 0.0
-    va = ra = vd = rd = vs = 0.0
-    for cell in range(len(seen)):
-        v, r = precision[cell] * veil[cell], precision[cell] * road[cell]
+    vv = vr = rr = v1 = r1 = vy = ry = vk = rk = vs = 0.0
+    for cell in range(of.sky):
+        v = of.one[cell] * veil[cell]
+        v1 += v
+        vv += v * veil[cell]
+        vy += of.seen[cell] * veil[cell]
+        vs += of.rise[cell] * veil[cell]
+    for cell in range(of.sky, len(veil)):
+        v, r = of.one[cell] * veil[cell], of.one[cell] * road[cell]
+        v1 += v
+        r1 += r
         vv += v * veil[cell]
         vr += v * road[cell]
         rr += r * road[cell]
-        v1 += v
-        r1 += r
-        vy += v * seen[cell]
-        ry += r * seen[cell]
-        if is_day:
-            va += v * even[1, cell]
-            ra += r * even[1, cell]
-            vd += v * even[2, cell]
-            rd += r * even[2, cell]
-            vs += v * even[3, cell]
-    gram[0, 0], gram[0, 1], gram[1, 1], gram[0, 2], gram[1, 2] = vv, vr, rr, v1, r1
-    gram[0, 3], gram[1, 3], gram[0, 4], gram[1, 4], gram[0, 5], gram[1, 5] = va, ra, vd, rd, vs, 0.0
-    side[0], side[1] = vy, ry
+        vy += of.seen[cell] * veil[cell]
+        ry += of.seen[cell] * road[cell]
+        vk += v * kept[cell]
+        rk += r * kept[cell]
+    gram[0, 0], gram[0, 1], gram[1, 1], gram[0, -1], gram[1, -1] = vv, vr, rr, vy, ry
+    gram[0, 2], gram[0, 3], gram[0, 4], gram[0, 5] = v1, v1 - vk, vk, vs
+    gram[1, 2], gram[1, 3], gram[1, 4], gram[1, 5] = r1, r1 - rk, rk, 0.0
 
 
 @kernel
-def _sums_of_others(
-    glow: Floats,
-    veil: Templates,
-    road: Templates,
-    even: Floats,
-    seen: Floats,
-    precision: Floats,
-    gram: Floats,
-    side: Floats,
-) -> None:
+def _sums_of_others(of: _Weighed, shape: int, veil: Templates, road: Templates, kept: Floats, gram: Floats) -> None:
     """Normal equations of the glow of others' lamps."""
-    last = _OTHERS + 1
-    gram[:, last], side[last] = 0.0, 0.0
-    for cell in range(len(seen)):
-        g = precision[cell] * glow[cell]
-        gram[0, last] += g * veil[cell]
-        gram[1, last] += g * road[cell]
-        for i in range(4):
-            gram[2 + i, last] += g * even[i, cell]
-        gram[last, last] += g * glow[cell]
-        side[last] += g * seen[cell]
+    v = r = k = 0.0
+    for cell in range(len(veil)):
+        glow = of.glow[shape, cell]
+        v += glow * veil[cell]
+        r += glow * road[cell]
+        k += glow * kept[cell]
+    sums = of.glow_sums[shape]
+    one, square, seen, rise = sums[0], sums[1], sums[2], sums[3]
+    gram[0, 6], gram[1, 6], gram[2, 6], gram[3, 6], gram[4, 6] = v, r, one, one - k, k
+    gram[5, 6], gram[6, 6], gram[6, -1] = rise, square, seen
 
 
 @kernel
-def _combine(gram: Floats, side: Floats, factor: float, terms: Terms, matrix: Floats, right: Floats) -> None:
-    """Normal equations of lamplight as one, with a ratio of veil and road."""
-    matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
-    right[0] = factor * side[0] + side[1]
-    for i in range(1, len(terms)):
-        row = 1 + terms[i]
-        matrix[0, i] = matrix[i, 0] = factor * gram[0, row] + gram[1, row]
-        right[i] = side[row]
-        for j in range(i, len(terms)):
-            matrix[i, j] = matrix[j, i] = gram[row, 1 + terms[j]]
-
-
-@kernel
-def _daylight_scale(
-    matrix: Floats, right: Floats, terms: Terms, measured: Measured, used: Floats, known: Floats, scratch: Floats
-) -> float:
-    """Standard size of the airlight: of the sky that is seen, or by the light sensor and the lamplight's amplitude."""
+def _set_daylight(measured: Measured, gram: Floats, known: Floats, solved: Floats, terms: int, used: Floats) -> None:
+    """Set what is known of daylight by its size: that of the sky, or by a sensor and the lamplight's amplitude."""
     if measured.lamp_scale == 0.0:
-        return max(measured.sky_scale, 1e-7)
-    _of_lamps_alone(matrix, right, used)
-    _set_known(terms, max(measured.lamp_scale * used[0], 1e-7), known)
-    _of_all_light(matrix, right, terms, known, used, scratch)
-    return float(max(measured.lamp_scale * used[0], 1e-7))
+        _set_known(max(measured.sky_scale, 1e-7), known)
+        return
+    for some in (1 << _LAMPS | 1 << _PEDESTAL, terms):
+        solved[:, 0, 0] = np.nan
+        _set_amplitudes(gram, known, solved, some, 1.0, used)
+        _set_known(max(measured.lamp_scale * used[_LAMPS], 1e-7), known)
 
 
 @kernel
-def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
-    used[:] = 0.0
-    det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
-    lamp = max((right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / max(det, 1e-300), 0.0)
-    dark = (right[1] - lamp * matrix[0, 1]) / matrix[1, 1]
-    used[0], used[1] = lamp, dark
-    form = lamp * lamp * matrix[0, 0] + 2.0 * lamp * dark * matrix[0, 1] + dark * dark * matrix[1, 1]
-    return float(form - 2.0 * (lamp * right[0] + dark * right[1]))
-
-
-@kernel
-def _set_known(terms: Terms, scale: float, known: Floats) -> None:
+def _set_known(scale: float, known: Floats) -> None:
     """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
-    for i in range(2, len(terms) - (terms[-1] == _OTHERS)):
-        mean, deviation = 0.0, _SLOPE_DEVIATION * scale
-        if terms[i] == _AIRLIGHT:
-            mean, deviation = _AIRLIGHT_MEAN * scale, _AIRLIGHT_DEVIATION * scale
-        elif terms[i] == _DAY_ROAD:
-            mean, deviation = _DAY_ROAD_MEAN * scale, _DAY_ROAD_DEVIATION * scale
-        known[0, i], known[1, i] = mean, 1.0 / deviation**2
+    known[0, _AIRLIGHT], known[0, _DAY_ROAD] = _AIRLIGHT_MEAN * scale, _DAY_ROAD_MEAN * scale
+    known[1, _AIRLIGHT] = 1.0 / (_AIRLIGHT_DEVIATION * scale) ** 2
+    known[1, _DAY_ROAD] = 1.0 / (_DAY_ROAD_DEVIATION * scale) ** 2
+    known[1, _SLOPE] = 1.0 / (_SLOPE_DEVIATION * scale) ** 2
 
 
 @kernel
-def _of_all_light(matrix: Floats, right: Floats, terms: Terms, known: Floats, used: Floats, scratch: Floats) -> float:
-    """As `_of_lamps_alone`, with light of others and of the day, whose size is about known."""
-    count = len(terms)
-    free = np.ones(count, np.bool_)
+def _set_amplitudes(gram: Floats, known: Floats, solved: Floats, terms: int, factor: float, used: Floats) -> float:
+    """Set amplitudes for a ratio of veil and road; their quadratic form, and what is known, less the form's constant.
+
+    But for the pedestal and the slope no light is negative.
+    """
     while True:
-        for i in range(count):
-            scratch[i, count] = right[i] + known[1, i] * known[0, i] if free[i] else 0.0
-            for j in range(count):
-                scratch[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
-            scratch[i, i] = matrix[i, i] + known[1, i] if free[i] else 1.0
-        _eliminate(scratch, used)
-        fixed = False
-        # But for the pedestal and the slope no light is negative.
-        for i in range(count):
-            if terms[i] not in (_PEDESTAL, _SLOPE) and used[i] < 0.0 and not fixed:
-                free[i], fixed = False, True
-        if not fixed:
-            return _form(matrix, right, known, used)
+        one = terms >> 1
+        if math.isnan(solved[one, 0, 0]):
+            _solve_but_for_lamps(gram, known, terms, solved[one])
+        own = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
+        lamps = factor * gram[0, -1] + gram[1, -1]
+        for i in range(1, _TERMS):
+            shared = factor * gram[0, 1 + i] + gram[1, 1 + i]
+            own -= shared * (factor * solved[one, i, -2] + solved[one, i, -1])
+            lamps -= shared * solved[one, i, -3]
+        used[_LAMPS] = lamps / max(own, 1e-300) if terms & 1 else 0.0
+        negative = 0 if used[_LAMPS] < 0.0 else _TERMS
+        for i in range(1, _TERMS):
+            used[i] = solved[one, i, -3] - used[0] * (factor * solved[one, i, -2] + solved[one, i, -1])
+            if used[i] < 0.0 and i not in (_PEDESTAL, _SLOPE):
+                negative = min(negative, i)
+        if negative == _TERMS:
+            return float(solved[one, 0, 0] - used[_LAMPS] * lamps)
+        terms &= ~(1 << negative)
 
 
 @kernel
-def _eliminate(a: Floats, found: Floats) -> None:
-    """Solve positive definite equations, whose right side is the last column, by elimination in place."""
-    count = len(a)
-    for i in range(count):
-        scale = 1.0 / a[i, i]
-        for k in range(i + 1, count):
-            share = a[k, i] * scale
-            for j in range(i + 1, count + 1):
-                a[k, j] -= share * a[i, j]
-    for i in range(count - 1, -1, -1):
-        rest = a[i, count]
-        for j in range(i + 1, count):
-            rest -= a[i, j] * found[j]
-        found[i] = rest / a[i, i]
+def _solve_but_for_lamps(gram: Floats, known: Floats, terms: int, a: Floats) -> None:
+    """Amplitudes of some terms without lamplight, and by how much a unit of veil and of road lowers them.
 
-
-@kernel
-def _form(matrix: Floats, right: Floats, known: Floats, used: Floats) -> float:
-    """Quadratic form of amplitudes, and what is known of them, less the form's constant."""
+    They become the last three columns of the equations, whose first row is the solution's form alone.
+    """
     form = 0.0
-    for i in range(len(used)):
-        form += known[1, i] * (used[i] - known[0, i]) ** 2 - 2.0 * used[i] * right[i]
-        for j in range(len(used)):
-            form += used[i] * matrix[i, j] * used[j]
-    return form
+    for i in range(1, _TERMS):
+        is_free, right = (terms >> i) & 1, gram[1 + i, -1] + known[1, i] * known[0, i]
+        for j in range(i, _TERMS):
+            a[i, j] = gram[1 + i, 1 + j] if is_free and (terms >> j) & 1 else 0.0
+        a[i, i] = a[i, i] + known[1, i] if is_free else 1.0
+        a[i, -3], a[i, -2], a[i, -1] = is_free * right, is_free * gram[0, 1 + i], is_free * gram[1, 1 + i]
+        form += known[1, i] * known[0, i] ** 2
+    _eliminate(a)
+    for i in range(1, _TERMS):
+        form -= (gram[1 + i, -1] + known[1, i] * known[0, i]) * a[i, -3]
+    a[0, 0] = form
+
+
+@kernel
+def _eliminate(a: Floats) -> None:
+    """Solve positive definite equations in place, whose right sides are columns; the first row is none of them."""
+    for i in range(1, _TERMS):
+        scale = 1.0 / a[i, i]
+        for k in range(i + 1, _TERMS):
+            share = a[i, k] * scale
+            for j in range(k, a.shape[1]):
+                a[k, j] -= share * a[i, j]
+    for i in range(_TERMS - 1, 0, -1):
+        for side in range(_TERMS, a.shape[1]):
+            for j in range(i + 1, _TERMS):
+                a[i, side] -= a[i, j] * a[j, side]
+            a[i, side] /= a[i, i]
 
 
 @kernel

@@ -199,7 +199,12 @@ class FaceLight:
 
 
 def face_light(
-    light: NDArray[np.float32], place: tuple[float, float], radius: float, layout: Layout, narrowed: float
+    light: NDArray[np.float32],
+    place: tuple[float, float],
+    radius: float,
+    layout: Layout,
+    narrowed: float,
+    noise: float = 0.0,
 ) -> FaceLight | None:
     """Fit a face of known layout, before a background with an even slope, to a part of a picture.
 
@@ -222,8 +227,8 @@ def face_light(
     face = Face(layout, radius, narrowed)
     for _ in range(_ROUNDS):
         fit = _placed(seen, right, down, face, state, weight, _LOOSE)
-        weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep), fit.state
-    weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep)
+        weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep, noise), fit.state
+    weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep, noise)
     fit = _placed(seen, right, down, face, state, weight, (state, _PLACED))
     columns = face.columns(right, down, state)
     # An error of the layout is the same in many pixels: it does not average out as noise does.
@@ -232,10 +237,10 @@ def face_light(
     return _line(face, columns, fit.solved, wider * fit.covariance)
 
 
-def _weights(residual: Floats, reach: Floats, steep: Floats) -> Floats:
+def _weights(residual: Floats, reach: Floats, steep: Floats, least: float) -> Floats:
     """Inverse variances of the pixels: what lies behind a sign is less even than its face, and edges are not sharp."""
     inner, outer = (reach < 0.9) & (steep < np.median(steep)), reach > 1.1
-    noise = max(float(np.sqrt(np.mean(residual[inner] ** 2))) if inner.any() else 0.0, _LEAST_NOISE)
+    noise = max(float(np.sqrt(np.mean(residual[inner] ** 2))) if inner.any() else 0.0, _LEAST_NOISE, least)
     behind = max(float(np.sqrt(np.mean(residual[outer] ** 2))) if outer.any() else noise, noise)
     return np.asarray(1.0 / (np.where(reach > 1.0, behind, noise) ** 2 + (EDGES * steep) ** 2))
 

@@ -363,7 +363,7 @@ class SignContrast:
         sighting = one.sign.sighting
         aside = math.atan2(sighting.lateral, max(one.sign.distance, 1.0))
         narrowed = max(abs(math.cos(sighting.facing + aside)), 0.3)
-        face = face_light(light, (u - left, v - top), radius, layout_of(sighting.kind), narrowed)
+        face = face_light(light, (u - left, v - top), radius, layout_of(sighting.kind), narrowed, sky.noise)
         return None if face is None else FaceLook(one.sign.distance, face, sky.luminance, sky.is_clipped)
 
     def _estimate(self, time: float, found: dict[str, object]) -> Estimate:

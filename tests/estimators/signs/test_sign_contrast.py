@@ -74,6 +74,21 @@ def test_light_of_a_face_is_that_of_the_law():
     assert found.slope == pytest.approx(0.55 * AIRLIGHT * fall, rel=0.1)
 
 
+def test_the_noise_of_few_pixels_is_not_understated() -> None:
+    rng, scale = np.random.default_rng(0), CAMERA.focal_length / 90.0
+    place = CAMERA.principal_point[0] - LATERAL * scale, CAMERA.principal_point[1] - 0.9 * scale
+    clean, read = picture(90.0 - SETBACK, 150.0).astype(np.float32), []
+    for _ in range(60):
+        light = clean + rng.normal(0.0, 2.0, clean.shape).astype(np.float32)
+        found = face_light(light, place, 0.45 * scale, layout_of("yield"), 1.0, noise=2.0)
+        variance, of_slope, shared = found.variance
+        # A face so small is one point of the line, whose variance is that of its mean reflectance.
+        assert found.is_mean
+        read.append((found.black, math.sqrt(variance - shared**2 / of_slope)))
+    seen, claimed = np.array(read).T
+    assert np.std(seen) < 1.3 * np.median(claimed)
+
+
 def test_one_of_three_signs_may_be_wrong() -> None:
     def fit(visibility: float) -> ApproachFit:
         return ApproachFit(-0.5 * ((np.log(GRID) - math.log(extinction_from_visibility(visibility))) / 0.05) ** 2, 1.0)

@@ -39,14 +39,26 @@ from fogsim_envs.batch.stable_baselines import BatchVecEnv
 from fogsim_envs.task.observation import STATE_FEATURES
 
 BATCH = "fogsim/FogAdvisoryBatch-v2"
-DISCOUNT, REPEAT = 0.98, 4  # An action is in force for 2 s, so that it shows in what the next ones earn
+REPEAT = 4  # An action is in force for 2 s, so that it shows in what the next ones earn
 FIRST_RATE, LAST_RATE = 1e-3, 2e-5
 MULTIPLIER_RATE = 0.05
 SMOOTH = 9  # Points of a curve whose mean is drawn
 SHORTEST = 0.01  # Between two points of a curve [min]
 MOST = 100_000_000  # Decisions, more than any training makes; DQN explores during a share of them
 METHODS = {"PPO": PPO, "SAC": SAC, "DQN": DQN}
-ACTIONS: dict[str, dict[str, Any]] = {"PPO": {}, "SAC": {"continuous": True}, "DQN": {"discrete": True}}
+CONSTANTS: dict[str, dict[str, Any]] = {
+    "PPO": {"n_steps": 32, "batch_size": 2048, "n_epochs": 6, "gae_lambda": 0.9, "ent_coef": 0.002},
+    "PPO of few decisions": {
+        "n_steps": 1024, "batch_size": 256, "n_epochs": 20, "gae_lambda": 0.9, "ent_coef": 0.0, "gamma": 0.95,
+        "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.7},
+    },
+    "SAC": {"learning_starts": 2000, "train_freq": 1, "gradient_steps": 4, "ent_coef": "auto_0.1"},
+    "DQN": {
+        "learning_starts": 2000, "train_freq": 1, "gradient_steps": 8, "batch_size": 128,
+        "target_update_interval": 1000, "exploration_fraction": 0.0005, "learning_rate": 3e-4,
+    },
+}  # fmt: skip
+"""Where SUMO makes decisions slow, PPO learns from each more often, with less noise, and from nearer rewards."""
 PARTS = {
     "lead": ("lead_present", "lead_distance", "lead_relative_speed"),
     "estimate": tuple(one for one in STATE_FEATURES if one.startswith("estimate")),
@@ -148,34 +160,25 @@ class Training(BaseCallback):
 
 def trained(asked: argparse.Namespace, seed: int) -> tuple[BaseAlgorithm, list[tuple[float, int, float, float]]]:
     """An agent, and its curve: minutes, decisions, and mean return and cost of the last 500 episodes (SUMO: 50)."""
-    actions, is_batch = ACTIONS[asked.method], "Batch" in asked.train_on
+    is_batch, method = "Batch" in asked.train_on, asked.method
+    is_few = method == "PPO" and not is_batch
+    actions = {"continuous": method == "SAC" or is_few, "discrete": method == "DQN"}
     if is_batch:
         # What learns from each decision many times needs fewer of them.
-        number = 256 if asked.method == "PPO" else 16
+        number = 256 if method == "PPO" else 16
         envs: VecEnv = BatchVecEnv(gym.make_vec(asked.train_on, num_envs=number, **actions).unwrapped, REPEAT)
     else:
         envs = DummyVecEnv([lambda: Repeated(gym.make(asked.train_on, observation="state", **actions))])
     workers = VecMonitor(Hidden(envs, asked.hide), info_keywords=("earned", "cost"))
     workers.seed(seed)
-    # Only rewards are scaled: the state's entries are in -1 ... 1 already.
-    scaled = VecNormalize(workers, norm_obs=False, gamma=DISCOUNT)
     clock = Training(envs, asked.minutes, asked.cost_limit)
-    constants: dict[str, dict[str, Any]] = {
-        "PPO": {
-            "n_steps": 32 if is_batch else 1024, "batch_size": 2048 if is_batch else 256,
-            "n_epochs": 6 if is_batch else 10, "gae_lambda": 0.9, "learning_rate": clock.learning_rate,
-            "ent_coef": 0.002,
-        },
-        "SAC": {"learning_starts": 2000, "train_freq": 1, "gradient_steps": 4, "ent_coef": "auto_0.1"},
-        "DQN": {
-            "learning_starts": 2000, "train_freq": 1, "gradient_steps": 8, "batch_size": 128,
-            "target_update_interval": 1000, "exploration_fraction": 0.0005, "learning_rate": 3e-4,
-        },
-    }  # fmt: skip
-    agent = METHODS[asked.method](
-        "MlpPolicy", scaled, gamma=DISCOUNT, stats_window_size=500 if is_batch else 50, seed=seed, device="cpu",
-        policy_kwargs={"net_arch": [64, 64]}, **constants[asked.method],
-    )  # fmt: skip
+    constants = {"gamma": 0.98, "policy_kwargs": {"net_arch": [64, 64]}}
+    constants |= {"learning_rate": clock.learning_rate} if method == "PPO" else {}
+    constants |= CONSTANTS["PPO of few decisions" if is_few else method]
+    # Only rewards are scaled: the state's entries are in -1 ... 1 already.
+    scaled = VecNormalize(workers, norm_obs=False, gamma=constants["gamma"])
+    window = 500 if is_batch else 50
+    agent = METHODS[method]("MlpPolicy", scaled, stats_window_size=window, seed=seed, device="cpu", **constants)
     agent.learn(MOST, callback=clock)
     agent.learning_rate = LAST_RATE  # The file need not hold the clock, and with it all episodes.
     agent._setup_lr_schedule()
@@ -222,6 +225,12 @@ def rule_arguments(env_id: str, rule: RuleConstants) -> dict[str, Any]:
     if math.isfinite(rule.fallback):
         given["fallback"] = rule.fallback
     return {"overrides": [f"advice={json.dumps({'method': 'stopping_sight_distance', 'parameters': given})}"]}
+
+
+def actions_of(agent: BaseAlgorithm) -> dict[str, bool]:
+    """Which actions an environment must have for an agent."""
+    space = agent.action_space
+    return {"continuous": isinstance(space, gym.spaces.Box), "discrete": isinstance(space, gym.spaces.Discrete)}
 
 
 def compared(agent: Evaluation, other: Evaluation) -> dict[str, float]:
@@ -280,7 +289,7 @@ def main() -> None:
         others = {name: evaluate(name, env_id, seeds, **state) for name in ("rule", "oracle")}
         others["tuned rule"] = evaluate("rule", env_id, seeds, **state, **rule_arguments(env_id, tuned))
         for number, agent in agents.items():
-            ours = evaluate(agent, env_id, seeds, **state, **ACTIONS[asked.method])
+            ours = evaluate(agent, env_id, seeds, **state, **actions_of(agent.agent))
             gains = {name: compared(ours, one) for name, one in others.items()}
             print(json.dumps({"id": env_id, "seed": number, **gains}), flush=True)
 

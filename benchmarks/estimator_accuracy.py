@@ -91,17 +91,17 @@ def measure_unit(
     rows = []
     for visibility in [*map(float, fogs), *[math.inf] * draws]:
         marks, levels = bool(rng.integers(2)), float(rng.choice(AIRLIGHT_LEVELS))
-        told = dataclasses.replace(true, pitch=true.pitch + math.radians(rng.normal(0.0, pitch)))
+        stated = dataclasses.replace(true, pitch=true.pitch + math.radians(rng.normal(0.0, pitch)))
         occupied, measured = with_leader(free, rng)
         condition = {"visibility": visibility, "marks": marks, "levels": levels, "camera": number}
         for lead, instant in (("absent", free), ("unmeasured", occupied)):
             view = road(scenes, seed, surface, repairs).view(instant.state, instant.ego, true, marks=marks)
             seen = Observation(photograph(view, true, driven(scenes, seed).fog, visibility, levels, rng), 25.0)
-            rows += [condition | {"lead": lead} | look(form, told, seen) for form in forms]
+            rows += [condition | {"lead": lead} | look(form, stated, seen) for form in forms]
         seen = dataclasses.replace(seen, lead=measured)
         # The papers' own forms make nothing of a range.
         ranging = [form for form in forms if not form.endswith(PUBLISHED)]
-        rows += [condition | {"lead": "measured"} | look(form, told, seen) for form in ranging]
+        rows += [condition | {"lead": "measured"} | look(form, stated, seen) for form in ranging]
     return rows
 
 

@@ -27,6 +27,9 @@ _LAMPS, _PEDESTAL, _AIRLIGHT, _DAY_ROAD, _SLOPE, _OTHERS, _TERMS = range(7)
 """Terms that add up to the light: lamplight, pedestal, airlight, the road by day, how the sky brightens upward, glow of
 others' lamps; and how many they are. Sets of terms are bits."""
 
+_ROUNDING = 1e-12
+"""Share of a sum of squares below which what is left of it is rounding [-]."""
+
 _SLOPE_AT_TOP = 4.0
 """How much brighter the highest cell of the sky is for each unit of the slope [-]."""
 
@@ -103,13 +106,11 @@ def log_likelihoods(
     terms += (shapes > 0) << _OTHERS
     weighed, factors = _weighed(measured, weight / variance), np.exp(_RATIOS)
     power = (weighed.seen * measured.seen).sum()
-    kept, gram, known, used = (
-        np.zeros(cells),
-        np.zeros((_TERMS + 1, _TERMS + 2)),
-        np.zeros((2, _TERMS)),
-        np.zeros(_TERMS),
-    )
-    solved, found, highest = np.zeros((1 << (_TERMS - 1), _TERMS, _TERMS + 3)), np.empty((draws, count)), -np.inf
+    kept, gram = np.zeros(cells), np.zeros((_TERMS + 1, _TERMS + 2))
+    known, used = np.zeros((2, _TERMS)), np.zeros(_TERMS)
+    # By which terms but the lamplight are free
+    solved = np.zeros((1 << (_TERMS - 1), _TERMS, _TERMS + 3))
+    found, highest = np.empty((draws, count)), -np.inf
     for place in range(count):
         for draw in range(draws):
             if is_day or draw == 0:
@@ -263,13 +264,14 @@ def _set_amplitudes(gram: Floats, known: Floats, solved: Floats, terms: int, fac
         one = terms >> 1
         if math.isnan(solved[one, 0, 0]):
             _solve_but_for_lamps(gram, known, terms, solved[one])
-        own = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
+        whole = own = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
         lamps = factor * gram[0, -1] + gram[1, -1]
         for i in range(1, _TERMS):
             shared = factor * gram[0, 1 + i] + gram[1, 1 + i]
             own -= shared * (factor * solved[one, i, -2] + solved[one, i, -1])
             lamps -= shared * solved[one, i, -3]
-        used[_LAMPS] = lamps / max(own, 1e-300) if terms & 1 else 0.0
+        # Lamplight that looks like the other terms shows nothing but rounding.
+        used[_LAMPS] = lamps / own if terms & 1 and own > _ROUNDING * whole else 0.0
         negative = 0 if used[_LAMPS] < 0.0 else _TERMS
         for i in range(1, _TERMS):
             used[i] = solved[one, i, -3] - used[0] * (factor * solved[one, i, -2] + solved[one, i, -1])

@@ -204,7 +204,7 @@ def face_light(
     radius: float,
     layout: Layout,
     narrowed: float,
-    noise: float = 0.0,
+    noise: float,
 ) -> FaceLight | None:
     """Fit a face of known layout, before a background with an even slope, to a part of a picture.
 

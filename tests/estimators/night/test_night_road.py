@@ -1,11 +1,13 @@
 """Fog from what the own head lamps light: fog and road, by one model."""
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import InputError
@@ -209,6 +211,43 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
         assert np.allclose(best.luminance, shown, rtol=2e-3)
         assert best.summary[0] < 1e-2
         assert best.summary[1] == pytest.approx(seen.sum() / shown.sum(), abs=0.01)
+
+
+def test_amplitudes_are_those_of_least_squares() -> None:
+    rng, sky, cells = np.random.default_rng(2), 12, 30
+    is_sky = np.arange(cells) < sky
+    up, depth = (
+        np.where(is_sky, np.linspace(0.1, 1.0, cells), 0.0),
+        np.where(is_sky, 1e9, np.linspace(80.0, 8.0, cells)),
+    )
+    veil = np.exp(0.5 * rng.standard_normal(cells)).astype(np.float32)
+    road = np.where(is_sky, 0.0, np.exp(rng.standard_normal(cells))).astype(np.float32)
+    glow, kept, scale = np.geomspace(1.0, 0.01, cells), np.exp(-0.03 * depth), 0.2
+    # Airlight, the road by day, how the sky brightens and the glow, with what is known of them; the pedestal before.
+    light = np.stack([np.ones(cells), 1.0 - kept, kept, 4.0 * up, glow])
+    mean = np.array([0.0, 0.7, 0.15, 0.0, 0.0]) * scale
+    deviation = np.array([0.01, 0.5 * scale, 0.12 * scale, 0.3 * scale, 1.0])
+    for amounts in (
+        (0.3, 0.001, 0.1, 0.02, 0.02, 0.3),
+        (0.3, 0.001, 0.1, -0.2, 0.02, -0.3),
+        (-0.3, 0.0, 0.2, 0.05, 0.0, 0.0),
+    ):
+        shown = amounts[0] * (veil + road) + np.array(amounts[1:]) @ light
+        measured, best = Measured(shown, up, glow[None], scale, 0.0, 0.01, 20.0), Fit(np.empty(cells), np.empty(2))
+        spread, templates = np.full(cells, 0.01**2), (one[None, None] for one in (veil, road))
+        found = log_likelihoods(
+            measured, np.array([0.03]), *templates, depth[None].astype(np.float32), spread, np.ones(cells), best
+        )
+        total = 0.0
+        for ratio in np.linspace(-1.8, 1.8, 7):
+            terms = np.vstack([math.exp(ratio) * veil + road, light])
+            rows = np.vstack([terms.T / 0.01, np.diag(np.concatenate([[0.0], 1.0 / deviation]))[1:]])
+            wanted = np.concatenate([shown / 0.01, mean / deviation])
+            lowest = np.array([0.0, -np.inf, 0.0, 0.0, -np.inf, 0.0])
+            solved = lsq_linear(rows, wanted, (lowest, np.inf), tol=1e-14)
+            square = 2.0 * solved.cost / cells
+            total += (0.25 + square) ** -10.0 * math.exp(-0.5 * (ratio / 0.7) ** 2)
+        assert found[0, 0] == pytest.approx(math.log(total), abs=1e-4)
 
 
 def test_noise_that_is_cut_off_at_the_dark_is_allowed_for() -> None:

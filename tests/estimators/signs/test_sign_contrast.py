@@ -68,7 +68,7 @@ def test_light_of_a_face_is_that_of_the_law():
     scale = CAMERA.focal_length / (distance + SETBACK)
     place = CAMERA.principal_point[0] - LATERAL * scale, CAMERA.principal_point[1] - 0.9 * scale
     light = picture(distance, visibility).astype(np.float32)
-    found = face_light(light, place, 0.45 * scale, layout_of("speed_limit"), 1.0)
+    found = face_light(light, place, 0.45 * scale, layout_of("speed_limit"), 1.0, 0.0)
     fall = math.exp(-extinction_from_visibility(visibility) * (distance + SETBACK))
     assert found.black == pytest.approx(AIRLIGHT * (1.0 - fall), rel=0.03)
     assert found.slope == pytest.approx(0.55 * AIRLIGHT * fall, rel=0.1)
@@ -80,7 +80,7 @@ def test_the_noise_of_few_pixels_is_not_understated() -> None:
     clean, read = picture(90.0 - SETBACK, 150.0).astype(np.float32), []
     for _ in range(60):
         light = clean + rng.normal(0.0, 2.0, clean.shape).astype(np.float32)
-        found = face_light(light, place, 0.45 * scale, layout_of("yield"), 1.0, noise=2.0)
+        found = face_light(light, place, 0.45 * scale, layout_of("yield"), 1.0, 2.0)
         variance, of_slope, shared = found.variance
         # A face so small is one point of the line, whose variance is that of its mean reflectance.
         assert found.is_mean

@@ -10,8 +10,8 @@ as they enter, and complies without delay). Protocols:
 - ``full_road``: the scenario's own demand. The road has filled for 180 s when the ego comes and advice begins, for all
   on it and for all who enter; after 160 s the run ends.
 
-    python benchmarks/collisions.py [--json] [--seeds 20] [--visibility 60 --visibility 1000]
-                                    [--protocol from_the_beginning --protocol full_road] [--speed-choice unaffected]
+    python benchmarks/collisions.py [--json] [--docs] [--seeds 10] [--visibility 20 40 60]
+                                    [--protocol from_the_beginning full_road] [--speed-choice observed unaffected]
 
 Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the mean over seeds.
 """
@@ -19,11 +19,12 @@ Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the
 import itertools
 import math
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from harness import ROOT, Row, mean, parse_options, publish
+from harness import ROOT, Row, lines_of, mean, parse_options, progress, publish
 
 import fogsim
 from fogsim.atmosphere import FieldAccess
@@ -91,7 +92,7 @@ def one_run(visibility: float, protocol: str, oracle: bool, speed_choice: str, s
         return collisions
 
 
-def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, seeds: int) -> Row:
+def measure(protocol: str, speed_choice: str, visibility: float, oracle: bool, seeds: int) -> Row:
     """One record over all seeds."""
     runs = [one_run(visibility, protocol, oracle, speed_choice, seed) for seed in range(seeds)]
     counts = np.array([len(run) for run in runs])
@@ -112,17 +113,39 @@ def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, s
     }
 
 
+def table(records: Sequence[Row]) -> list[str]:
+    """A line for each visibility, choice of speed and protocol, without and with advice."""
+    headings = ("advice begins", "drivers", "V_met", "left alone", "mean impact", "advised")
+    lines = []
+    for alone, advised in zip(records[::2], records[1::2], strict=True):
+        impact = alone["impact_speed_mean"]
+        begins = "with the run" if alone["protocol"] == "from_the_beginning" else "on a full road"
+        choice = f"`{alone['speed_choice']}`"
+        impact = "–" if impact is None else f"{impact:.1f} m/s"
+        lines.append((begins, choice, f"{alone['visibility']:g} m", counts(alone), impact, counts(advised)))
+    return lines_of(headings, lines)
+
+
+def counts(record: Row) -> str:
+    """Collisions of a run with their interval, and in how many runs there was one."""
+    if not record["runs_with_collision"]:
+        return "0, no run"
+    low, middle, high = (record[f"collisions_{name}"] for name in ("low", "mean", "high"))
+    return f"{middle:.1f} ({low:.1f} … {high:.1f}), {record['runs_with_collision']} of {record['seeds']} runs"
+
+
 def main() -> None:
     """Measure and print."""
     given = parse_options(
         __doc__,
-        seeds=(20, "seeds for each visibility and policy"),
-        visibility=([60.0, 1000.0], "visibilities [m]"),
+        docs=("explanation/drivers.md", "collisions"),
+        seeds=(10, "seeds for each visibility and policy"),
+        visibility=([20.0, 40.0, 60.0], "visibilities [m]"),
         protocol=(list(SECONDS), "when advice begins", SECONDS),
-        speed_choice=("unaffected", "how fast drivers drive in fog by themselves"),
+        speed_choice=(["observed", "unaffected"], "how fast drivers drive in fog by themselves"),
     )
-    cases = itertools.product(given.visibility, given.protocol, (False, True))
-    publish(given, [measure(*case, given.speed_choice, given.seeds) for case in cases])
+    cases = list(itertools.product(given.protocol, given.speed_choice, given.visibility, (False, True)))
+    publish(given, [measure(*case, given.seeds) for case in progress(cases, "cases")], table)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,16 @@
 """Gaps that drivers accept at an unsignalised crossing in fog, and what comes of it.
 
 A road with priority (700 vehicles an hour in one direction, Poisson arrivals, 50 km/h) is crossed by another one (200
-an hour); by day, step 0.1 s, drivers who do not slow down for the fog unless another choice is named. A gap is the time
-between two vehicles of the first road at the crossing; it is accepted by who drives onto the crossing in it, and
-refused by who has come within 10 m of the crossing before it begins and enters after its end.
+an hour); by day, step 0.1 s. Drivers are SUMO's own, whom fog does not concern, or FogSim's with a choice of speed. A
+gap is the time between two vehicles of the first road at the crossing; it is accepted by who drives onto the crossing
+in it, and refused by who has come within 10 m of the crossing before it begins and enters after its end.
 
 Of all seeds together: accepted gaps at the quantiles 0 (smallest), 15 % and 50 % [s], the largest refused one [s], the
 share of gaps below 5 s that are accepted, collisions in 1000 crossings with the mean of their impact speeds [m/s], and
 vehicles of the first road that brake harder than 4.5 m/s², in 1000 crossings.
 
-    python benchmarks/junctions.py [--json] [--visibility inf --visibility 60 …] [--seeds 5] [--minutes 30]
-        [--speed-choice unaffected] [--see-through-fog]
+    python benchmarks/junctions.py [--json] [--docs] [--visibility inf 60 20] [--seeds 5] [--minutes 30]
+        [--drivers sumo unaffected observed]
 """
 
 import argparse
@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from harness import ROOT, parse_options, publish
+from harness import ROOT, Row, lines_of, parse_options, progress, publish
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import SPEED_CHOICES, AfterCollision, DriverSetup, DriverSight, TrafficSetup, libsumo_traffic
@@ -40,6 +40,8 @@ MAJOR_WAY, MINOR_WAY = ":C_10", ":C_7"
 """Where the two roads cross, straight on."""
 WAITING_PLACE = 10.0
 """Who is nearer to the crossing than this has come to it [m]."""
+SUMO = "sumo"
+"""The drivers of SUMO, who see through fog."""
 HARD = 4.5
 """SUMO's comfortable deceleration of a passenger car [m/s²]."""
 SHORT_GAP = 5.0
@@ -55,7 +57,7 @@ class Crossings:
     crossings: int = 0
     hard: int = 0
 
-    def record(self) -> dict[str, float | None]:
+    def record(self) -> Row:
         """The figures."""
         smallest, low, middle = (quantile(self.accepted, q) for q in (0.0, 0.15, 0.5))
         short = [sum(gap < SHORT_GAP for gap in gaps) for gaps in (self.accepted, self.refused)]
@@ -67,7 +69,7 @@ class Crossings:
             "refused_most_s": quantile(self.refused, 1.0),
             "short_accepted": round(short[0] / max(sum(short), 1), 2),
             "collisions_per_1000": round(1000.0 * len(self.impacts) / max(self.crossings, 1), 1),
-            "impact_mps": round(statistics.mean(self.impacts), 1) if self.impacts else 0.0,
+            "impact_mps": round(statistics.mean(self.impacts), 1) if self.impacts else None,
             "hard_braking_per_1000": round(1000.0 * self.hard / max(self.crossings, 1), 1),
         }
 
@@ -154,9 +156,9 @@ def count(major: Sequence[float], minor: dict[str, float], waiting: dict[str, fl
             seen.refused.append(gap)
 
 
-def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float | str | None]:
+def measure(drivers: str, visibility: float, arguments: argparse.Namespace) -> Row:
     """One record."""
-    seen, duration = Crossings(), 60.0 * arguments.minutes
+    seen, duration, is_sumo = Crossings(), 60.0 * arguments.minutes, drivers == SUMO
     for seed in range(1, arguments.seeds + 1):
         with tempfile.TemporaryDirectory() as name:
             setup = TrafficSetup(
@@ -169,25 +171,61 @@ def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float
                 warm_up_limit=10.0,
                 advice_deceleration=2.0,
                 reading_radius=10.0,
-                sight=None if arguments.see_through_fog else DriverSight(illuminance=10_000.0),
-                drivers=DriverSetup(SPEED_CHOICES[arguments.speed_choice]()),
+                sight=None if is_sumo else DriverSight(illuminance=10_000.0),
+                drivers=DriverSetup(SPEED_CHOICES["unaffected" if is_sumo else drivers]()),
                 after_collision=AfterCollision.REMOVE,
             )
             run(visibility, setup, duration, seed, seen)
-    return {"visibility_m": "inf" if math.isinf(visibility) else visibility, **seen.record()}
+    return {"drivers": drivers, "visibility_m": "inf" if math.isinf(visibility) else visibility, **seen.record()}
+
+
+COLUMNS = {
+    "crossings": ("crossings", "{}"),
+    "accepted_least_s": ("accepted gaps: smallest", "{} s"),
+    "accepted_15_s": ("15 %", "{} s"),
+    "accepted_50_s": ("50 %", "{} s"),
+    "refused_most_s": ("largest refused", "{} s"),
+    "short_accepted": ("of gaps < 5 s accepted", "{:.0%}"),
+    "collisions_per_1000": ("collisions in 1000", "{:.0f}"),
+    "impact_mps": ("mean impact", "{} m/s"),
+    "hard_braking_per_1000": ("braking > 4.5 m/s² in 1000", "{:.0f}"),
+}
+"""Headings of the docs' table and forms of its figures, by the record's keys."""
+
+
+def table(records: Sequence[Row]) -> list[str]:
+    """A line for each kind of drivers and visibility."""
+    lines = []
+    for row in records:
+        who = "SUMO's own" if row["drivers"] == SUMO else f"`{row['drivers']}`"
+        where = (
+            "any" if row["drivers"] == SUMO else "∞" if row["visibility_m"] == "inf" else f"{row['visibility_m']:g} m"
+        )
+        figures = ["–" if row[key] is None else form.format(row[key]) for key, (_, form) in COLUMNS.items()]
+        lines.append((who, where, *figures))
+    return lines_of(("drivers", "V_met", *(heading for heading, _ in COLUMNS.values())), lines)
 
 
 def main() -> None:
     """Measure and print."""
     given = parse_options(
         __doc__,
+        docs=("explanation/drivers.md", "junctions"),
         visibility=([math.inf, 60.0, 20.0], "V_met [m]"),
         seeds=(5, "seeds 1, 2, …"),
         minutes=(30.0, "simulated time of each seed"),
-        speed_choice=("unaffected", "how drivers choose their speed in fog"),
-        see_through_fog=(False, "SUMO's own drivers"),
+        drivers=(
+            [SUMO, "unaffected", "observed"],
+            "SUMO's own, or how drivers choose their speed",
+            (SUMO, *SPEED_CHOICES),
+        ),
     )
-    publish(given, [measure(visibility, given) for visibility in given.visibility])
+    cases = [
+        (drivers, visibility)
+        for drivers in given.drivers
+        for visibility in (given.visibility[:1] if drivers == SUMO else given.visibility)
+    ]
+    publish(given, [measure(*case, given) for case in progress(cases, "cases")], table)
 
 
 if __name__ == "__main__":

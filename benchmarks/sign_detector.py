@@ -9,18 +9,18 @@ the map's regions, a frame, that are no sign: `with` one standing there, and whe
 (`without`). Times are of one processor: projection, detection and registration of three signs, and a whole frame.
 Constants were chosen with `--pool 0`; what is reported is of `--pool 1`.
 
-    python benchmarks/sign_detector.py [--json] [--pool 1] [--draws 8] [--pictures fogsim painted] [--kinds stop …]
-        [--visibilities 50 …] [--distances 10 …] [--frames 20]
+    python benchmarks/sign_detector.py [--json] [--docs] [--pool 1] [--draws 12] [--pictures fogsim painted]
+        [--kinds stop …] [--visibilities 50 …] [--distances 10 …] [--frames 20]
 """
 
 import argparse
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from harness import Row, parse_options, publish
+from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 from sign_pictures import (
@@ -197,12 +197,43 @@ def _least_ms(work: Callable[[], None], times: int) -> float:
     return 1e3 * least
 
 
+HEADINGS = ("images", "recall", "false alarms a frame, with the sign", "where the map is wrong", "recall of triangles")
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """A line for each kind of images, with the operating ranges of two visibilities."""
+    lines = []
+    for pictures, name, triangles in (("fogsim", "FogSim's", OWN_TRIANGLES), ("painted", "painted", TRIANGLES)):
+        of_kinds = [row for row in rows if row["pictures"] == pictures]
+        (whole,) = (row for row in of_kinds if row["kind"] == "all but triangles")
+        alarms = [f"{whole[f'false_alarms_{place}']:.3f}" for place in ("with", "without")]
+        ranges = [_range(of_kinds, triangles, visibility) for visibility in (50.0, 100.0)]
+        corners = [row for row in of_kinds if row["kind"] in triangles]
+        lines.append((name, _recall([whole]), *alarms, _recall(corners), *ranges))
+    return lines_of(
+        (*HEADINGS, "operating range at 50 m", "at 100 m"), [*lines, ("wanted", "98 %", "0.05", "0.05", "", "", "")]
+    )
+
+
+def _recall(rows: Sequence[Row]) -> str:
+    looks = sum(row["looks"] for row in rows)
+    return f"{sum(row['looks'] * row['recall_half_pct'] for row in rows) / looks:.1f} % of {looks}"
+
+
+def _range(rows: Sequence[Row], triangles: Collection[str], visibility: float) -> str:
+    ranges = [
+        row["operating_range_m"] for row in rows if row["visibility_m"] == visibility and row["kind"] not in triangles
+    ]
+    return f"{min(ranges):g}–{max(ranges):g} m"
+
+
 def main() -> None:
     """Measure, and print a table or JSON."""
     given = parse_options(
         __doc__,
+        docs=("explanation/signs.md", "sign detector"),
         pool=(1, "which draws"),
-        draws=(8, "of each distance"),
+        draws=(12, "of each distance"),
         frames=(20, "frames that are timed, 0 for none"),
         pictures=(["fogsim", "painted"], "which", ("fogsim", "painted")),
         kinds=(["all"], "of signs"),
@@ -216,7 +247,7 @@ def main() -> None:
             found.append(whole_pictures(given.visibilities, given.draws, np.random.default_rng([given.pool, 19])))
     if given.frames:
         found.append(timed(given.frames))
-    publish(given, found)
+    publish(given, found, docs=table)
 
 
 if __name__ == "__main__":

@@ -113,6 +113,7 @@ MEASUREMENTS = (
         ("night choices",),
     ),
     benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
+    benchmark("night_sources", 5, ("halos",)),
     Measurement(
         "restoration",
         ("OMP_NUM_THREADS=1 python benchmarks/restoration.py --docs",),
@@ -125,6 +126,7 @@ MEASUREMENTS = (
     benchmark("photograph_roads", 1, ("photographs",)),
     benchmark("camera_kinds", 3, ("camera kinds",), " --images 5"),
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
+    benchmark("sign_detector", 5, ("sign detector",)),
     benchmark("sensor_faults", 6, ("sensor faults",)),
     benchmark("roadside_cameras", 3, ("roadside cameras",)),
     benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
@@ -153,6 +155,8 @@ MEASUREMENTS = (
         ("fogsim/reproduce/drivers/__init__.py",),
         ("drivers-published", "drivers-traffic"),
     ),
+    benchmark("junctions", 6),
+    benchmark("collisions", 15),
     Measurement(
         "airlight",
         (
@@ -204,14 +208,8 @@ UNWRITTEN = (
     Unwritten("docs/benchmarks/policies.md", "compared with real roads", "from `field_sizes`, by hand"),
     Unwritten("docs/explanation/drivers.md", "who sees what at night", "`fogsim.traffic.drivers`, by hand"),
     Unwritten("docs/explanation/drivers.md", "how far a traffic light is seen", "Allard's law, by hand"),
-    Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
-    Unwritten("docs/explanation/drivers.md", "collisions with standing vehicles", "`python benchmarks/collisions.py`"),
-    Unwritten("docs/explanation/drivers.md", "networks from other sources", "`python benchmarks/networks.py`"),
-    Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
-    Unwritten("docs/explanation/night.md", "pictures taken for fog", "`python benchmarks/night_sources.py`"),
     Unwritten("docs/explanation/night.md", "sight by low and high beams", "`fogsim.lighting.own_sight`, by hand"),
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
-    Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
     Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
     Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_agent.py`"),
 )

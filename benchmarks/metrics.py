@@ -25,7 +25,6 @@ from harness import Row, parse_options, publish
 from traffic import CONFIGURATIONS, timed
 
 from fogsim.metrics import METRICS, RunMetrics
-from fogsim.scenario import build
 from fogsim.scenario.loading import clock_settings, scenario_from_config
 from fogsim.simulation.loop import run
 from fogsim.study.profiles import RunProfiles
@@ -54,7 +53,7 @@ def measure(network: str, frames: str, vehicles: int, seconds: float, size: int,
         told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", f"duration_s={seconds}", *settings]
         scenario = scenario_from_config(config, "ego", [*clock_settings(0.1, period, period), *told])
         profiles = [RunProfiles()] if profiled else []
-        metrics = RunMetrics(build.safety_standard(scenario), watchers=profiles)
+        metrics = RunMetrics(watchers=profiles)
         steps = run(scenario, 1)
         last = [next(steps)]
 

@@ -22,7 +22,6 @@ from fogsim.metrics import step_metrics
 from fogsim.offline import FrameEstimates, Picture
 from fogsim.offline.overlay import Overlay
 from fogsim.recorders import FramePanel
-from fogsim.scenario import build
 from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.adaptation import adaptation, contrast_ratio
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
@@ -118,9 +117,8 @@ def demo_when(begins: Callable[[Step], bool]) -> Callable[[], Image.Image]:
 
     def draw() -> Image.Image:
         panel, scenario = FramePanel(), fogsim.load_scenario("motorway_fog_bank")
-        standard = build.safety_standard(scenario)
         for step in fogsim.run(scenario, seed=1):
-            drawn = panel.draw(step, step_metrics(step, standard))
+            drawn = panel.draw(step, step_metrics(step))
             if begins(step):
                 return Image.fromarray(drawn)
         raise SystemExit("the demo ended before that moment")

@@ -17,7 +17,7 @@ from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import Simulation, refuse_copies
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
-from fogsim_envs.rewards import RewardWeights, reward_terms
+from fogsim_envs.rewards import RewardWeights, advice_standard, reward_terms
 from fogsim_envs.spaces import ImageSize, action_space, command_of, observation_space, observe
 
 Observation = dict[str, NDArray[Any]]
@@ -72,7 +72,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         build.check_frames(scenario, "the agent")
         self._active = scenario
         self._frames = build.periods(scenario).decision_frames
-        self._standard, self._advice = build.safety_standard(scenario), build.advice_config(scenario)
+        self._standard, self._advice = advice_standard(scenario), build.advice_config(scenario)
         rate = 1 / scenario.clocks.decision_period_s
         self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": rate}
 
@@ -99,7 +99,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         return observe(self._step), _info(self._step)
 
     def _show(self, step: Step) -> None:
-        self._renderer.show(step, self._standard, self.metadata["render_fps"])
+        self._renderer.show(step, self.metadata["render_fps"])
 
     def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let an action be in force for one decision period."""
@@ -125,7 +125,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""
         if self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before render()")
-        return self._renderer.render(self._step, self._standard)
+        return self._renderer.render(self._step)
 
     def close(self) -> None:
         """End the simulation and close the window; closing twice is allowed."""

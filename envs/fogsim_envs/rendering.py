@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.metrics import SafetyStandard, step_metrics
+from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
 from fogsim.values import Step
 
@@ -57,25 +57,25 @@ class StepRenderer:
         self._panel = self._make_panel()
         self._drawn: tuple[Step, NDArray[np.uint8]] | None = None
 
-    def show(self, step: Step, standard: SafetyStandard, rate: float) -> None:
+    def show(self, step: Step, rate: float) -> None:
         """Show a step that was just made if there is a window; it stands there as long as the step takes.
 
         Takes `rate` [1/s].
         """
         if self._mode == "human":
-            self._window.show(self._picture(step, standard), rate)
+            self._window.show(self._picture(step), rate)
 
-    def render(self, step: Step, standard: SafetyStandard) -> NDArray[np.uint8] | None:
+    def render(self, step: Step) -> NDArray[np.uint8] | None:
         """What `gymnasium.Env.render` gives: the picture of the latest step; None with a window or without a mode."""
         if self._mode is None:
             gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
         # A window shows the step already.
-        return self._picture(step, standard).copy() if self._mode == "rgb_array" else None
+        return self._picture(step).copy() if self._mode == "rgb_array" else None
 
-    def _picture(self, step: Step, standard: SafetyStandard) -> NDArray[np.uint8]:
+    def _picture(self, step: Step) -> NDArray[np.uint8]:
         # The panel remembers what it has drawn, for its charts.
         if self._drawn is None or self._drawn[0] is not step:
-            self._drawn = step, self._panel.draw(step, step_metrics(step, standard))
+            self._drawn = step, self._panel.draw(step, step_metrics(step))
         return self._drawn[1]
 
     def close(self) -> None:

@@ -1,9 +1,11 @@
 """What an agent is rewarded for: named terms, so that users can weigh them again."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from fogsim.advice import ADVISERS
 from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
+from fogsim.scenario import Scenario, build
 from fogsim.values import Lamp, Step
 
 _COMFORTABLE_DECELERATION = 2.0
@@ -24,6 +26,16 @@ class RewardWeights:
     discomfort: float = 0.3  # Against decelerations above 2 m/s²
     collision: float = 50.0  # Against a collision, once
     lamps: float = 0.2  # Against a rear fog lamp that blinds others in clear air or is dark in dense fog
+
+
+def advice_standard(scenario: Scenario) -> SafetyStandard:
+    """What rewards judge by: the reaction time and deceleration that the scenario's adviser counts with, if it does."""
+    advising, usual = build.advice_config(scenario).adviser.make(ADVISERS), DEFAULT_STANDARD
+    return replace(
+        usual,
+        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
+        deceleration=getattr(advising, "deceleration", usual.deceleration),
+    )
 
 
 def reward_terms(

@@ -6,7 +6,6 @@ from fogsim.scenario.parts.methods import (
     check_frames,
     method,
     own_methods,
-    safety_standard,
     sections_config,
 )
 from fogsim.scenario.parts.run import run_config
@@ -25,7 +24,6 @@ __all__ = [
     "periods",
     "reports_config",
     "run_config",
-    "safety_standard",
     "sections_config",
     "traffic_setup",
     "world_config",

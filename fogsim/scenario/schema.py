@@ -36,12 +36,10 @@ from fogsim.values.scene import USUAL_PAVEMENT, RoadSurface
 
 
 class InformedMethod(Method):
-    """A method that uses the fog, known from the ego's belief or, with a meter next to the road, in truth.
-
-    Advice may also go by the reports of sensors next to the road, where sections of road are advised.
-    """
+    """A method that uses the visibility."""
 
     informed_by: Literal["belief", "truth", "sensors"] = "belief"
+    """Source of the visibility: the ego's belief, the truth, or, for advised sections, the reports of roadside sensors."""
 
 
 class ControllerSection(Method):

@@ -192,13 +192,14 @@ MISTAKE = "parameter"
 """Type of the errors of parameters, whose messages are complete."""
 
 
-class Method(BaseModel):
-    """A named method and its parameters (SI units, as its documentation names them)."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class Method(Section):
+    """A named method and its parameters."""
 
     method: str
+    """Name of the method (`fogsim list`), `module:Class` or `onnx:FILE`."""
+
     parameters: dict[str, Any] = Field(default_factory=dict)
+    """Arguments of its constructor, in SI units."""
 
 
 def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:

@@ -1,13 +1,11 @@
-"""The methods that a run has chosen: estimators and advisers, and what judges a run by its advice."""
+"""The methods that a run has chosen: estimators, advisers and controllers."""
 
-import dataclasses
 from collections.abc import Iterable
 
 from fogsim.advice import ADVISERS, CONTROLLERS, Adviser, BeliefController, Controller, VehicleAdviser
 from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator, supply
-from fogsim.metrics import SafetyStandard
 from fogsim.values import Camera
 
 
@@ -38,13 +36,3 @@ def road_adviser(chosen: MethodConfig) -> Adviser:
             "where roads are advised, take an adviser with advise()"
         )
     return advising
-
-
-def safety_standard(chosen: MethodConfig) -> SafetyStandard:
-    """What a run is judged by: the reaction time and deceleration that its adviser counts with, where it has them."""
-    advising, usual = adviser(chosen), SafetyStandard()
-    return dataclasses.replace(
-        usual,
-        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
-        deceleration=getattr(advising, "deceleration", usual.deceleration),
-    )

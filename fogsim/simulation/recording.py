@@ -30,7 +30,6 @@ from fogsim.recorders import (
     StepRecorder,
     write_sign_map,
 )
-from fogsim.simulation.chosen_methods import safety_standard
 from fogsim.simulation.loop import Processes, run, warn_of_unplayed
 from fogsim.simulation.run_config import RunConfig, RunRecord, ScenarioLike
 from fogsim.simulation.traffic_run import run_traffic
@@ -175,7 +174,7 @@ def record_run(
     def of_ego() -> _Recorded[Step]:
         return _Recorded(
             lambda folder: run(config, seed, sumo_outputs=folder, camera_processes=camera_processes),
-            RunMetrics(safety_standard(config.advice.adviser)),
+            RunMetrics(),
             RECORDERS,
             watch,
         )
@@ -204,7 +203,7 @@ def record_traffic(
         road = RoadSpeeds()
         return _Recorded(
             lambda folder: run_traffic(config, seed, folder),
-            TrafficRunMetrics(safety_standard(config.advice.adviser), watchers=[road]),
+            TrafficRunMetrics(watchers=[road]),
             TRAFFIC_RECORDERS,
             watch,
             road,

@@ -53,14 +53,14 @@ def result_file(folder: Path, run: StudyRun) -> Path:
 
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
     """Run a scenario and return its ``metrics`` (`RunSummary.flat`) and ``profiles`` (`RunProfiles.to_json`)."""
-    standard, profiles = build.safety_standard(scenario), RunProfiles()
+    profiles = RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:
-            metrics = RunMetrics(standard, watchers=[profiles])
+            metrics = RunMetrics(watchers=[profiles])
             summary = _watched(run(scenario, seed, sumo_outputs=sumo_outputs), metrics, profiles)
         else:
-            of_traffic = TrafficRunMetrics(standard, watchers=[profiles])
+            of_traffic = TrafficRunMetrics(watchers=[profiles])
             summary = _watched(run_traffic(scenario, seed, sumo_outputs), of_traffic, profiles)
     return {"metrics": summary.flat(), "profiles": profiles.to_json()}
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from fogsim.core.files.atomic import write_text
-from fogsim.metrics import metric_topics
+from fogsim.metrics import DEFAULT_STANDARD, metric_topics
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.templating import render
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.scenario.wording.non_defaults import Setting, non_default_settings
 from fogsim.scenario.wording.sentences import SENTENCES
 from fogsim.study.comparison import (
@@ -131,18 +131,14 @@ def _design(study: Study) -> str:
 
 
 def _statistics(study: Study) -> str:
-    standards = dict.fromkeys(build.safety_standard(one) for one in study.cells().values())
-    judged = "; ".join(
-        f"reaction time {one.reaction_time:g} s and deceleration {one.deceleration:g} m/s² in stopping sight "
-        f"distances, time to collision {one.time_to_collision:g} s"
-        for one in standards
-    )
     return (
         "Differences to the baseline are means over pairs of runs with the same seed. Intervals: "
         f"{100.0 * study.confidence:g} %, bias-corrected and accelerated bootstrap of {RESAMPLES:,} resamples "
         "(Efron 1987). p-values: two-sided paired permutation tests, adjusted among the main metrics by Benjamini & "
         "Hochberg (1995). "
-        f"Thresholds of the safety metrics: {judged}."
+        f"Thresholds of the safety metrics: reaction time {DEFAULT_STANDARD.reaction_time:g} s and deceleration "
+        f"{DEFAULT_STANDARD.deceleration:g} m/s² in stopping sight distances, time to collision "
+        f"{DEFAULT_STANDARD.time_to_collision:g} s."
     )
 
 

@@ -14,7 +14,7 @@ from fogsim.conditions import Always, Condition, Eventually, Finding, Whenever
 from fogsim.core.files.atomic import write_json, write_text
 from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.scenario.expect.schema import clauses_of
 from fogsim.simulation.loop import run
 from fogsim.simulation.run_config import NO_RENDERER
@@ -138,12 +138,11 @@ def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Pa
     has_frames = scenario.traffic.has_ego and scenario.renderer != NO_RENDERER
     steps: Iterable[TrafficStep] = run(scenario, seed) if scenario.traffic.has_ego else run_traffic(scenario, seed)
     video = VideoRecorder(folder / _VIDEO, scenario.clocks.camera_period_s) if has_frames and instants else None
-    standard = build.safety_standard(scenario)
     for step in steps:
         for log in logs.values():
             log.update(step)
         if video is not None and isinstance(step, Step) and -BEFORE <= step.time - min(instants) <= AFTER:
-            video.record(step, step_metrics(step, standard))
+            video.record(step, step_metrics(step))
         if instants and step.time >= max(instants) + AFTER:
             break
     if video is not None:

@@ -12,7 +12,7 @@ from fogsim.conditions import ExpectationWatch
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError, UnplayedWarning
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario
 from fogsim.scenario.expect.schema import clauses_of
 from fogsim.scenario.loading import load_cases
 from fogsim.simulation.loop import run
@@ -31,14 +31,14 @@ def check_case(
     scenario: Scenario, seed: int, sumo_outputs: Path | None = None, odd: OddFile | None = None
 ) -> dict[str, Any]:
     """Run a case and return ``findings``, ``metrics``, ``ending`` and, with an ODD, ``coverage`` as JSON data."""
-    standard, watch = build.safety_standard(scenario), ExpectationWatch(clauses_of(scenario.expect))
+    watch = ExpectationWatch(clauses_of(scenario.expect))
     coverage = None if odd is None else CoverageWatch(odd)
     ending = None
     with warnings.catch_warnings():
         # Expectations decide about events that were not played.
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:
-            of_ego = RunMetrics(standard)
+            of_ego = RunMetrics()
             for step in run(scenario, seed, sumo_outputs=sumo_outputs):
                 of_ego.update(step)
                 watch.update(step)
@@ -47,7 +47,7 @@ def check_case(
                 ending = step.ending
             summary = of_ego.summary()
         else:
-            of_traffic = TrafficRunMetrics(standard)
+            of_traffic = TrafficRunMetrics()
             for instant in run_traffic(scenario, seed, sumo_outputs):
                 of_traffic.update(instant)
                 watch.update(instant)

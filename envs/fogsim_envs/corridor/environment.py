@@ -34,6 +34,7 @@ from fogsim_envs.corridor.observation import (
 from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
 from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout, refuse_copies
 from fogsim_envs.infos import flat_numbers
+from fogsim_envs.rewards import advice_standard
 from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
 
@@ -222,7 +223,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self._meters = np.random.default_rng((3, run_seed))
         self._rule = RoadAdvice(build.advice_config(scenario))
         self._frames = build.periods(scenario).decision_frames
-        self._standard, self._duration = build.safety_standard(scenario), scenario.duration_s
+        self._standard, self._duration = advice_standard(scenario), scenario.duration_s
         self._shown = (math.inf,) * len(self.possible_agents)
         self.agents = list(self.possible_agents)
         self._move()

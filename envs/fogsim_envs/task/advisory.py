@@ -25,6 +25,7 @@ from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
+from fogsim_envs.rewards import advice_standard
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
@@ -208,9 +209,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._episode, self._driver = drawn.episode, OwnDriver(drawn.episode.driver)
         self._advice, self._frames = build.advice_config(scenario), build.periods(scenario).decision_frames
         self._adviser = AdvisedDriving(self._advice, self._frames)
-        self._standard = build.safety_standard(scenario)
+        self._standard = advice_standard(scenario)
         if self._is_measured:
-            self._measured = RunMetrics(self._standard)
+            self._measured = RunMetrics()
             self._measured.update(self._step)
             self._unmeasured = dict.fromkeys(self._metrics(), math.nan)
         self._way_end = self._arrival(self._step, scenario)
@@ -370,10 +371,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""
-        return self._renderer.render(self._current, self._standard)
+        return self._renderer.render(self._current)
 
     def _show(self) -> None:
-        self._renderer.show(self._current, self._standard, self.metadata["render_fps"])
+        self._renderer.show(self._current, self.metadata["render_fps"])
 
     def close(self) -> None:
         """End the simulation and close the window; closing twice is allowed."""

@@ -75,7 +75,7 @@ class DenseFogKnown:
         if self._begins is None:
             return
         ahead = self._begins - step.route_position
-        if ahead < -_INTO_FOG:
+        if ahead < -_INTO_FOG or (ahead < -_BEHIND_EDGE and step.truth.visibility >= _DENSE_FOG):
             self._found.append(-_INTO_FOG if self._known is None else self._known)
             self._begins = None
             return
@@ -83,7 +83,7 @@ class DenseFogKnown:
         believed = (
             step.belief.visibility_quantile(0.5)
             if profile is None
-            else profile.visibility_quantile(max(ahead + _BEHIND_EDGE, 0.0), 0.5)
+            else profile.visibility_quantile(ahead + _BEHIND_EDGE, 0.5)
         )
         if believed >= _KNOWN_FOG:
             self._known = None

@@ -8,11 +8,9 @@ from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.metrics import SafetyStandard
 from fogsim.scenario.drivers_schema import Harmonisation as WrittenHarmonisation
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.section import Method
-from fogsim.simulation import chosen_methods
 from fogsim.simulation.run_config import (
     NO_RENDERER,
     AdviceConfig,
@@ -55,11 +53,6 @@ def own_methods(scenario: ScenarioFile) -> dict[str, str]:
     if scenario.controller is not None:
         found[scenario.controller.method] = CONTROLLERS.version(scenario.controller.method, folder)
     return {name: version for name, version in found.items() if version is not None}
-
-
-def safety_standard(scenario: ScenarioFile) -> SafetyStandard:
-    """What a run is judged by."""
-    return chosen_methods.safety_standard(method(scenario, scenario.advice))
 
 
 def advice_config(scenario: ScenarioFile) -> AdviceConfig:

@@ -91,22 +91,29 @@ class _Window:
         self._surface: Any = None
 
     def show(self, picture: NDArray[np.uint8], rate: float) -> None:
-        if self._surface is None:
-            self._open(picture.shape[1], picture.shape[0])
+        size = picture.shape[1], picture.shape[0]
+        if not self._is_open(size):
+            self._open(size)
         self._pygame.surfarray.blit_array(self._surface, picture.swapaxes(0, 1))
         # Otherwise the system takes the window for one that hangs.
         self._pygame.event.pump()
         self._pygame.display.flip()
         self._clock.tick(rate)
 
-    def _open(self, width: int, height: int) -> None:
+    def _is_open(self, size: tuple[int, int]) -> bool:
+        """Whether the window still stands: pygame has one, and another environment may have closed or resized it."""
+        if self._surface is None or self._pygame.display.get_surface() is not self._surface:
+            return False
+        return bool(self._surface.get_size() == size)
+
+    def _open(self, size: tuple[int, int]) -> None:
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         # Only who wants a window waits for this.
         self._pygame: Any = importlib.import_module("pygame")
         try:
             self._pygame.display.init()
             self._pygame.display.set_caption(self._title)
-            self._surface = self._pygame.display.set_mode((width, height))
+            self._surface = self._pygame.display.set_mode(size)
         except self._pygame.error as error:
             raise InputError(f"render_mode: 'human' could not open a window: {error}; {_INSTEAD}") from error
         self._clock = self._pygame.time.Clock()

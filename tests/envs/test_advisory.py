@@ -19,7 +19,6 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.errors import InputError
-from fogsim.metrics import DEFAULT_STANDARD
 from fogsim_envs.rendering import StepRenderer
 from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, command_of
 
@@ -186,10 +185,26 @@ def test_a_window_needs_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
     assert env.metadata["render_modes"] == ["rgb_array"]
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     with pytest.raises(InputError, match=r"could not open a window: .*; take 'rgb_array'"):
-        StepRenderer("human", "x").show(_a_step(env), DEFAULT_STANDARD, 2.0)
+        StepRenderer("human", "x").show(_a_step(env), 2.0)
     env.close()
     with pytest.raises(InputError, match="unknown render_mode 'ansi'"):
         StepRenderer("ansi", "x")
+
+
+def test_a_window_that_another_closed_is_opened_again(
+    env: gymnasium.Env[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    step, first, second = _a_step(env), StepRenderer("human", "first"), StepRenderer("human", "second")
+    first.show(step, 2.0)
+    size = pygame.display.get_surface().get_size()
+    second.show(step, 2.0)
+    first.close()
+    second.show(step, 2.0)
+    pygame.display.set_mode((64, 48))
+    second.show(step, 2.0)
+    assert pygame.display.get_surface().get_size() == size
+    second.close()
 
 
 def _a_step(env: gymnasium.Env[Any, Any]) -> Any:

@@ -189,6 +189,31 @@ def test_a_cohort_is_due_in_its_time_and_the_run_ends_when_it_has_left(tmp_path:
     assert values["traffic_travel_time_s_per_cohort_vehicle"] == pytest.approx(expected)
 
 
+def test_vehicles_of_a_cohort_that_a_collision_removes_are_unfinished(tmp_path: Path) -> None:
+    """The second does not see the first, which stands, and both are removed."""
+    config = demand(
+        tmp_path,
+        '<vehicle id="a" route="r" depart="2"><stop lane="approach_0" endPos="60" duration="200"/></vehicle>'
+        '<vehicle id="b" route="r" depart="14" departLane="0" departSpeed="max"/>',
+    )
+    keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.cohort_s=20", "duration_s=60")
+    blind = ("fog.visibility_m=10", "drivers.speed_choice=unaffected", "advice=none", "traffic.keep_lane=[b]")
+    removed = "traffic.after_collision=remove"
+    found = measure_run(scenario_from_config(config, "none", [*keys, *blind, removed]), 1)["metrics"]
+    assert (found["traffic_collisions"], found["traffic_cohort_unfinished"]) == (1, 2)
+
+
+def test_a_run_is_judged_by_the_same_standard_under_every_advice(tmp_path: Path) -> None:
+    config = demand(tmp_path, '<vehicle id="a" route="r" depart="0"/>')
+    advice = "advice={method: stopping_sight_distance, parameters: {reaction_time: 1.5, deceleration: 4.5}}"
+    scenario = scenario_from_config(config, "none", ["fog.visibility_m=50", "duration_s=3", advice])
+    usual = TrafficRunMetrics()
+    for step in fogsim.run_traffic(scenario, 1):
+        usual.update(step)
+    key = "traffic_sight_margin_by_distance_m"
+    assert measure_run(scenario, 1)["metrics"][key] == usual.summary().flat()[key]
+
+
 def test_vehicles_of_a_cohort_that_have_not_left_in_time_are_unfinished(tmp_path: Path) -> None:
     config = demand(tmp_path, '<flow id="f" route="r" begin="0" end="100" period="2" departSpeed="20"/>')
     keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.cohort_s=6", "duration_s=8")

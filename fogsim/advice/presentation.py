@@ -148,7 +148,8 @@ class PresentedAdviser(ABC):
     def _presented(self, speed: float, limit: float) -> float:
         if speed >= limit:
             return math.inf
-        return max(self.minimum, self._on_grid(speed) if self.rounding > 0.0 else speed)
+        shown = max(self.minimum, self._on_grid(speed) if self.rounding > 0.0 else speed)
+        return shown if shown < limit else math.inf
 
     def _on_grid(self, speed: float) -> float:
         multiple = speed / self.rounding

@@ -67,8 +67,12 @@ def pair_on_courses(
     else:
         same = course[order[1:]] == course[order[:-1]]
         follower, leader = order[:-1][same], order[1:][same]
-        aside = np.zeros(len(leader))
+        aside = None
     way = position[leader] - position[follower]
+    if aside is None:
+        # Across the mean heading: exact along an arc, and free of the drawn glide of a lane change.
+        x, y = cosine[follower] + cosine[leader], sine[follower] + sine[leader]
+        aside = (way[:, 1] * x - way[:, 0] * y) / np.maximum(np.hypot(x, y), 1e-9)
     distance = np.sqrt(np.maximum(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2 - aside**2, 0.0))
     return Following(follower, leader, np.maximum(distance - length[leader], 0.0), speed[follower], speed[leader])
 

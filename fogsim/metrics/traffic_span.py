@@ -66,6 +66,7 @@ class TrafficSpan:
     # (vehicles,) bool: Whether each vehicle so far, by its number, is in the cohort
     in_cohort: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
     cohort_waiting_time: float = 0.0  # Time that the cohort's vehicles have waited to enter the road [s]
+    cohort_parked_time: float = 0.0  # Time that they have been off the lanes [s]
     # (k,) int: Rows of the ego, one in each step in which it is on a lane; None without an ego
     ego: NDArray[np.intp] | None = None
     reading_radius: float = math.inf  # As of `Step` [m]; ``inf`` without an ego
@@ -153,7 +154,7 @@ class TrafficGathering:
         self._collisions: list[Collision] = []
         self._route: NDArray[np.float64] | None = None
         self._cohort: Cohort | None = None
-        self._cohort_waiting_time = 0.0
+        self._cohort_waiting_time = self._cohort_parked_time = 0.0
         self._egos: list[int] = []
         self._reading_radius = math.inf
         self._last_ids: tuple[str, ...] = ()
@@ -172,6 +173,8 @@ class TrafficGathering:
         traffic, self._route, self._cohort = step.traffic, step.truth.route, step.cohort
         if self._cohort is not None:
             self._cohort_waiting_time += elapsed * self._cohort.waiting
+            away = np.flatnonzero(traffic.off_lanes)
+            self._cohort_parked_time += elapsed * sum(traffic.ids[i] in self._cohort.vehicles for i in away)
         if step.collisions:
             # The simulation may have removed both; then they were near at the step before.
             near = {*self._last_ids, *traffic.ids}
@@ -228,6 +231,7 @@ class TrafficGathering:
             cohort=self._cohort,
             in_cohort=self._in_cohort(),
             cohort_waiting_time=self._cohort_waiting_time,
+            cohort_parked_time=self._cohort_parked_time,
             ego=np.array(self._egos, dtype=np.intp) if self._egos else None,
             reading_radius=self._reading_radius,
             course=np.concatenate(courses),
@@ -236,7 +240,7 @@ class TrafficGathering:
         self._moments += len(states)
         self._time = float(clock[-1])
         self._rows, self._states, self._numbers, self._collisions, self._egos = 0, [], [], [], []
-        self._cohort_waiting_time = 0.0
+        self._cohort_waiting_time = self._cohort_parked_time = 0.0
         return _on_lanes(span, ~np.concatenate([state.off_lanes for state in states]))
 
     def _in_cohort(self) -> NDArray[np.bool_]:
@@ -314,7 +318,7 @@ class TrafficCohort(TrafficMetric):
         self._cohort = span.cohort
         mine = np.flatnonzero(span.in_cohort[span.vehicle])
         elapsed, free = span.elapsed[mine], np.maximum(span.free_speed[mine], 0.1)
-        self._time += float(elapsed.sum()) + span.cohort_waiting_time
+        self._time += float(elapsed.sum()) + span.cohort_waiting_time + span.cohort_parked_time
         self._lost += float((elapsed * (1.0 - span.speed[mine] / free)).sum()) + span.cohort_waiting_time
 
     def result(self) -> dict[str, JsonValue]:

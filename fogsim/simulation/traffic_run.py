@@ -214,7 +214,7 @@ class TrafficRun:
         )
 
     def _ending(self, index: int, snapshot: NetworkSnapshot, cohort: Cohort | None) -> Ending | None:
-        if cohort is not None and not cohort.unfinished and self._cohort.is_complete:
+        if cohort is not None and self._cohort.has_left:
             return Ending.COHORT_LEFT
         if index >= self._periods.frames or snapshot.is_ended:
             return Ending.TIME
@@ -241,7 +241,8 @@ class _CohortWatch:
         self._duration = duration
         self._before: frozenset[str] | None = None
         self._due: frozenset[str] = frozenset()
-        self.is_complete = False
+        self._lost: frozenset[str] = frozenset()  # Removed after a collision
+        self._is_complete = self.has_left = False
 
     def update(self, time: float, snapshot: NetworkSnapshot) -> Cohort | None:
         """The cohort after a step; vehicles that are due at the first step already are not in it."""
@@ -250,12 +251,15 @@ class _CohortWatch:
         here = {*snapshot.state.ids, *snapshot.waiting}
         if self._before is None:
             self._before = frozenset(here)
-        if not self.is_complete:
+        if not self._is_complete:
             new = here - self._before - self._due
             self._due = self._due | new if new else self._due
-            self.is_complete = time >= self._duration
-        waiting = len(self._due.intersection(snapshot.waiting))
-        return Cohort(self._due, waiting, unfinished=len(self._due & here))
+            self._is_complete = time >= self._duration
+        hit = {vehicle for one in snapshot.collisions for vehicle in (one.collider, one.victim)}
+        self._lost |= (self._due & hit) - here
+        waiting, on_the_way = len(self._due.intersection(snapshot.waiting)), len(self._due & here)
+        self.has_left = self._is_complete and not on_the_way
+        return Cohort(self._due, waiting, unfinished=on_the_way + len(self._lost))
 
 
 def _axis_along(edges: Sequence[str], net: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -223,7 +223,7 @@ class Cohort:
     waiting : int
         How many of them find no room to enter the road yet.
     unfinished : int
-        How many of them have not left yet: those on the road, and those waiting.
+        How many of them have not left yet: those on the road, those waiting, and those removed after a collision.
     """
 
     vehicles: frozenset[str]

@@ -44,6 +44,14 @@ def test_speeds_are_rounded_as_it_is_asked_for(rounded: str, expected: float) ->
     assert speeds("alabama_i10", [100.0], rounded=rounded, rounding=5 / 3.6) == [pytest.approx(in_kmh)]  # 45 mph = 72.4
 
 
+def test_no_advice_is_above_the_limit() -> None:
+    """The least advice and rounding up may exceed a low limit."""
+    for parameters in ({"minimum": 48 / 3.6}, {"rounding": 40 / 3.6, "rounded": "up"}):
+        adviser = ADVISERS["stopping_sight_distance"](**parameters)
+        advice = adviser.advise(certain_belief(OPTICAL_DEPTH_AT_VISIBILITY / 15.0), 30 / 3.6, 0.0, SpeedAdvice())
+        assert advice.speed == math.inf
+
+
 def test_unrounded_speeds_come_as_they_are() -> None:
     safe = safe_speed(100.0, 2.5, 3.4) * 3.6
     assert speeds("stopping_sight_distance", [100.0], rounding=0.01) == [pytest.approx(safe, abs=0.04)]

@@ -15,16 +15,18 @@ BANK = 1000.0
 PLACES = np.arange(-300.0, 1001.0, 10.0)
 
 
-def before_bank(index: int, place: float, believed: float | None, everywhere: float = 800.0) -> Step:
+def before_bank(
+    index: int, place: float, believed: float | None, everywhere: float = 800.0, length: float = math.inf
+) -> Step:
     """A step at a place before a bank of 60 m, of which a visibility is believed; none if no places are known."""
     at = place + PLACES
 
     def profile(in_bank: float, outside: float, deviation: float) -> FogProfile:
-        visibility = np.where(at >= BANK, in_bank, outside)
+        visibility = np.where((at >= BANK) & (at < BANK + length), in_bank, outside)
         logarithms = np.array([math.log(extinction_from_visibility(one)) for one in visibility])
         return FogProfile(PLACES, logarithms, np.full(PLACES.size, deviation))
 
-    here = 60.0 if place >= BANK else 800.0
+    here = 60.0 if BANK <= place < BANK + length else 800.0
     step = make_step(index, time=float(index), route_position=place, visibility=here, believed=belief(everywhere, 0.1))
     known = None if believed is None else profile(believed, 800.0, 0.1)
     return dataclasses.replace(
@@ -43,6 +45,11 @@ def known_before(*believed: tuple[float, float | None, float]) -> object:
 def test_a_bank_is_known_from_where_it_was_believed_and_stayed_so():
     way = [(400.0, 800.0), (500.0, 100.0), (600.0, 800.0), (700.0, 90.0), (900.0, 60.0), (1100.0, 60.0), (1310.0, 60.0)]
     assert known_before(*((place, in_bank, 800.0) for place, in_bank in way)) == pytest.approx(300.0, abs=11.0)
+
+
+def test_a_short_bank_that_was_known_stays_so_behind_it():
+    steps = [before_bank(i, place, 60.0, length=150.0) for i, place in enumerate((600.0, 1010.0, 1160.0, 1320.0))]
+    assert summarise(steps)["dense_fog_known_before_m"] == pytest.approx(400.0, abs=11.0)
 
 
 def test_who_knows_no_places_knows_it_when_inside():

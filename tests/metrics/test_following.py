@@ -29,6 +29,12 @@ def test_a_lane_in_a_curve_is_followed() -> None:
     assert found.speed.tolist() == found.leader_speed.tolist() == [10.0] * 4
 
 
+def test_gaps_leave_out_the_glide_of_a_lane_change() -> None:
+    road = lanes(("a", 0, 30), ("a", 7, 25), heading=1.0)
+    place = road.position + np.array([[0.0], [3.5]]) * (np.sin(1.0), -np.cos(1.0), 0.0)
+    assert find_following(dataclasses.replace(road, position=place)).gap == pytest.approx([2.0])
+
+
 def test_a_half_circle_is_followed_from_end_to_end() -> None:
     angle = np.linspace(0.05, 3.1, 8)[::-1]
     road = lanes(*(("a", 0.0, 10.0) for _ in angle))

@@ -4,10 +4,8 @@ import math
 
 import pytest
 
-import fogsim
 from fogsim.errors import SimulationError, UnknownNameError
 from fogsim.metrics import METRICS, RunMetrics, RunSummary
-from fogsim.scenario import build
 from fogsim.values import Collision, Ending
 from tests.metrics.summaries import summarise
 from tests.recorders.synthetic import drive, make_step
@@ -64,19 +62,6 @@ def test_the_summary_names_what_sight_was_judged_by() -> None:
     summary = summarise([make_step(0, speed=20.0, visibility_ahead=50.0)], reaction_time=1.0, deceleration=5.0)
     assert (summary["stopping_reaction_time_s"], summary["stopping_deceleration_mps2"]) == (1.0, 5.0)
     assert summary["minimum_visibility_margin_m"] == pytest.approx(-10.0)
-
-
-@pytest.mark.parametrize(
-    ("advice", "reaction_time", "deceleration"),
-    [
-        ("{method: stopping_sight_distance, parameters: {reaction_time: 1.5, deceleration: 4.5}}", 1.5, 4.5),
-        ("stopping_sight_distance", 2.5, 3.4),
-        ("none", 2.5, 3.4),
-    ],
-)
-def test_a_run_is_judged_by_what_its_advice_counts_with(advice: str, reaction_time: float, deceleration: float) -> None:
-    standard = build.safety_standard(fogsim.load_scenario("motorway_fog_bank", [f"advice={advice}"]))
-    assert (standard.reaction_time, standard.deceleration) == (reaction_time, deceleration)
 
 
 def test_a_step_that_comes_once_more_adds_only_its_ending() -> None:

@@ -213,6 +213,15 @@ def test_events_and_times_of_the_cohort() -> None:
     assert times["traffic_delay_s_per_cohort_vehicle"] == pytest.approx(3.0 * (0.25 + 0.5 + 1.0) / 3)
 
 
+def test_a_parked_vehicle_of_the_cohort_takes_time_but_loses_none() -> None:
+    road = dataclasses.replace(
+        lanes(("a", 0, 20), ("a", 40, 0)), free_speed=np.array([20.0, 20.0]), off_lanes=np.array([False, True])
+    )
+    times = watched(TrafficCohort(), [(0.0, road), (2.0, road)], cohort=Cohort(frozenset({"v0", "v1"}), 0, 2))
+    assert times["traffic_travel_time_s_per_cohort_vehicle"] == pytest.approx(2.0)
+    assert times["traffic_delay_s_per_cohort_vehicle"] == pytest.approx(0.0)
+
+
 def test_histogram_of_what_lies_within_and_beyond() -> None:
     found = Histogram(0.0, 10.0, 0.5)
     assert found.quantile(0.5) is None

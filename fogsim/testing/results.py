@@ -95,6 +95,12 @@ def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> Cas
     return CaseResult(run, None, findings, found.metrics, found.duration_s)
 
 
+def completed_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> CaseResult | None:
+    """As `read_result`, but None also if the run failed, so that it is run again."""
+    found = read_result(folder, run, expectations)
+    return None if found is None or found.message is not None else found
+
+
 def read_coverage(folder: Path, run: StudyRun) -> dict[str, Any] | None:
     """Coverage of an ODD by a case; None if its run failed or collected none."""
     found = read_run(result_file(folder, run), _CASE)

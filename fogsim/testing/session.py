@@ -1,9 +1,11 @@
 """Running tests: cases in parallel, results in files, and resuming an earlier call."""
 
+import contextlib
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
@@ -11,17 +13,24 @@ from fogsim.conditions import FindingVerdict
 from fogsim.core.files.atomic import partial_path, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.readers import read_json
-from fogsim.core.files.writer_lock import WriterLock
+from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock
 from fogsim.errors import InputError
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
 from fogsim.testing.judgement import Judgement, Outcome, judge
-from fogsim.testing.results import CaseResult, read_result
+from fogsim.testing.results import CaseResult, completed_result, read_result
 
 Watch = Callable[[int, int], None]
 """Called at the beginning and after each case, with the numbers of completed and failed cases."""
+
+SessionKind = Literal["tests", "campaign"]
+"""What a directory holds results of."""
+
+_COMMANDS: Mapping[SessionKind, str] = {"tests": "test", "campaign": "campaign"}
+_DECIDING = ("fogsim", "libsumo")
+"""Distributions whose results of different versions are not mixed, as in studies."""
 
 _SESSION = "session.json"
 _RESULTS = "results"
@@ -89,7 +98,8 @@ def run_tests(
     engine : Engine
         Engine for the cases, with `check_to_file` as its work.
     resume : bool
-        Whether results of an interrupted earlier call count; those of other scenarios, seeds or versions do not.
+        Whether results of an interrupted earlier call count; those of other scenarios, seeds or versions, and of
+        failed runs, do not.
     first_failure_ends : bool
         Whether to stop at the first case that fails.
     watch : callable
@@ -103,16 +113,15 @@ def run_tests(
     Raises
     ------
     InputError
-        If the directory holds something else, or is written by another process.
+        If the directory holds something else or a campaign, or is written by another process.
     OSError
         If a result cannot be written.
     KeyboardInterrupt
         On Ctrl-C: completed cases are kept, for `resume`.
     """
-    results = begin_session(out, resume)
-    with WriterLock(out):
+    with begin_session(out, resume=resume) as results:
         names = {run.key: (*test.lines,) for test in tests for run in test.runs}
-        found = {run.key: read_result(results, run, names[run.key]) for test in tests for run in test.runs}
+        found = {run.key: completed_result(results, run, names[run.key]) for test in tests for run in test.runs}
         waiting = [run for test in tests for run in test.runs if found[run.key] is None]
         done = failed = 0
         for one in found.values():
@@ -121,8 +130,9 @@ def run_tests(
 
         def count(run: StudyRun, _: str | None) -> None:
             nonlocal done, failed
-            found[run.key] = one = read_result(results, run, names[run.key])
-            done, failed = done + 1, failed + (one is None or one.has_failed)
+            one = read_result(results, run, names[run.key]) or CaseResult(run, "its result cannot be read")
+            found[run.key] = one
+            done, failed = done + 1, failed + one.has_failed
             watch(done, failed)
             if failed and first_failure_ends:
                 raise _FirstFailure
@@ -137,19 +147,30 @@ def run_tests(
     return outcomes
 
 
-def begin_session(out: Path, resume: bool) -> Path:
-    """Create the directory, and keep only results that count."""
+@contextlib.contextmanager
+def begin_session(out: Path, *, resume: bool, kind: SessionKind = "tests") -> Iterator[Path]:
+    """Lock a directory, keep only results that count, and yield their folder.
+
+    InputError if it holds something else, another kind of results, or a campaign of another FogSim or SUMO.
+    """
     refuse_unwritable_folder(out)
     session = out / _SESSION
-    if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session)}:
-        raise InputError(f"--out {out} holds something else than tests; choose another directory")
+    if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session), out / LOCK_NAME}:
+        raise InputError(f"--out {out} holds something else than tests or a campaign; choose another directory")
     out.mkdir(parents=True, exist_ok=True)
-    last = _read_session(out)
-    if not (resume and last.versions == versions()):
-        shutil.rmtree(results_folder(out), ignore_errors=True)
-    write_json(session, {"versions": versions(), "not_passed": last.not_passed})
-    results_folder(out).mkdir(exist_ok=True)
-    return results_folder(out)
+    with WriterLock(out):
+        last, now = _read_session(out), versions()
+        if last.kind not in (None, kind):
+            raise InputError(f"--out {out} holds results of fogsim {_COMMANDS[last.kind]}; choose another directory")
+        changed = [name for name in _DECIDING if last.versions.get(name) != now[name]]
+        if kind == "campaign" and last.versions and changed:
+            was = ", ".join(f"{name} {last.versions.get(name)} (now {now[name]})" for name in changed)
+            raise InputError(f"--out {out} holds a campaign of {was}; choose another directory")
+        if changed or not resume:
+            shutil.rmtree(results_folder(out), ignore_errors=True)
+        write_json(session, {"kind": kind, "versions": now, "not_passed": last.not_passed})
+        results_folder(out).mkdir(exist_ok=True)
+        yield results_folder(out)
 
 
 def results_folder(out: Path) -> Path:
@@ -158,17 +179,24 @@ def results_folder(out: Path) -> Path:
 
 
 class _Session(BaseModel):
-    """State that is kept between two calls."""
+    """State that is kept between two calls; without a kind, an earlier FogSim wrote it."""
 
+    kind: SessionKind | None = None
     versions: dict[str, str | None] = Field(default_factory=dict)
     not_passed: dict[str, list[str]] = Field(default_factory=dict)
 
 
 def _read_session(out: Path) -> _Session:
-    try:
-        return _Session.model_validate(read_json(out / _SESSION))
-    except (InputError, ValidationError):
+    file = out / _SESSION
+    if not file.exists():
         return _Session()
+    try:
+        return _Session.model_validate(read_json(file))
+    except (InputError, ValidationError) as error:
+        raise InputError(
+            f"{file}: not the description of tests or a campaign; choose another directory with --out, or remove the "
+            "file and the results next to it"
+        ) from error
 
 
 def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutcome:
@@ -187,7 +215,7 @@ def _end(out: Path, outcomes: Sequence[FileOutcome]) -> None:
         cases = [*still, *(label for label, counts in were_run.items() if counts)]
         if cases:
             noted[file] = cases
-    write_json(out / _SESSION, {"versions": versions(), "not_passed": noted})
+    write_json(out / _SESSION, {"kind": "tests", "versions": versions(), "not_passed": noted})
 
 
 def _counts_against(result: CaseResult, wrong: set[tuple[str, str]]) -> bool:

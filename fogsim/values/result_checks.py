@@ -220,7 +220,7 @@ def _check_entry(who: str, key: object, entry: object) -> None:
     if isinstance(entry, Mapping):
         for inner, value in entry.items():
             _check_entry(who, f"{key}.{inner}", value)
-    elif isinstance(entry, float | int):
+    elif isinstance(entry, float | int) and not isinstance(entry, bool):
         if not math.isfinite(entry):
             raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {shown(entry)}")
     elif entry is not None and not isinstance(entry, str):

@@ -3,12 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_up_cases import BROKEN, MadeUpEngine, complete, made_up_test
 
+from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
 from fogsim.testing import last_failed, only_cases, run_tests
+from fogsim.testing.session import begin_session
 
 
 def test_all_cases_are_run_and_judged(tmp_path: Path) -> None:
@@ -58,12 +61,63 @@ def test_what_was_done_counts_when_resumed_and_only_then(tmp_path: Path) -> None
 def test_results_of_other_versions_do_not_count(tmp_path: Path) -> None:
     test, told = made_up_test(["a"]), {"a": complete("passed")}
     run_tests([test], tmp_path, MadeUpEngine(told))
-    session = json.loads((tmp_path / "session.json").read_text())
-    session["versions"]["fogsim"] = "0.0.1"
-    (tmp_path / "session.json").write_text(json.dumps(session))
-    resumed = MadeUpEngine(told)
-    run_tests([test], tmp_path, resumed, resume=True)
-    assert resumed.ran == ["a"]
+    for distribution, ran in (("platform", []), ("numpy", []), ("fogsim", ["a"])):
+        set_version(tmp_path, distribution)
+        resumed = MadeUpEngine(told)
+        run_tests([test], tmp_path, resumed, resume=True)
+        assert resumed.ran == ran, distribution
+
+
+def set_version(out: Path, distribution: str) -> None:
+    """As if another version had written a directory's results."""
+    session = json.loads((out / "session.json").read_text())
+    session["versions"][distribution] = "0.0.1"
+    (out / "session.json").write_text(json.dumps(session))
+
+
+def test_a_directory_that_is_being_written_keeps_its_results(tmp_path: Path) -> None:
+    test, told = made_up_test(["a"]), {"a": complete("passed")}
+    run_tests([test], tmp_path, MadeUpEngine(told))
+    with WriterLock(tmp_path), pytest.raises(InputError, match="is writing there"):
+        run_tests([test], tmp_path, MadeUpEngine(told))
+    assert (tmp_path / "results" / "a.json").exists()
+
+
+def test_a_result_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
+    told = {"a": {**complete("failed"), "metrics": {"mine": True}}, "b": complete("passed")}
+    (outcome,) = run_tests([made_up_test(["a", "b"])], tmp_path, MadeUpEngine(told))
+    assert [one.message for one in outcome.broken] == ["its result cannot be read"]
+    assert not outcome.is_passed
+
+
+def test_a_failed_run_is_repeated_when_resumed(tmp_path: Path) -> None:
+    test = made_up_test(["a", "b"])
+    run_tests([test], tmp_path, MadeUpEngine({"a": BROKEN, "b": complete("failed")}))
+    resumed = MadeUpEngine({"a": complete("passed")})
+    (outcome,) = run_tests([test], tmp_path, resumed, resume=True)
+    assert (resumed.ran, outcome.broken) == (["a"], [])
+
+
+def test_results_of_a_campaign_are_kept(tmp_path: Path) -> None:
+    """Tests, another FogSim and a damaged description are refused; another platform is not."""
+
+    def begun(**how: Any) -> list[str]:
+        with begin_session(tmp_path, **how) as folder:
+            (folder / "a.json").touch()
+            return [file.name for file in folder.iterdir()]
+
+    begun(resume=True, kind="campaign")
+    with pytest.raises(InputError, match="holds results of fogsim campaign; choose another directory"):
+        begun(resume=False)
+    set_version(tmp_path, "platform")
+    assert begun(resume=True, kind="campaign") == ["a.json"]
+    set_version(tmp_path, "fogsim")
+    with pytest.raises(InputError, match=r"holds a campaign of fogsim 0\.0\.1 \(now "):
+        begun(resume=True, kind="campaign")
+    (tmp_path / "session.json").write_text("{")
+    with pytest.raises(InputError, match=r"session\.json: not the description of tests or a campaign"):
+        begun(resume=True, kind="campaign")
+    assert (tmp_path / "results" / "a.json").exists()
 
 
 def test_the_first_failure_ends_it_if_asked(tmp_path: Path) -> None:

@@ -134,6 +134,7 @@ def test_lamps() -> None:
         ({"speed_mps": math.nan}, "speed_mps must be a finite number, or None .*; got nan"),
         ({"a": {"b": math.inf}}, r"a\.b must be a finite number"),
         ({"a": [1.0]}, "a must be None, a word"),
+        ({"a": True}, "a must be None, a word"),
     ],
 )
 def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -> None:

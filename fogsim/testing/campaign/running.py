@@ -19,7 +19,7 @@ from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Sequencing, Sp
 from fogsim.testing.collection import FogTest, run_of
 from fogsim.testing.odd.odd_file import OddFile, read_odd
 from fogsim.testing.odd.openodd_library import Coverage
-from fogsim.testing.results import CaseResult, read_result
+from fogsim.testing.results import CaseResult, completed_result, read_result
 from fogsim.testing.session import begin_session, results_folder
 from fogsim.testing.shrinking import SmallestCase, Values, case_key, smallest_case
 
@@ -133,10 +133,11 @@ def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignW
     Raises
     ------
     InputError
-        If the directory holds something else, or a drawn case does not fit.
+        If the directory holds something else, or a campaign of another FogSim or SUMO, or is written by another
+        process; or if a drawn case does not fit.
     """
-    folder, found, failed = begin_session(out, resume=True), Findings(), 0
-    with WriterLock(out):
+    found, failed = Findings(), 0
+    with begin_session(out, resume=True, kind="campaign") as folder:
         plan = (
             again(campaign.space, campaign.earlier, found)
             if campaign.earlier
@@ -146,7 +147,7 @@ def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignW
         while True:
             runs = _runs(campaign, batch, len(found.drawn))
             names = tuple(runs[0].scenario.expect)
-            known = {run.key: read_result(folder, run, names) for run in runs}
+            known = {run.key: completed_result(folder, run, names) for run in runs}
             done = len(found.drawn) + sum(one is not None for one in known.values())
             failed += sum(one is not None and one.has_failed for one in known.values())
             watch(done, failed)
@@ -203,10 +204,10 @@ def smallest_failing(campaign: Campaign, found: Findings, out: Path, engine: Eng
         except InputError:
             return None
         folder = results_folder(out)
-        if read_result(folder, run, names) is None:
+        if completed_result(folder, run, names) is None:
             engine.run([run], folder, lambda *_: None)
-        result = read_result(folder, run, names)
-        return None if result is None or result.message is not None else result.has_failed
+        result = completed_result(folder, run, names)
+        return None if result is None else result.has_failed
 
     with WriterLock(out):
         known = {case_key(one.run.levels): one.has_failed for one in found.results if one.message is None}

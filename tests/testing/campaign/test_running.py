@@ -79,6 +79,15 @@ def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, tmp
     assert "no failure rate" in rate_text(resumed)
 
 
+def test_a_failed_run_is_repeated_when_resumed(campaign: Campaign, tmp_path: Path) -> None:
+    found = run_campaign(campaign, tmp_path / "out", Closed())
+    write_json(
+        result_file(tmp_path / "out" / "results", found.results[0].run), {"status": "failed", "message": "killed"}
+    )
+    resumed = run_campaign(campaign, tmp_path / "out", Closed(1))
+    assert [one.message for one in resumed.results] == [None] * 40
+
+
 def test_the_command_of_a_failure_runs_the_same_case(campaign: Campaign, tmp_path: Path) -> None:
     found = run_campaign(campaign, tmp_path / "a", Closed())
     junit = files(campaign, found, tmp_path / "a")["junit.xml"].decode()

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from fogsim.core.files.readers import number_in_text, read_text
+from fogsim.core.files.readers import number_in_text, read_text, refuse_other_length
 from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.errors import InputError, shown
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE, Surroundings
@@ -34,6 +34,9 @@ FOLLOWING_BELOW = 4.0
 
 LEAST = 30
 """Fewest vehicles in fog, and in clear air, that a fit needs."""
+
+_LEAST_SESSIONS = 10
+"""Fewest sessions with fog whose spread gives intervals: over fewer, the sandwich tends to zero."""
 
 _SPEEDS = {"speed_mps": 1.0, "speed_kmh": KMH_PER_MPS}
 _FITTED = ("slowest_share", "overdriving", "speed_spread")
@@ -113,8 +116,9 @@ def read_passages(path: Path) -> Passages:
                 raise InputError(f"{path}:1: column {shown(meant[0])}: did you mean {optional!r}?")
         for row in rows:
             where = f"{path}:{rows.line_num}"
-            speed = number_in_text(where, speeds[0], row[speeds[0]] or "", 0.1, 500.0) / _SPEEDS[speeds[0]]
-            visibility = number_in_text(where, "visibility_m", row["visibility_m"] or "", 1.0, 1e6)
+            refuse_other_length(where, row)
+            speed = number_in_text(where, speeds[0], row[speeds[0]], 0.1, 500.0) / _SPEEDS[speeds[0]]
+            visibility = number_in_text(where, "visibility_m", row["visibility_m"], 1.0, 1e6)
             headway = row.get("headway_s")
             gap = number_in_text(where, "headway_s", headway, 0.01, 1e6) if headway else math.nan
             values.append((visibility, speed, gap))
@@ -137,9 +141,16 @@ def fit_drivers(passages: Passages) -> FittedDrivers:
                 f"expected at least {LEAST} vehicles {words} (visibility below or above {UNAFFECTED_ABOVE:g} m) that "
                 f"do not follow another within {FOLLOWING_BELOW:g} s, got {np.count_nonzero(chosen)}"
             )
-    constants = _fitted_speeds(passages, ~follows)
     clear_headways = passages.headway[~fog & follows]
     enough = min(int(np.count_nonzero(fog & follows)), len(clear_headways)) >= LEAST
+    for chosen in (fog & ~follows, fog & follows) if enough else (fog & ~follows,):
+        sessions = np.unique(passages.session[chosen])
+        if sessions[0] >= 0 and len(sessions) < _LEAST_SESSIONS:
+            raise InputError(
+                f"expected vehicles in fog from at least {_LEAST_SESSIONS} sessions, got {len(sessions)}: too few for "
+                "intervals; leave out the column session to count each vehicle as independent"
+            )
+    constants = _fitted_speeds(passages, ~follows)
     following = _fitted_shares(passages, fog & follows, clear_headways) if enough else {}
     return FittedDrivers(constants, following, int(np.count_nonzero(~fog)), int(np.count_nonzero(fog)))
 

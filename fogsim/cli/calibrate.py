@@ -10,6 +10,7 @@ from rich.table import Table
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.core.interruption import interruptible
+from fogsim.errors import InputError, printable
 
 calibrate = typer.Typer(
     no_args_is_help=True, help="Measure what a method needs to know about a camera, or fit drivers to measurements."
@@ -127,17 +128,20 @@ def calibrate_drivers_command(
 ) -> None:
     """Fit drivers to your own measurements of speed and headway in fog (docs/how_to/own_drivers.md)."""
     from fogsim.calibration.driver_calibration import fit_drivers, read_passages
-    from fogsim.core.files.atomic import write_bytes
+    from fogsim.core.files.atomic import write_text
     from fogsim.core.files.output_targets import refuse_unwritable
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[data])
+    passages = read_passages(data)
     try:
         with interruptible():
-            fitted = fit_drivers(read_passages(data))
+            fitted = fit_drivers(passages)
+    except InputError as error:
+        raise InputError(f"{data}: {error}") from error
     except KeyboardInterrupt:
         stderr.print("interrupted; nothing is written")
         raise typer.Exit(INTERRUPTED) from None
-    write_bytes(out, fitted.as_yaml(data.name).encode())
+    write_text(out, fitted.as_yaml(printable(data.name, in_one_line=True)))
     found = {**fitted.constants, **{f"following.{kind}": share for kind, share in fitted.following.items()}}
     if as_json:
         typer.echo(json.dumps({name: one._asdict() for name, one in found.items()}))

@@ -1,6 +1,7 @@
 """Fitted drivers: the constants of simulated drivers come back, within intervals that hold."""
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -70,10 +71,18 @@ def test_vehicles_of_a_session_count_together() -> None:
     assert together == pytest.approx(alone, rel=1e-3)
 
 
+def test_few_sessions_in_fog_are_refused() -> None:
+    made = passages(400, 5)
+    foggy = made.visibility < 1000.0
+    alone = np.where(foggy, 0, np.arange(400))
+    with pytest.raises(InputError, match=r"at least 10 sessions, got 1: .* leave out the column session"):
+        fit_drivers(Passages(made.visibility, made.speed, made.headway, alone))
+
+
 def test_what_is_written_is_a_scenarios(tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
     made = passages(400, 3)
     rows = zip(made.visibility, 3.6 * made.speed, strict=True)
-    data = tmp_path / "m25.csv"
+    data = tmp_path / os.fsdecode(b"m\xfcnchen.csv")
     data.write_text("visibility_m,speed_kmh\n" + "".join(f"{v},{s}\n" for v, s in rows))
     fitted = fit_drivers(read_passages(data))
     out = tmp_path / "drivers.yaml"
@@ -81,7 +90,7 @@ def test_what_is_written_is_a_scenarios(tmp_path: Path, command: Callable[..., t
     assert code == 0
     assert "too few headways" in printed
     text = out.read_text(encoding="utf-8")
-    assert text == fitted.as_yaml("m25.csv")
+    assert text == fitted.as_yaml(r"m\udcfcnchen.csv")
     block = text.partition("drivers:\n")[2]
     scenario = load_scenario("motorway_fog_bank", [f"drivers={{{_flow(block)}}}"])
     choice = driver_setup(scenario).speed_choice
@@ -101,6 +110,8 @@ def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
         ("visibility_m,speed_kmh\n60,fast\n", "data.csv:2.*speed_kmh"),
         ("visibility_m,speed_kmh,session\n60,80,a\n60,80,\n", "data.csv:3: session is empty"),
         ("visibility_m,speed_kmh,headway\n60,80,2\n", "data.csv:1: column 'headway': did you mean 'headway_s'"),
+        ("visibility_m,speed_kmh,session\n120,5,63,2,a\n", "data.csv:2: more cells than columns.* commas"),
+        ("visibility_m,speed_kmh,headway_s\n120,63\n", "data.csv:2: fewer cells than columns"),
         ("visibility_m,speed_kmh\n60,80\n", "at least 30 vehicles in fog .* got 1"),
     ]:
         (tmp_path / "data.csv").write_text(text)

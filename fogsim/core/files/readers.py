@@ -5,6 +5,7 @@ import json
 import math
 import os
 import stat
+from collections.abc import Mapping
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, NoReturn
@@ -124,6 +125,14 @@ def read_json(path: Path, most: int = _MOST_BYTES) -> Any:
         raise InputError(f"{path}: not valid JSON: nested too deeply") from error
     except ValueError as error:
         raise InputError(f"{path}: not valid JSON: {error}") from error
+
+
+def refuse_other_length(where: str, row: Mapping[Any, Any]) -> None:
+    """InputError unless a row of `csv.DictReader` has as many cells as the heading."""
+    if None in row:
+        raise InputError(f"{where}: more cells than columns; are decimals written with commas?")
+    if None in row.values():
+        raise InputError(f"{where}: fewer cells than columns")
 
 
 def _refuse_constant(name: str) -> NoReturn:

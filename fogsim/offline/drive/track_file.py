@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.files.readers import number_in_text, read_text
+from fogsim.core.files.readers import number_in_text, read_text, refuse_other_length
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError, shown
 
@@ -134,7 +134,8 @@ def _csv_points(path: Path) -> Iterator[Point]:
         counted, start = column["time"] == "time_s", None
         for row in rows:
             where = f"--track {path}: line {rows.line_num}"
-            text = row[column["time"]] or ""
+            refuse_other_length(where, row)
+            text = row[column["time"]]
             time = _float(where, "time_s", text) if counted else _instant(where, text)
             start = (0.0 if counted else time) if start is None else start
             heading = _float(where, "heading_deg", row["heading_deg"]) if row.get("heading_deg") else math.nan

@@ -4,16 +4,19 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.core.registry import Registry, make
+from fogsim.errors import InputError
 from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of
+from fogsim_envs.task.drive import FogDriveEnv
 from fogsim_envs.task.rewards import FRONT_FOG_LAMP_VISIBILITY, REAR_FOG_LAMP_VISIBILITY, TaskWeights
 
 Info = Mapping[str, Any]
@@ -134,3 +137,11 @@ def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
 
         return make(SIGN_BASELINES, name, action_space)
     return make(BASELINES, name, action_space)
+
+
+def check_baseline(name: str, env: gymnasium.Env[Any, Any]) -> None:
+    """Refuse a baseline that advises speeds where the agent drives."""
+    if name != "random" and isinstance(env.unwrapped, FogDriveEnv):
+        raise InputError(
+            f"policy: the agent of FogDrive drives, and baselines other than 'random' advise speeds; got {name!r}"
+        )

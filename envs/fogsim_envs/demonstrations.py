@@ -11,7 +11,7 @@ import gymnasium
 
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import FogSimError, InputError, MissingDependencyError
-from fogsim_envs.baselines import BASELINES, baseline
+from fogsim_envs.baselines import BASELINES, baseline, check_baseline
 
 
 @checked_parameters
@@ -27,6 +27,7 @@ def record_demonstrations(
         raise InputError(f"data set {data_set!r} already exists: choose another id, or minari delete {data_set}")
     env = minari.DataCollector(gymnasium.make(env_id, **arguments))
     try:
+        check_baseline(name, env)
         policy = baseline(name, env.action_space)
         for seed in range(episodes):
             policy.reset(seed)

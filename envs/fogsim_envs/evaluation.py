@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
-from fogsim_envs.baselines import Info, Policy, baseline
+from fogsim_envs.baselines import Info, Policy, baseline, check_baseline
 from fogsim_envs.infos import reward_terms_of, row_of, word_of
 
 _RESAMPLES = 2000
@@ -144,7 +144,7 @@ def evaluate(
     Raises
     ------
     InputError
-        If there are no seeds, or the discount is none.
+        If there are no seeds, the discount is none, or a baseline that advises speeds is given for FogDrive.
     """
     numbers = tuple(seeds)
     if not numbers:
@@ -173,6 +173,8 @@ def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
 
 def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> EpisodeResult:
     if isinstance(env, gymnasium.Env):
+        if isinstance(policy, str):
+            check_baseline(policy, env)
         return _episode(env, _policy(policy, env.action_space), seed, discount)
     return _parallel_episode(env, policy, seed, discount)
 

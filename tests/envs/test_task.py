@@ -114,6 +114,12 @@ def test_baselines_are_evaluated() -> None:
         fogsim_envs.evaluate("none", FAST, seeds=[])
 
 
+def test_baselines_that_advise_are_refused_where_the_agent_drives() -> None:
+    for name, arguments in [("fixed", {}), ("none", {"continuous": True}), ("rule", {"discrete": True})]:
+        with pytest.raises(InputError, match=f"the agent of FogDrive drives, .* got '{name}'"):
+            fogsim_envs.evaluate(name, "fogsim/FogDrive-v2", [0], image_size=(64, 48), **arguments)
+
+
 @pytest.fixture(scope="module")
 def fast() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(FAST, render_mode="rgb_array")

@@ -1,6 +1,7 @@
 """Studies: policies, fogs, demands, drivers and estimators compared over seeds, in parallel, with intervals."""
 
 import os
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -92,13 +93,15 @@ def run_study(
         missing = directory.missing()
         done = len(study.runs) - len(missing)
         watch(done, None)
+        # Cells whose settings make the same scenario share a result.
+        sharing = Counter(run.key for run in missing)
 
-        def count(_: StudyRun, message: str | None) -> None:
+        def count(run: StudyRun, message: str | None) -> None:
             nonlocal done
-            done += 1
+            done += sharing[run.key]
             watch(done, message)
 
-        engine.run(missing, directory.results, count)
+        engine.run(list({run.key: run for run in missing}.values()), directory.results, count)
         rows = directory.rows()
         check_factors(rows, [run.levels for run in study.runs])
         write_table(rows, out)

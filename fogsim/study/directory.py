@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from fogsim.core.files.atomic import partial_path, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
@@ -26,6 +26,7 @@ class _Manifest(BaseModel):
     versions: dict[str, str | None]
     files: dict[str, str]
     cells: dict[str, dict[str, Any]]
+    own_methods: dict[str, str] = Field(default_factory=dict)
 
 
 class StudyDirectory:
@@ -63,8 +64,8 @@ class StudyDirectory:
         # The baseline and the number of seeds may change: completed runs stay valid.
         now = {**described, "versions": _deciding_versions(versions())}
         before = {**there, "versions": _deciding_versions(there["versions"])}
-        kinds = ("versions", "files", "cells")
-        changed = [change for kind in kinds for change in _changes(before.get(kind, {}), now[kind])]
+        kinds = ("versions", "files", "cells", "own_methods")
+        changed = [change for kind in kinds for change in _changes(before[kind], now.get(kind, {}))]
         if changed:
             more = f"; and {len(changed) - _MOST_LISTED} more" if len(changed) > _MOST_LISTED else ""
             raise InputError(

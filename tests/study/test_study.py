@@ -104,6 +104,42 @@ def test_other_versions_and_changed_files_are_refused(tmp_path: Path) -> None:
         StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
 
 
+def test_changed_methods_and_files_that_they_read_are_refused(tmp_path: Path) -> None:
+    town = tmp_path / "town"
+    shutil.copytree(Path(__file__).parents[1] / "data" / "grid", town)
+    config = (town / "grid.sumocfg").read_text(encoding="utf-8")
+    (town / "grid.sumocfg").write_text(config.replace("<input>", '<input><weight-files value="weights.xml"/>'))
+    adviser = "class Mine:\n    def advise(self, time, fog):\n        return None\n"
+    read = {"weights.xml": "<meandata/>", "edges.txt": "edge:A0A1", "range.json": "{}", "own.py": adviser}
+    for name, content in read.items():
+        (town / name).write_text(content)
+    text = """
+sumocfg: town/grid.sumocfg
+ego: veh18
+settings:
+  - fog.visibility_m=80
+  - 'traffic.sumo_options={fcd-output.filter-edges.input-file: edges.txt}'
+  - 'estimators=[{method: belaroussi2015, parameters: {operating_range: range.json}}]'
+factors: {p: {mine: ['advice=own:Mine']}}
+"""
+    StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
+    for name, content in read.items():
+        (town / name).write_text(content + "\n# changed\n")
+        with pytest.raises(InputError, match=rf"{name.replace('.py', ':Mine')} was '[^']+' and is"):
+            StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
+        (town / name).write_text(content)
+
+
+def test_cells_with_the_same_scenario_share_one_run(tmp_path: Path) -> None:
+    estimators = "  estimator: {joint: ['estimators=[joint_road]'], zhu: ['estimators=[zhu2015]']}\nseeds: 2"
+    study = load_study(study_file(tmp_path, STUDY.replace("seeds: 2", estimators)), ["lighting=low_beam"])
+    engine, done = PlayedRuns(), [0]
+    rows = run_study(study, tmp_path / "out", engine=engine, watch=lambda number, _: done.append(number))
+    assert (len(rows), len(engine.run_numbers), done[-1]) == (8, len({run.key for run in study.runs}), 8)
+    assert len(engine.run_numbers) == 4
+    assert {row["status"] for row in rows} == {"complete"}
+
+
 def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path))
     with pytest.raises(InputError, match="something else than a study"):

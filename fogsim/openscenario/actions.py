@@ -110,6 +110,7 @@ class Actions(LateralActions):
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, final = f"{self.vehicles[actor].called}.speed", speed["to_kmh"] / KMH_PER_MPS
             effect.ends.append(f"{own} > {final - NEAR:.9g} m/s and {own} < {final + NEAR:.9g} m/s")
+        effect.has_unknown_end |= "rate_mps2" in speed and not {"to_kmh", "continuous"} & speed.keys()
         effect.is_endless |= "continuous" in speed
         # At a rate of 0 a speed stays as it is.
         held = {"like": self.vehicles[actor].named, "shape": "step"}
@@ -193,7 +194,7 @@ class Actions(LateralActions):
             arrive["to_kmh"] = 0.0 if is_factor else value * KMH_PER_MPS
             arrive["factor"] = value if is_factor else float(is_relative)
         near = action.number("targetToleranceMaster", 0.0)
-        effect.has_unknown_end = master.named != "ego"
+        effect.has_unknown_end |= master.named != "ego"
         effect.ends.append(f"ego.position >= {its_place - near + master.front:.3f} m")
         effect.add(actor, arrive=arrive)
 
@@ -243,7 +244,7 @@ class Actions(LateralActions):
             effect.lasts = max(effect.lasts, path["at_s"][-1])
         else:
             x, y = points[-1][:2]
-            effect.has_unknown_end = origin != "map" or math.dist(points[0][:2], (x, y)) < 2.0 * _AT_THE_END
+            effect.has_unknown_end |= origin != "map" or math.dist(points[0][:2], (x, y)) < 2.0 * _AT_THE_END
             end = f"distance_to({self.vehicles[actor].called}, {vehicle.front:g} m, {x:.3f} m, {y:.3f} m)"
             effect.ends.append(f"{end} < {_AT_THE_END} m")
         if trajectory.flag("closed"):

@@ -13,6 +13,7 @@ from fogsim.traffic.road.opendrive_lanes import Spot
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
+MOTION = {"speed", "follow", "arrive"}  # Keys of blocks that order a speed
 _TINY = 1e-9  # Lateral acceleration that is none [m/s²]
 _LONGEST = 60.0  # Most time that a move across takes [s]
 
@@ -38,11 +39,17 @@ class Effect:
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
 
-    def changes_speed(self, subject: str) -> bool:
-        """Whether a subject's speed changes, or goes by another vehicle's, for some time."""
-        done = self.do.get(subject, {})
-        speed = done.get("speed", {})
-        return bool({"continuous", "profile"} & {*speed}) or "follow" in done or speed.get("shape", "step") != "step"
+    @property
+    def moves(self) -> bool:
+        """Whether it orders a speed."""
+        return any(MOTION & done.keys() for done in self.do.values())
+
+    def changes_speed(self, *subjects: str) -> bool:
+        """Whether the speed of a subject (default: any) changes, or goes by another vehicle's, for some time."""
+        done = [self.do.get(one, {}) for one in subjects or self.do]
+        speeds = [one.get("speed", {}) for one in done]
+        lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
+        return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
 
 @dataclass

@@ -28,7 +28,8 @@ from fogsim.traffic.road.opendrive_lanes import read_opendrive_lanes
 from fogsim.traffic.templates.xml_text import element, opening
 from fogsim.units import KMH_PER_MPS
 
-_USUAL_DURATION = 120.0  # Longest simulated time of a file whose stop trigger has no time [s]
+_USUAL_DURATION = 120.0  # Longest simulated time of a file without a stop trigger [s]
+_LONGEST = 3600.0  # The same of one whose stop trigger is more than a time [s]
 _NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
 _FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
@@ -114,6 +115,7 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
     groups = [one for one in storyboard.walk() if one.tag == "Actors"]
     actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
     positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.speed(name))}
+    story.initial = begin.effect.sets
     story.find_events(storyboard)
     return begin
 
@@ -183,9 +185,9 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
     if stop.at is not None:
         return {"duration_s": max(stop.at, 0.1)}
     if not stop.delay:
-        return {"duration_s": _USUAL_DURATION, "end_when": stop.condition}
+        return {"duration_s": _LONGEST, "end_when": stop.condition}
     timeline.append(timeline_entry(node, "stop", stop, {})[1])
-    return {"duration_s": _USUAL_DURATION, "end_when": "happened(stop)"}
+    return {"duration_s": _LONGEST, "end_when": "happened(stop)"}
 
 
 def _vehicles_text(begin: Beginning) -> str:

@@ -1,18 +1,29 @@
 """The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fogsim.openscenario.actions import Actions
-from fogsim.openscenario.lateral import Effect
+from fogsim.openscenario.lateral import MOTION, Effect
 from fogsim.openscenario.parameters import fits
-from fogsim.openscenario.triggers import AT_ONCE, NEVER, TimelineEntry, Trigger, Triggers, both, timeline_entry
+from fogsim.openscenario.triggers import (
+    AT_ONCE,
+    NEVER,
+    STEP,
+    TimelineEntry,
+    Trigger,
+    Triggers,
+    both,
+    is_single,
+    timeline_entry,
+)
 from fogsim.openscenario.xml_tree import Node, NodeError
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
+_ROOM = 600  # Characters of a condition for what differs between its parts
 _REFERENCE = "CatalogReference"
-_MOTION = {"speed", "follow", "arrive"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -36,7 +47,11 @@ class Storyboard:
     root: Node
     triggers: Triggers = field(init=False)
     entries: dict[int, Entry] = field(default_factory=dict)
+    initial: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables that Init sets
     _begins: dict[int, Trigger] = field(default_factory=dict)
+    _stops: dict[int, str] = field(default_factory=dict)  # Names of entries that stop acts
+    _over_marks: dict[str, str] = field(default_factory=dict)  # Of what is over, by entries
+    _end_marks: dict[int, list[str]] = field(default_factory=dict)  # Of what others have ended, by elements
     _stories: list[Node] = field(default_factory=list)
     _acts: list[Node] = field(default_factory=list)
     _never: list[Node] = field(default_factory=list)  # Acts and events that never begin
@@ -93,14 +108,17 @@ class Storyboard:
 
     def timeline(self) -> list[TimelineEntry]:
         """Entries of the timeline, each with its element."""
+        taken = {name for one in self.entries.values() for name in one.names}
+        stopped = [act for act in self._acts if any(one.children for one in act.all("StopTrigger"))]
+        self._stops = {id(act): _free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
         for act in self._acts:
-            stop = self.triggers.trigger(act.one("StopTrigger"))
+            until = self._until(act)
             for entry in (one for one in self.entries.values() if one.group.above is act):
                 own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
                 entry.trigger = both(self._begins[id(act)], own)
-                written += self._executed(entry, self._until(stop, entry.node))
+                written += self._executed(entry, until)
         return written
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
@@ -121,34 +139,67 @@ class Storyboard:
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
         """What an overriding event does to others of its maneuver that have begun: speeds stay as they are."""
-        actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & _MOTION]
-        others = [one for one in self.entries.values() if one is not entry and one.node.above is entry.node.above]
-        begun = [f"happened({one.names[0]})" for one in others if any(map(one.effect.changes_speed, actors))]
-        if entry.node.get("priority") == "parallel" or not trigger.condition or not begun:
+        actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & MOTION]
+        others = [one for one in self._others(entry) if any(map(one.effect.changes_speed, actors))]
+        if entry.node.get("priority") == "parallel" or not trigger.condition:
             return []
-        when = Trigger(f"({trigger.condition}) and not happened({name}) and ({' or '.join(begun)})", trigger.delay)
-        known = self.actions.vehicles
+        known, first = self.actions.vehicles, trigger.condition
+        if trigger.delay:
+            first = f"({first}) delayed {trigger.delay:g} s"
         held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors if one in known}
-        return [timeline_entry(entry.node, f"{name}_ends_others", when, held, until)]
+        written = []
+        for number, running in enumerate(_alternatives(part for one in others for part in self._running(one))):
+            when = Trigger(f"({first}) and not happened({name}) and ({running})")
+            called = f"{name}_ends_others" + (f"_{number + 1}" if number else "")
+            written.append(timeline_entry(entry.node, called, when, held, until))
+        return written
 
-    def _until(self, stop: Trigger | None, node: Node) -> str:
-        """Condition for an event in addition to its trigger: its act has not been stopped."""
+    def _others(self, entry: Entry) -> list[Entry]:
+        """Other events of its maneuver."""
+        above = entry.node.above
+        return [one for one in self.entries.values() if one is not entry and one.node.above is above]
+
+    def _running(self, entry: Entry) -> list[str]:
+        """Conditions that an execution of an event is running; where its end is not known, that the first has begun."""
+        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moves):
+            return [f"happened({entry.names[0]})"]
+        return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
+
+    def _ended(self, entry: Entry) -> list[str]:
+        """Marks of an event whose changes of speed others end that override it."""
+        if id(entry.node) not in self._end_marks:
+            marks = self._end_marks[id(entry.node)] = []
+            overriding = [one for one in self._others(entry) if one.node.get("priority") != "parallel"]
+            is_ended = len(entry.names) == 1 and (entry.effect.is_endless or entry.effect.changes_speed())
+            began = [name for one in overriding for name in one.names if is_ended]
+            edges = (f"(happened({one}) and not (happened({one}) delayed {STEP}))" for one in began)
+            for edge in _alternatives(edges):
+                when = f"happened({entry.names[0]}) delayed {STEP} and ({edge})"
+                marks.append(self._mark(entry.node, f"{entry.names[0]}_ended", Trigger(when)))
+        return self._end_marks[id(entry.node)]
+
+    def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
+        """Condition that a trigger has fired: an entry of the timeline without action."""
+        taken = {mark["name"] for _, mark in self.triggers.marks}
+        name = _free_name(wanted, taken.union(*(one.names for one in self.entries.values())))
+        self.triggers.marks.append(timeline_entry(node, name, trigger, {}))
+        return f"happened({name})"
+
+    def _until(self, act: Node) -> str:
+        """Condition for events in addition to their triggers: their act has not been stopped."""
+        stop = self.triggers.trigger(act.one("StopTrigger"))
         if stop is None or not stop.condition:
             return ""
-        if stop.at is not None:
-            return f"time < {max(stop.at, 0.0):g} s"
-        name = f"stop_{len(self.triggers.marks)}"
-        self.triggers.marks.append(timeline_entry(node, name, stop, {}))
-        return f"not happened({name})"
+        name = self._stops[id(act)]
+        self.triggers.marks.append(timeline_entry(act, name, stop, {}))
+        return f"not happened({name})" if stop.at is None else f"time < {max(stop.at, 0.0):g} s"
 
     def _act_begins(self, act: Node) -> Trigger:
         """When an act begins; a trigger that is more than a time becomes a mark."""
         begins = self.triggers.trigger(act.one("StartTrigger")) or AT_ONCE
         if begins.at is not None or not begins.condition:
             return begins
-        name = _free_name(f"act_{act.get('name')}", {mark["name"] for _, mark in self.triggers.marks})
-        self.triggers.marks.append(timeline_entry(act, name, begins, {}))
-        return Trigger(f"happened({name})")
+        return Trigger(self._mark(act, f"act_{act.get('name')}", begins))
 
     def state(self, node: Node) -> Trigger:
         """Trigger for a ``StoryboardElementStateCondition``."""
@@ -167,7 +218,13 @@ class Storyboard:
             return Trigger("time < 0 s")
         self._open.append(found[0])
         try:
-            return self._begun(found[0]) if state in _BEGUN else self._over(found[0])
+            if state in _OVER:
+                return self._over(found[0])
+            begun = self._begun(found[0])
+            if state != "runningState" or (is_single(node) and kind != "Event"):
+                return begun
+            # What is over at once is running for a step.
+            return Trigger(f"({begun.condition}) and not (({self._over(found[0]).condition}) delayed {STEP})")
         finally:
             self._open.pop()
 
@@ -177,7 +234,7 @@ class Storyboard:
         setters = [entry for entry in self.entries.values() if name in entry.effect.sets]
         if not (values := self._declared(node)):
             raise NodeError(node, f"there is no {node.tag.removesuffix('Condition').lower()} {name!r}")
-        holds = fits(values[0], node)
+        holds = fits(self.initial.get(name, values[0]), node)
         if {fits(entry.effect.sets[name], node) for entry in setters} <= {holds}:
             return AT_ONCE if holds else Trigger("time < 0 s")
         if len(setters) > 1:
@@ -204,24 +261,37 @@ class Storyboard:
         return self._begins[id(act)]
 
     def _over(self, part: Node) -> Trigger:
+        if part.tag == "Action" and len(part.above.all("Action") if part.above else ()) > 1:
+            raise NodeError(part, "when one of several actions of an event is over is not known; name the event")
         inside = {id(one) for one in part.walk()}
-        entries = [entry for key, entry in self.entries.items() if key in inside]
-        entries = [self._entry(part)] if part.tag == "Action" else entries
-        return Trigger(" and ".join(self._played(one, one.names[-1]) for one in entries)) if entries else AT_ONCE
+        inside |= {id(self._entry(part).node)} if part.tag == "Action" else set()
+        phrases = []
+        for act in self._acts:
+            entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
+            phrase = " and ".join(self._played(one, one.names[-1]) for one in entries)
+            stop = self._stops.get(id(act))
+            phrases += [f"(({phrase}) or happened({stop}))" if stop else phrase] * bool(entries)
+        return Trigger(" and ".join(phrases)) if phrases else AT_ONCE
 
     def _played(self, entry: Entry, name: str) -> str:
         effect, phrase = entry.effect, f"happened({name})"
         if effect.has_unknown_end:
-            entry.node.refuse("when a trajectory without times or places is over is not known")
-        if effect.is_endless:
-            return "time < 0 s"
+            message = "when a trajectory without times or places, or a relative speed by rate, is over is not known"
+            entry.node.refuse(message)
         if effect.ends_itself:
-            if any(_MOTION & done.keys() for done in effect.do.values()):
+            if effect.moves:
                 entry.node.refuse("together with a speed, the end of a change of lane by distance is not known")
             phrase = f"over({name})"
         elif effect.lasts > 0.0:
             phrase = f"{phrase} for {effect.lasts:g} s"
-        return " and ".join([phrase, *(f"({end})" for end in effect.ends)])
+        ended = self._ended(entry)
+        if effect.is_endless:
+            return f"({' or '.join(ended)})" if ended else "time < 0 s"
+        if effect.ends and name not in self._over_marks:
+            when = Trigger(" and ".join([phrase, *(f"({end})" for end in effect.ends)]))
+            self._over_marks[name] = self._mark(entry.node, f"{name}_over", when)
+        phrase = self._over_marks.get(name, phrase)
+        return f"({' or '.join([phrase, *ended])})" if ended else phrase
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
@@ -245,3 +315,14 @@ def _free_name(wanted: str, taken: set[str]) -> str:
     name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
     numbered = (f"{name}_{number}" for number in range(2, len(taken) + 3))
     return next(one for one in (name, *numbered) if one not in taken)
+
+
+def _alternatives(parts: Iterable[str]) -> list[str]:
+    """Conditions of one of the parts each, as few as their length allows."""
+    joined: list[str] = []
+    for part in parts:
+        if joined and len(joined[-1]) + len(part) < _ROOM:
+            joined[-1] += f" or {part}"
+        else:
+            joined.append(part)
+    return joined

@@ -14,6 +14,7 @@ _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
 NEAR = 0.05  # Difference up to which speeds are equal [m/s]
+STEP = "0.001 s"  # Less than a camera period: what is delayed by it was so one step before
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
@@ -84,16 +85,24 @@ class Triggers:
         if node.tag == "SimulationTimeCondition":
             value, rule = node.number("value"), node.word("rule", tuple(rule for rule in RULES if rule != "notEqualTo"))
             if rule in ("lessThan", "lessOrEqual"):
-                return Trigger(self._edged(("time", RULES[rule], f"{value:g} s"), edge, node), delay)
-            return Trigger(f"time >= {value + delay:g} s", at=value + delay)
-        if node.tag == "StoryboardElementStateCondition":
+                return Trigger(self._edged(("time", RULES[rule], f"{value:g} s"), edge), delay)
+            # A time is reached for one step only.
+            edge = "rising" if rule == "equalTo" else edge
+            found = Trigger(f"time >= {value:g} s", at=value)
+        elif node.tag == "StoryboardElementStateCondition":
             found = self.states(node)
-            if found.at is not None:
-                return _at_time(max(found.at, 0.0) + delay) if delay else found
-            return replace(found, delay=found.delay + delay)
-        if node.tag in ("ParameterCondition", "VariableCondition"):
-            return replace(self.values(node), delay=delay)
-        raise NodeError(node, "FogSim has no such condition")
+        elif node.tag in ("ParameterCondition", "VariableCondition"):
+            found = self.values(node)
+        else:
+            raise NodeError(node, "FogSim has no such condition")
+        now, before = f"({found.condition})", f"(({found.condition}) delayed {STEP})"
+        if edge == "falling":
+            return Trigger(f"not {now} and {before}", delay)
+        if edge != "none" and not is_single(node):
+            return Trigger(f"{now} and not {before}", delay)
+        if found.at is not None:
+            return _at_time(max(found.at, 0.0) + delay)
+        return replace(found, delay=found.delay + delay)
 
     def _by_entities(self, node: Node, edge: str) -> str:
         triggering, test = node.need("TriggeringEntities"), node.need("EntityCondition").one()
@@ -103,23 +112,23 @@ class Triggers:
         for one in triggering.some("EntityRef"):
             with test.refusing():
                 vehicle = self.positions.vehicles.of(one)
-                phrase.append(self._edged(CONDITIONS[test.tag](self, test, vehicle), edge, node))
-        return (" and " if rule == "all" else " or ").join(_bracketed(one, len(phrase)) for one in phrase)
+                phrase.append(CONDITIONS[test.tag](self, test, vehicle))
+        if len(phrase) == 1:
+            return self._edged(phrase[0], edge)
+        joint = " and " if rule == "all" else " or "
+        return self._edged((joint.join(_bracketed(" ".join(one), 2) for one in phrase),), edge)
 
-    def _edged(self, test: _Test, edge: str, node: Node) -> str:
+    def _edged(self, test: _Test, edge: str) -> str:
         text, is_rising = " ".join(test), edge == "rising"
         if edge == "none":
             return text
         if edge == "risingOrFalling":
-            return f"({self._edged(test, 'rising', node)}) or ({self._edged(test, 'falling', node)})"
-        if len(test) > 1:
+            return f"({self._edged(test, 'rising')}) or ({self._edged(test, 'falling')})"
+        if len(test) > 1 and (test[1] in ("<", ">")) == is_rising:
             signal, rule, value = test
             return f"{signal} {'rises above' if (rule[0] == '>') == is_rising else 'falls below'} {value}"
-        # An edge: the condition was different before.
-        name = f"before_{len(self.marks)}"
-        now, before = (text, f"not ({text})") if is_rising else (f"not ({text})", text)
-        self.marks.append(timeline_entry(node, name, Trigger(before), {}))
-        return f"happened({name}) and ({now})"
+        now, before = (f"({text})", f"(not ({text}))") if is_rising else (f"not ({text})", f"({text})")
+        return f"{before} delayed {STEP} and {now}"
 
     def _compared(self, node: Node, signal: str, unit: str) -> _Test:
         node.word("direction", ("longitudinal",), "longitudinal")
@@ -171,6 +180,9 @@ class Triggers:
             return self._compared(node, straight, "m")
         ahead, behind = (0.0, 0.0) if is_free else (one.front + other.rear, one.rear + other.front)
         gap, value = f"gap({pair})", node.number("value")
+        if not is_free and value <= max(ahead, behind):
+            message = "it is shorter than from reference points to bumpers; write freespace=true, and less"
+            raise ValueError(f"value: {message}")
         near, far = f"{value - ahead:.9g} m", f"{behind - value:.9g} m"
         if node.word("rule", _INEQUALITIES)[0] == "l":
             return (f"{gap} < {near} and {gap} > {far}",)
@@ -246,6 +258,16 @@ CONDITIONS = handlers(Triggers, "condition")
 def _at_time(time: float) -> Trigger:
     """Trigger at a time [s]."""
     return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
+
+
+def is_single(node: Node) -> bool:
+    """Whether a condition is its group's only one, of what begins once: when it first holds is then its edge."""
+    above, is_alone = node.above, True
+    while above and is_alone:
+        is_alone = above.attributes.get("maximumExecutionCount", "1") == "1"
+        is_alone &= above.tag != "ConditionGroup" or len(above.children) == 1
+        above = above.above
+    return is_alone
 
 
 def both(first: Trigger, then: Trigger) -> Trigger:

@@ -138,6 +138,98 @@ def test_an_event_that_overrides_ends_a_change_of_speed_of_its_maneuver(
     assert motion_at(steps, 6.0, "Lead")[1:] == pytest.approx((1.75, speed_after), abs=0.25)
 
 
+def _two_cars(folder: Path, events: str, stop: str, at: float = 20.0) -> Path:
+    """A file whose events move Lead, which begins at a speed [m/s], far ahead of the ego."""
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(at)}"}
+    return write(folder, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}, stop=stop, visibility=5000.0)
+
+
+def _time(later: float) -> str:
+    return after(later).removeprefix("<ConditionGroup>").removesuffix("</ConditionGroup>")
+
+
+RATE = 'dynamicsShape="linear" value="4" dynamicsDimension="rate"'
+IN_TWO_SECONDS = 'dynamicsShape="linear" value="2" dynamicsDimension="time"'
+NEXT = '</Maneuver><Maneuver name="n">'
+CONTINUES = speed(5).replace(
+    '<AbsoluteTargetSpeed value="5"/>',
+    '<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="factor" continuous="true"/>',
+)
+
+
+def test_what_is_over_stays_over(tmp_path: Path) -> None:
+    events = event("up", _slows(RATE, 16), after(1.0)) + event("down", _slows(RATE, 10), after(4.0))
+    steps = run(_two_cars(tmp_path, events, group(state("act", "a", "completeState")), at=10.0))
+    assert (steps[-1].ending, steps[-1].time) == (Ending.END_CONDITION, pytest.approx(5.7, abs=0.21))
+
+
+def test_a_stop_trigger_is_waited_for_longer_than_two_minutes(tmp_path: Path) -> None:
+    data = read_openscenario(_two_cars(tmp_path, event("late", speed(5), after(125.0)), over("late"))).data
+    assert (data["duration_s"], data["end_when"]) == (3600.0, "happened(late)")
+
+
+def test_an_event_that_is_over_is_not_ended_by_one_that_overrides(tmp_path: Path) -> None:
+    early, late = (
+        event("early", _slows(IN_TWO_SECONDS, 20), after(1.0)),
+        event("across", changes_lane(1, "time", 1.0), after(7.0)),
+    )
+    slows = event("slows", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"', 5), after(5.0))
+    steps = run(_two_cars(tmp_path, early + late + NEXT + slows, after(13.1)))
+    assert motion_at(steps, 13.0, "Lead")[2] == pytest.approx(5.0, abs=0.1)
+
+
+def test_an_endless_event_is_over_when_it_is_overridden_and_not_before(tmp_path: Path) -> None:
+    events = event("across", changes_lane(1, "time", 1.0), after(0.5)) + event("like", CONTINUES, after(2.0))
+    steps = run(
+        _two_cars(
+            tmp_path, events + event("fast", speed(9), after(4.0)), group(state("maneuver", "m", "endTransition"))
+        )
+    )
+    assert steps[-1].ending is Ending.END_CONDITION
+    assert steps[-1].time == pytest.approx(4.3, abs=0.15)
+
+
+def test_an_act_that_is_stopped_is_over(tmp_path: Path) -> None:
+    file = _two_cars(tmp_path, event("late", speed(5), after(50.0)), group(state("act", "a", "completeState")))
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("</Act>", f"<StopTrigger>{after(2.0)}</StopTrigger></Act>"), encoding="utf-8")
+    assert run(file)[-1].time == pytest.approx(2.2, abs=0.15)
+
+
+def test_ends_that_are_not_known_are_refused(tmp_path: Path) -> None:
+    by_rate = CONTINUES.replace(' continuous="true"', "").replace(
+        'dynamicsShape="step" value="0" dynamicsDimension="time"', RATE
+    )
+    with pytest.raises(InputError, match="or a relative speed by rate, is over is not known"):
+        read_openscenario(_two_cars(tmp_path, event("like", by_rate, after(1.0)), over("like")))
+    two = event("two", f'{speed(5)}</Action><Action name="lane">{changes_lane(1, "time", 3.0)}', after(1.0))
+    with pytest.raises(InputError, match="one of several actions of an event is over is not known; name the event"):
+        read_openscenario(_two_cars(tmp_path, two, group(state("action", "lane", "completeState"))))
+
+
+def test_conditions_that_are_true_for_a_while_are_true_no_longer(tmp_path: Path) -> None:
+    fast = _faster_than(18).replace('"Ego"', '"Lead"')
+    running = state("event", "up", "runningState")
+    events = event("up", _slows(IN_TWO_SECONDS, 20), after(2.0))
+    events += event("at_3", speed(20), group(running, _time(3.0))).replace("override", "parallel")
+    for name, conditions in {
+        "too_late": group(running, _time(6.0)),
+        "rising": group(_time(3.0).replace('"none"', '"rising"'), fast),
+        "equal": group(_time(3.0).replace("greaterThan", "equalTo"), fast),
+    }.items():
+        events += event(name, speed(20), conditions).replace("override", "parallel")
+    times = begun(run(_two_cars(tmp_path, events, after(8.0), at=10.0)))
+    assert times["at_3"] == pytest.approx(3.0, abs=0.15)
+    assert not {"too_late", "rising", "equal"} & times.keys()
+
+
+def test_what_init_sets_replaces_the_declared_value(tmp_path: Path) -> None:
+    file = _two_cars(tmp_path, event("waits", speed(5), _waits_for("true")), after(2.0))
+    text = file.read_text(encoding="utf-8").replace("<CatalogLocations>", f"{DECLARED}<CatalogLocations>")
+    file.write_text(text.replace("<Init><Actions>", f"<Init><Actions>{SETS}"), encoding="utf-8")
+    assert begun(run(file))["waits"] == pytest.approx(0.1, abs=0.11)
+
+
 def test_an_event_that_overrides_leaves_alone_what_begins_later(tmp_path: Path) -> None:
     brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(2.0))
     leaves = event("leave", changes_lane(1, "time", 1.0), after(1.0))

@@ -13,6 +13,7 @@ from fogsim.openscenario.parameters import evaluated
 from fogsim.scenario.loading import load_scenario
 from tests.openscenario.writing import DATA, entry
 
+STANDS = '<Condition name="stands" delay="0" conditionEdge="none">'
 STAND_STILL = '<StandStillCondition duration="0.5"/>'
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
@@ -98,21 +99,53 @@ def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
     ("edge", "told"),
     [
         ("rising", "ego.speed falls below 3 m/s"),
-        ("falling", "ego.speed rises above 3 m/s"),
-        ("risingOrFalling", "(ego.speed falls below 3 m/s) or (ego.speed rises above 3 m/s)"),
+        ("falling", "(ego.speed < 3 m/s) delayed 0.001 s and not (ego.speed < 3 m/s)"),
+        (
+            "risingOrFalling",
+            "(ego.speed falls below 3 m/s) or ((ego.speed < 3 m/s) delayed 0.001 s and not (ego.speed < 3 m/s))",
+        ),
     ],
 )
 def test_edges_of_comparisons(read: Callable[..., dict[str, Any]], edge: str, told: str) -> None:
-    old = '<Condition name="stands" delay="0" conditionEdge="none">'
-    data = read((STAND_STILL, '<SpeedCondition value="3" rule="lessThan"/>'), (old, old.replace('"none"', f'"{edge}"')))
+    data = read((STAND_STILL, '<SpeedCondition value="3" rule="lessThan"/>'), (STANDS, STANDS.replace("none", edge)))
     assert told in data["end_when"]
 
 
-def test_an_edge_of_more_than_a_comparison_remembers_what_was_before(read: Callable[..., dict[str, Any]]) -> None:
-    old = '<Condition name="stands" delay="0" conditionEdge="none">'
-    data = read((old, old.replace('"none"', '"rising"')))
-    assert "happened(before_1) and (ego.speed < 0.1 m/s for 0.5 s)" in data["end_when"]
-    assert entry(data, "before_1")["when"] == "not (ego.speed < 0.1 m/s for 0.5 s)"
+def test_an_edge_at_equality_is_one_of_the_comparison_as_written(read: Callable[..., dict[str, Any]]) -> None:
+    speed, edge = '<SpeedCondition value="3" rule="lessOrEqual"/>', STANDS.replace("none", "rising")
+    told = "(not (ego.speed <= 3 m/s)) delayed 0.001 s and (ego.speed <= 3 m/s)"
+    assert told in read((STAND_STILL, speed), (STANDS, edge))["end_when"]
+    assert (
+        "ego.speed rises above 3 m/s"
+        in read((STAND_STILL, speed), (STANDS, STANDS.replace("none", "falling")))["end_when"]
+    )
+
+
+def test_an_edge_of_more_than_a_comparison_compares_with_one_step_before(read: Callable[..., dict[str, Any]]) -> None:
+    stands = "(ego.speed < 0.1 m/s for 0.5 s)"
+    end = read((STANDS, STANDS.replace("none", "rising")))["end_when"]
+    assert f"(not {stands}) delayed 0.001 s and {stands}" in end
+
+
+def test_an_edge_is_one_of_all_triggering_entities_together(read: Callable[..., dict[str, Any]]) -> None:
+    one = '<EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
+    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+    begin = text.index('<TriggeringEntities triggeringEntitiesRule="', text.index(STANDS))
+    old = text[begin : text.index(STAND_STILL) + len(STAND_STILL)]
+    new = f'<TriggeringEntities triggeringEntitiesRule="all"><EntityRef entityRef="Lead"/>{one}'
+    data = read((old, f'{new}<SpeedCondition value="1" rule="lessThan"/>'), (STANDS, STANDS.replace("none", "rising")))
+    both = "(Lead.speed < 1 m/s and ego.speed < 1 m/s)"
+    assert f"(not {both}) delayed 0.001 s and {both}" in data["end_when"]
+
+
+def test_distances_shorter_than_to_the_bumpers_are_refused(read: Callable[..., dict[str, Any]]) -> None:
+    for kind, value in (("lessThan", 7.0), ("greaterThan", 3.0)):
+        near = (
+            f'<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="longitudinal" value="{value}" '
+            f'freespace="false" rule="{kind}"/>'
+        )
+        with pytest.raises(InputError, match="value: it is shorter than from reference points to bumpers"):
+            read((STAND_STILL, near))
 
 
 def test_a_stop_trigger_of_a_time_is_the_duration(read: Callable[..., dict[str, Any]]) -> None:

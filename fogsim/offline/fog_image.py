@@ -19,6 +19,7 @@ from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
+from fogsim.vision.restoration.picture import largest_value
 
 _LEAST_SKY = 0.001
 """Least share of sky in an image from which its airlight is taken; otherwise, the brightest such share is used."""
@@ -118,6 +119,10 @@ def fog_file(
     refuse_unwritable_image(out, "--out", overwrite=overwrite, read=read)
     pixels = read_image(image)
     refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
+    try:
+        largest_value(pixels if pixels.ndim == 2 else pixels[..., :3], camera)
+    except InputError as error:
+        raise InputError(f"{image}: {error}") from error
     if isinstance(depth, DepthMap):
         distance, share, sines = read_distance(depth, camera), 1.0, None
     else:

@@ -1,7 +1,7 @@
 """A calibration of an unknown camera from its images, and how uncertain it is."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -127,7 +127,7 @@ def guess_camera(
         horizon is given.
     """
     _check_values(mount_height, field_of_view)
-    pictures = list(_spread(source, progress))
+    pictures = _spread(source, progress)
     first = pictures[0]
     rows, cols = first.shape[:2]
     if horizon_row is not None and not 0.0 <= horizon_row <= rows - 1:
@@ -192,9 +192,9 @@ def _check_values(mount_height: float | None, field_of_view: float | None) -> No
         )
 
 
-def _spread(source: Source, progress: Callable[[int, int], None]) -> Iterator[Pixels]:
-    """Images of one size, spread over the source."""
-    every = max(1, math.ceil(source.count / _MOST_IMAGES))
+def _spread(source: Source, progress: Callable[[int, int], None]) -> list[Pixels]:
+    """Images of one size, spread over the source; every other one is dropped whenever there are too many."""
+    kept, every = list[Pixels](), max(1, math.ceil(source.count / _MOST_IMAGES))
     size, name, reason = None, None, ""
     for index, picture in enumerate(source.pictures()):
         reason = reason or picture.error
@@ -204,9 +204,12 @@ def _spread(source: Source, progress: Callable[[int, int], None]) -> Iterator[Pi
         if size is None:
             size, name = picture.image.shape[:2], picture.name
         _refuse_other_size(picture, picture.image, size, name)
-        yield picture.image
+        kept.append(picture.image)
+        if len(kept) > 2 * _MOST_IMAGES:  # a video may not state its length
+            kept, every = kept[::2], 2 * every
     if size is None:
         raise InputError(f"none of the images can be read: {reason}")
+    return kept
 
 
 def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], name: str | int | None) -> None:

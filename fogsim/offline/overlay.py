@@ -177,6 +177,9 @@ class OverlayFile:
         self._video = VideoWriter(path, _LOOKED_AT)
         self._format = _PICTURE_FORMATS.get(path.suffix.lower())
         self._picture = b""
+        # Stills all have the time 0, and a video can repeat one.
+        self._step = 1e-3 if source.temporal else source.period
+        self._time = -1.0
 
     def add(self, result: FrameEstimates) -> None:
         """Add an image with its estimates.
@@ -190,7 +193,9 @@ class OverlayFile:
             return
         drawn = self._overlay.draw(result)
         if self._format is None:
-            self._video.write(np.asarray(drawn), result.picture.time)
+            time = result.picture.time
+            self._time = time if time > self._time else self._time + self._step
+            self._video.write(np.asarray(drawn), self._time)
             return
         content = io.BytesIO()
         drawn.save(content, self._format)

@@ -180,6 +180,9 @@ class Straightener:
         places, fractions = self._maps
         # OpenCV keeps the type of the pixels, contrary to its annotations.
         straight: Any = cv2.remap(image, places, fractions, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        if image.dtype == np.uint16 and self.camera.bits > 8:
+            # Cubics overshoot next to highlights; a value that is too large already is refused later.
+            straight = np.minimum(straight, max(int(image.max()), 2**self.camera.bits - 1))
         return cast("Pixels", straight)
 
 

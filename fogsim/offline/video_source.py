@@ -66,10 +66,12 @@ class VideoWriter:
 
 
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:
-    """Raise InputError unless `out` is a writable ``.mp4`` and the camera's size is even; `kind` is for messages."""
+    """Raise InputError unless `out` is a writable ``.mp4`` and fits the camera; `kind` is for messages."""
     if out.suffix.lower() != ".mp4":
         raise InputError(f"--out {out}: a {kind} video is written as .mp4, got {out.suffix or 'no ending'}")
     refuse_unwritable(out, "--out", overwrite=overwrite, read=read, seeks=True)
+    if camera.bits > 8:
+        raise InputError(f"{read[0]}: frames have 8 bits, the camera {camera.bits}; leave `bits` out of its file")
     if camera.width % 2 or camera.height % 2:
         raise InputError(
             f"{read[0]}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
@@ -78,6 +80,9 @@ def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kin
 
 
 _DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
+_STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.* start (-?[\d.]+)")
+"""When a file begins and, if it is later, its first video [s]."""
+
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME_TIME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+)")
@@ -112,7 +117,7 @@ class VideoFile:
     period : float
         Time between two frames [s].
     duration : float
-        Its length from its header [s]; 0 if unknown.
+        Its length from the first frame by its header [s]; 0 if unknown.
     """
 
     path: Path
@@ -156,6 +161,8 @@ class VideoFile:
         if duration is not None:
             hours, minutes, rest = duration.groups()
             seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
+            if starts := _STARTS.search(header_text):
+                seconds -= max(float(starts[2]) - float(starts[1]), 0.0)
         return cls(path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds)
 
     @property

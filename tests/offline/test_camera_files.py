@@ -68,6 +68,18 @@ def test_frames_of_a_video_keep_their_times(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("ending", [".mkv", ".ts", ".mp4"])
+def test_sound_before_the_first_frame_is_no_damage(tmp_path: Path, ending: str) -> None:
+    whole, trimmed = tmp_path / "whole.mkv", tmp_path / f"trimmed{ending}"
+    ffmpeg = [ffmpeg_program(), "-loglevel", "error"]
+    sources = ["-f", "lavfi", "-i", "testsrc=size=80x60:rate=10:duration=4", "-f", "lavfi", "-i", "sine=duration=4"]
+    subprocess.run([*ffmpeg, *sources, "-g", "20", str(whole)], check=True)
+    subprocess.run([*ffmpeg, "-i", str(whole), "-ss", "1.1", "-c", "copy", str(trimmed)], check=True)
+    pictures = list(find_source(trimmed).pictures())
+    assert not pictures[-1].error
+    assert len(pictures) == find_source(trimmed).count == 20
+
+
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
 def test_a_stream_that_was_cut_off_says_so(tmp_path: Path, codec: str) -> None:
     whole, stream, cut = (tmp_path / name for name in ("whole.mp4", "stream.ts", "cut.ts"))

@@ -213,6 +213,13 @@ def test_sizes_must_agree(folder: Path) -> None:
         run(folder, camera=dataclasses.replace(CAMERA, width=65))
 
 
+def test_bits_must_agree(folder: Path) -> None:
+    cv2.imwrite(str(folder / "left.png"), noise(np.uint16, 3, 65535))
+    for name, told in [("image.png", "image.png: the image has 8 bits, the camera 12"), ("left.png", "are 0 … 4095")]:
+        with pytest.raises(InputError, match=told):
+            run(folder, image=folder / name, camera=dataclasses.replace(CAMERA, bits=12))
+
+
 @pytest.mark.parametrize("wrong", [math.nan, -3.0])
 def test_impossible_depths_are_refused(folder: Path, distance: NDArray[np.float64], wrong: float) -> None:
     distance[20, 30] = wrong

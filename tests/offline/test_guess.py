@@ -11,6 +11,7 @@ from PIL import Image
 from fogsim.errors import InputError
 from fogsim.offline import camera_text, estimate_images, find_source, guess_camera, write_camera
 from fogsim.offline.camera_file import load_camera
+from fogsim.offline.source import ImageFiles
 from fogsim.values import Response
 
 HEIGHT = 1.38
@@ -110,6 +111,15 @@ def test_mistakes_are_told(drive) -> None:
     ]:
         with pytest.raises(InputError, match=told):
             guess_camera(find_source(drive.folder / "images"), **options)
+
+
+def test_a_source_of_unknown_length_is_not_kept_whole(tmp_path: Path) -> None:
+    class Unstated(ImageFiles):
+        count = 1
+
+    Image.fromarray(np.full((48, 64), 120, np.uint8)).save(tmp_path / "blank.png")
+    with pytest.raises(InputError, match="found in 50 images"):
+        guess_camera(Unstated((tmp_path / "blank.png",) * 200, True, 0.1))
 
 
 def test_images_of_two_sizes_are_of_two_cameras(drive, tmp_path: Path) -> None:

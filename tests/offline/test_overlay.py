@@ -83,6 +83,13 @@ def test_a_video_has_a_frame_for_each_of_its_frames(drive, tmp_path: Path) -> No
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a.mp4", "b.mp4"]
 
 
+def test_stills_are_shown_one_after_another(drive, tmp_path: Path) -> None:
+    for index, name in enumerate("acb"):
+        Image.fromarray(drive.frames[index]).save(tmp_path / f"{name}.png")
+    written(tmp_path / "out.mp4", find_source(tmp_path, rate=2.0), drive)
+    assert [one.time for one in find_source(tmp_path / "out.mp4").pictures()] == pytest.approx([0.0, 0.5, 1.0])
+
+
 def test_a_still_is_a_picture(drive, tmp_path: Path) -> None:
     written(tmp_path / "a.png", find_source(drive.folder / "images" / "003.png"), drive)
     with Image.open(tmp_path / "a.png") as picture:

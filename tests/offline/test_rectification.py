@@ -152,6 +152,12 @@ def test_depth_and_channels_are_kept() -> None:
             assert np.all(straight == 200)
 
 
+def test_highlights_stay_within_the_bits_of_the_camera() -> None:
+    image = np.zeros((480, 640), np.uint16)
+    image[:, 320:] = 4095
+    assert Straightener(Calibration(replace(CAMERA, bits=12), BARREL, 0.1))(image).max() == 4095
+
+
 def test_an_image_of_another_size_is_still_told(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((100, 100), np.uint8)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match="100 × 100 pixels, the camera 640 × 480"):

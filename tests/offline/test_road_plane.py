@@ -153,6 +153,7 @@ def test_a_video_that_is_left_or_refused_leaves_no_file(clear_video: Path, tmp_p
     for changed, told in (
         ((tmp_path / "fog.avi", road), "is written as .mp4, got .avi"),
         ((clear_video, road), "would replace what is read"),
+        ((out, RoadPlane(Calibration(dataclasses.replace(CAMERA, bits=12)))), "frames have 8 bits, the camera 12"),
         ((out, RoadPlane(Calibration(dataclasses.replace(CAMERA, width=66)))), "64 × 48 pixels, the camera 66 × 48"),
     ):
         with pytest.raises(InputError, match=told):

@@ -47,15 +47,18 @@ class Difference:
     difference : float
         Mean of the differences of runs with the same seed.
     low, high : float or None
-        Ends of its bootstrap interval (BCa; Efron 1987); None if all differences are equal.
+        Ends of its bootstrap interval (BCa; Efron 1987); None if all differences are equal, or it is `untested`.
     p_value : float or None
-        Of a paired permutation test of no difference, two-sided; None if no run differs, or there is only one.
+        Of a paired permutation test of no difference, two-sided; None if no run differs, there is only one, or it is
+        `untested`.
     pairs : int
         Number of seeds with a value in both runs.
     seeds_for_half_width : int or None
         Seeds needed for an interval of the study's wanted half-width, by the normal distribution.
     adjusted_p_value : float or None
         The p-value adjusted for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has run.
+    unpaired : int
+        Of a metric that ranks policies: number of seeds with a value in only one of both runs.
     """
 
     metric: str
@@ -69,6 +72,12 @@ class Difference:
     pairs: int
     seeds_for_half_width: int | None
     adjusted_p_value: float | None = None
+    unpaired: int = 0
+
+    @property
+    def untested(self) -> str:
+        """Why nothing is tested: a missing value may be the best, as without any approach; empty if it is."""
+        return f"{self.unpaired} of {self.pairs + self.unpaired} pairs lack a value" if self.unpaired else ""
 
     def is_shown(self, confidence: float) -> bool:
         """Whether the data show a difference: the interval excludes 0, and the test agrees.
@@ -101,10 +110,14 @@ def number_of(value: object) -> float | None:
 def compare_to_baseline(study: Study, rows: Sequence[Row], metrics: Sequence[str]) -> list[Difference]:
     """Compare every policy to the baseline, by metric and in grid order, without pairs that share no seed."""
     pairs = list(_paired_rows(study, rows))
-    found = (
-        _difference(study, metric, levels, _paired_values(both, metric)) for metric in metrics for levels, both in pairs
-    )
+    found = (_difference(study, metric, levels, both) for metric in metrics for levels, both in pairs)
     return [one for one in found if one is not None]
+
+
+def incomplete_metrics(study: Study, rows: Sequence[Row], metrics: Sequence[str]) -> set[str]:
+    """Metrics that rank policies and have a value in only one run of some pair."""
+    pairs = list(_paired_rows(study, rows))
+    return {metric for metric in metrics if any(_unpaired(both, metric) for _, both in pairs)}
 
 
 def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
@@ -157,11 +170,22 @@ def _paired_values(both: Sequence[tuple[Row, Row]], metric: str) -> NDArray[np.f
     return np.array([pair for pair in values if None not in pair], dtype=np.float64).reshape(-1, 2)
 
 
-def _difference(study: Study, metric: str, levels: Mapping[str, str], values: NDArray[np.float64]) -> Difference | None:
+def _unpaired(both: Sequence[tuple[Row, Row]], metric: str) -> int:
+    """Pairs in which only one run has a value of a metric; 0 for one that does not rank policies."""
+    if metric_words(metric).better is None:
+        return 0
+    return sum((number_of(one.get(metric)) is None) != (number_of(other.get(metric)) is None) for one, other in both)
+
+
+def _difference(
+    study: Study, metric: str, levels: Mapping[str, str], both: Sequence[tuple[Row, Row]]
+) -> Difference | None:
+    values, unpaired = _paired_values(both, metric), _unpaired(both, metric)
     if not len(values):
         return None
     differences = values[:, 1] - values[:, 0]
-    low, high = mean_interval(differences, study.confidence)
+    tested = differences[:0] if unpaired else differences
+    low, high = mean_interval(tested, study.confidence)
     baseline_mean = float(values[:, 0].mean())
     return Difference(
         metric=metric,
@@ -171,9 +195,10 @@ def _difference(study: Study, metric: str, levels: Mapping[str, str], values: ND
         difference=float(differences.mean()),
         low=low,
         high=high,
-        p_value=_p_value(differences),
+        p_value=_p_value(tested),
         pairs=len(values),
-        seeds_for_half_width=_seeds_wanted(differences, study.wanted_interval * abs(baseline_mean), study.confidence),
+        seeds_for_half_width=_seeds_wanted(tested, study.wanted_interval * abs(baseline_mean), study.confidence),
+        unpaired=unpaired,
     )
 
 

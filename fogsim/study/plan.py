@@ -187,7 +187,7 @@ def _label(levels: Mapping[str, str]) -> str:
 
 
 def file_digests(scenario: Scenario) -> dict[str, str]:
-    """Digest of each file that a scenario's traffic and methods read, by name; InputError if one of SUMO's is missing."""
+    """Digest of each file that traffic and methods of a scenario read, by name; InputError if SUMO's are missing."""
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     files = [folder / path for path in named]

@@ -18,6 +18,7 @@ from fogsim.study.comparison import (
     Difference,
     adjust_p_values,
     compare_to_baseline,
+    incomplete_metrics,
     mean_interval,
     moved_denominators,
     number_of,
@@ -153,7 +154,7 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
     for panel, axes in panels:
         for place, policy in enumerate(compared):
             one = by_cell.get(grid.cell(policy, panel))
-            if one is None:
+            if one is None or one.untested:
                 continue
             look = grid.looks[policy]
             if one.low is not None and one.high is not None:
@@ -178,6 +179,8 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
         f"{words.label}: difference to {grid.baseline} of runs with the same seed, mean and {study.confidence:.0%} "
         "interval. Filled: a difference is shown; open: none could be shown."
     )
+    if any(one.untested for one in differences):
+        caption += " No marker: a pair lacks a value."
     columns = [*study.factors, "difference", "low", "high"]
     rows = [[*one.levels.values(), one.difference, one.low, one.high] for one in differences]
     return StudyFigure(metric, caption, svg_of(figure, metric), columns, rows)
@@ -265,8 +268,9 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
     known = numeric_metrics(done, study.factors)
     main = main_metrics(study.metrics, known)
     others = [] if study.metrics else [name for name in known if name not in main]
-    remarks = uninformative(done, [*main, *others])
     differences = adjust_p_values(compare_to_baseline(study, done, main)) + compare_to_baseline(study, done, others)
+    shown = {one.metric for one in differences if one.is_shown(study.confidence)}
+    remarks = uninformative(done, [name for name in (*main, *others) if name not in shown])
     _write_comparison(study, done, differences, remarks, folder)
     telling = [one for one in differences if one.metric in main and one.metric not in remarks]
     figures = [*_figures(study, done, remarks, profiles, telling)]
@@ -293,7 +297,7 @@ def _write_comparison(
             *(one.levels[name] for name in study.factors),
             *(one.metric, one.baseline_mean, one.mean, one.difference, one.low, one.high),
             *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width),
-            *(*events_of_both(study, cells, one), remarks.get(one.metric)),
+            *(*events_of_both(study, cells, one), one.untested or remarks.get(one.metric)),
         ]
         for one in differences
     ]
@@ -308,7 +312,9 @@ def _figures(
     differences: Sequence[Difference],
 ) -> Iterator[StudyFigure]:
     """All figures with data."""
-    drawable = [name for name in numeric_metrics(rows, study.factors) if remarks.get(name) != "does not vary"]
+    known = numeric_metrics(rows, study.factors)
+    incomplete = incomplete_metrics(study, rows, known)
+    drawable = [name for name in known if name not in incomplete and remarks.get(name) != "does not vary"]
     across = next((name for name in DELAY_METRICS if name in drawable), None)
     for group in SAFETY_METRICS:
         upwards = next((name for name in group if name in drawable), None)
@@ -318,7 +324,7 @@ def _figures(
         yield survival_figure(study, profiles)
         over_road = speed_figure(study, profiles), collisions_figure(study, profiles)
         yield from (figure for figure in over_road if figure is not None)
-    for metric in dict.fromkeys(one.metric for one in differences):
+    for metric in dict.fromkeys(one.metric for one in differences if not one.untested):
         yield differences_figure(study, metric, [one for one in differences if one.metric == metric])
 
 

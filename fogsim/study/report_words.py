@@ -75,7 +75,7 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
     events = _events(event_count(metric, rows))
     if one is None:
         return TableCell(text, events)
-    said = [signed(scale * one.difference)]
+    said = [one.untested or signed(scale * one.difference)]
     if one.low is not None and one.high is not None:
         said.append(f"({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})")
     return TableCell(text, events, said) if one.is_shown(study.confidence) else TableCell(text, [*events, *said])
@@ -117,7 +117,8 @@ def comparison_table(
     head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
     body: list[list[str | TableCell]] = []
     for one in differences:
-        interval = remarks.get(one.metric, "–") if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
+        unknown = one.untested or remarks.get(one.metric, "–")
+        interval = unknown if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
         means = zip((one.baseline_mean, one.mean), events_of_both(study, cells, one), strict=True)
         body.append(
             [
@@ -197,15 +198,15 @@ def _compared(study: Study, rows: Sequence[Row]) -> str:
 
 
 def _findings(study: Study, differences: Sequence[Difference]) -> Iterator[tuple[str, list[str]]]:
-    """Shown differences of each metric, in a list for each combination of the other factors."""
+    """Shown and untested differences of each metric, in a list for each combination of the other factors."""
     grid = Grid(study)
     for panel, title in grid.panels.items():
         cells = {grid.cell(policy, panel) for policy in grid.policies}
         here = [one for one in differences if tuple(one.levels.values()) in cells]
         by_metric = {one.metric: [each for each in here if each.metric == one.metric] for one in here}
-        shown = {m for m, found in by_metric.items() if any(one.is_shown(study.confidence) for one in found)}
-        items = [_finding(grid, metric, by_metric[metric]) for metric in by_metric if metric in shown]
-        nothing = [metric_words(metric).label for metric in by_metric if metric not in shown]
+        named = {one.metric for one in here if one.untested or one.is_shown(study.confidence)}
+        items = [_finding(grid, metric, by_metric[metric]) for metric in by_metric if metric in named]
+        nothing = [metric_words(metric).label for metric in by_metric if metric not in named]
         if nothing:
             items.append(f"No difference could be shown in: {', '.join(nothing)}.")
         if items:
@@ -221,7 +222,11 @@ def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
         if one.is_shown(grid.study.confidence):
             told = f"{policy} ({signed(words.scale * one.difference)})"
             groups.setdefault(_verdict(one, words), []).append(told)
-    unshown = [one.levels[grid.policy_factor] for one in differences if not one.is_shown(grid.study.confidence)]
+    unshown = [
+        one.levels[grid.policy_factor] + (f" ({one.untested})" if one.untested else "")
+        for one in differences
+        if not one.is_shown(grid.study.confidence)
+    ]
     said = [f"{verdict} with {', '.join(policies)}" for verdict, policies in groups.items()]
     said += [f"no difference could be shown for {', '.join(unshown)}"] if unshown else []
     unit = "percentage points" if words.unit == "%" else words.unit

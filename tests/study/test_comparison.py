@@ -6,6 +6,7 @@ import pytest
 from fogsim.study.comparison import (
     adjust_p_values,
     compare_to_baseline,
+    incomplete_metrics,
     moved_denominators,
     numeric_metrics,
     uninformative,
@@ -111,6 +112,24 @@ def test_only_seeds_of_which_both_runs_have_a_value_count() -> None:
     rows[0] = {**rows[0], "speed_mps": None}
     assert {one.pairs for one in compare_to_baseline(STUDY, rows, ["speed_mps"])} == {15}
     assert not compare_to_baseline(STUDY, [row for row in rows if row["policy"] == "slow"], ["speed_mps"])
+
+
+def test_a_ranking_metric_that_loses_pairs_is_not_tested() -> None:
+    """A policy without any approach in half of the runs has its best outcomes there, and must not be called worse."""
+    of_half = {("none", 0): 4.0, ("none", 1): 1.0, ("slow", 0): 3.5, ("slow", 1): None}
+    rows = [
+        {**row, "minimum_time_to_collision_s": of_half[str(row["policy"]), int(str(row["seed"])) % 2]}
+        for row in table(-2.0)
+    ]
+    (one, _) = compare_to_baseline(STUDY, rows, ["minimum_time_to_collision_s"])
+    assert (one.difference, one.low, one.p_value, one.seeds_for_half_width) == (-0.5, None, None, None)
+    assert one.untested == "10 of 20 pairs lack a value"
+    assert not one.is_shown(0.95)
+    assert incomplete_metrics(STUDY, rows, ["minimum_time_to_collision_s"]) == {"minimum_time_to_collision_s"}
+    # Without an approach in both runs, a pair is a tie.
+    both = [row for row in rows if row["minimum_time_to_collision_s"] != 1.0]
+    assert compare_to_baseline(STUDY, both, ["minimum_time_to_collision_s"])[0].p_value is not None
+    assert not incomplete_metrics(STUDY, both, ["minimum_time_to_collision_s"])
 
 
 def test_metrics_that_say_nothing_are_called_so() -> None:

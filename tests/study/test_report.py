@@ -190,6 +190,42 @@ def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
     assert "seeds_for_2.5_percent" in comparison[0]
 
 
+def test_a_rare_event_that_one_policy_causes_is_found(study: Study, tmp_path: Path) -> None:
+    """Collisions in six of 15 runs of one policy of four: the others are nine tenths of all values, and 0."""
+    factors = {"policy": ("none", "a", "b", "c"), "fog": ("thin",)}
+    runs = [
+        dataclasses.replace(study.runs[0], levels={"policy": policy, "fog": "thin"}, seed=seed)
+        for policy in factors["policy"]
+        for seed in range(15)
+    ]
+    levels = {name: dict.fromkeys(of_factor, ()) for name, of_factor in factors.items()}
+    rare = dataclasses.replace(study, factors=factors, runs=tuple(runs), level_settings=levels)
+    rows = [
+        {"run": i, **run.levels, "seed": run.seed, "status": "complete", "message": None}
+        | {"collisions": int(run.levels["policy"] == "c" and run.seed < 6)}
+        for i, run in enumerate(runs)
+    ]
+    write_report(rare, rows, {}, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Collisions of all vehicles [1/run]: worse with c (+0.4); no difference could be shown for a, b." in page
+    assert "saturated" not in page
+    assert (tmp_path / "figures" / "collisions.svg").exists()
+
+
+def test_of_pairs_without_a_value_no_difference_is_claimed(study: Study, tmp_path: Path) -> None:
+    rows = [
+        {**row, "minimum_time_to_collision_s": None if row["policy"] != "none" and row["seed"] == 0 else 2.0 - slow}
+        for row in rows_of(study)
+        for slow in [0.1 * (row["policy"] != "none") + 0.01 * int(str(row["seed"]))]
+    ]
+    page = written(study, rows, tmp_path)
+    finding = "no difference could be shown for slow &lt;1&gt; (1 of 8 pairs lack a value)."
+    assert page.count(finding) == 2
+    found = [row for row in table(tmp_path / "comparison.csv") if row["metric"] == "minimum_time_to_collision_s"]
+    assert {(row["p_value"], row["low"], row["remark"]) for row in found} == {("", "", "1 of 8 pairs lack a value")}
+    assert not list((tmp_path / "figures").glob("*minimum_time_to_collision_s*"))
+
+
 def test_without_any_finished_run_there_is_a_report_too(study: Study, tmp_path: Path) -> None:
     rows = [
         {"run": i, **run.levels, "seed": run.seed, "status": "missing", "message": None}

@@ -239,6 +239,8 @@ class _Trial:
 
     def look(self, holds: bool | None, time: float) -> bool | None:
         """Whether it is decided, and how; None while it is not."""
+        if time > self.time + self._clause.within + _TICK:
+            return self._clause.throughout if self._known else None
         self._known |= holds is not None
         if holds is not None and holds != self._clause.throughout:
             return holds

@@ -242,7 +242,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     if outputs.is_dir() and any(outputs.iterdir()):
         names.add(_SUMO_OUTPUTS)
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
-    if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
+    if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG, EVENT_LOG)):
         return
     # Without a manifest the directory claims nothing while new files replace old ones.
     (path / _NAMES["manifest"]).unlink(missing_ok=True)

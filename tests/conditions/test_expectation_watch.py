@@ -133,6 +133,9 @@ def test_whenever() -> None:
         (whenever(1.5), reaction(2.0), FAILED),
         (whenever(0.0), reaction(0.0), PASSED),
         (whenever(0.0), reaction(0.5), FAILED),
+        # A window that is no multiple of the steps of 0.5 s ends between two of them.
+        (whenever(0.3), reaction(0.5), FAILED),
+        (whenever(0.7, throughout=True), reaction(0.0, hold=1.0), PASSED),
         (whenever(2.0, least=2), reaction(1.0), PASSED),
         (whenever(2.0, least=3), reaction(1.0), OPEN),
         (whenever(2.0), reaction(1.0)[:4], OPEN),

@@ -50,6 +50,17 @@ def test_overwriting_replaces_what_fogsim_writes_and_nothing_else_at_the_end(tmp
     assert manifest == {"status": "complete", "files": ["manifest.json", "report.html"]}
 
 
+@pytest.mark.parametrize("log", ["steps.arrows", "trajectories.arrows", "events.arrows"])
+def test_rows_that_could_not_become_a_table_are_kept(tmp_path: Path, log: str) -> None:
+    (tmp_path / "manifest.json").write_text("earlier")
+    with RunDirectory(tmp_path, overwrite=True) as directory:
+        directory.begin({"status": "running"})
+        (directory.unfinished / log).write_text("rows")
+        directory.finish({"status": "failed"})
+    assert (tmp_path / "unfinished" / log).read_text() == "rows"
+    assert (tmp_path / "manifest.json").read_text() == "earlier"
+
+
 def test_a_change_of_places_that_is_cut_off_is_completed_and_mixes_nothing(tmp_path: Path) -> None:
     for name in ("manifest.json", "steps.parquet", "metrics.json", "video.mp4"):
         (tmp_path / name).write_text("earlier")

@@ -175,3 +175,18 @@ def test_files_that_sumo_could_not_write_to_their_end_are_told(tmp_path: Path) -
         (tmp_path / f"{name}.xml").write_text(text)
     with pytest.warns(UserWarning, match=r"all of cut\.xml, half\.xml, nothing\.xml in .*disk full"):
         folder.close()
+
+
+def test_a_configuration_deep_below_links_writes_into_the_runs_folder(town: Source, tmp_path: Path) -> None:
+    folder, out = town[1] / "a", tmp_path / "out"
+    deep = folder.joinpath(*"a" * 45)
+    trap = deep.joinpath(*[".."] * 40, *out.parts[1:]).resolve()
+    deep.mkdir(parents=True)
+    trap.parent.mkdir(parents=True)
+    trap.symlink_to(folder)
+    text = (town[1] / "town.sumocfg").read_text().replace(str(town[1] / "trips.xml"), f"{deep}/trips.xml")
+    (town[1] / "town.sumocfg").write_text(text)
+    for _ in fogsim.run(override(town[0], ["duration_s=1"]), 1, sumo_outputs=out):
+        pass
+    assert (out / "mine_trips.xml").is_file()
+    assert not (folder / "mine_trips.xml").exists()

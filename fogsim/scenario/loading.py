@@ -28,6 +28,7 @@ from fogsim.scenario.variation import KEYS, Case, Value, Variation, chosen_cases
 from fogsim.scenario.written_form import resolved
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import check_configured_files, check_sumo_file
+from fogsim.traffic.road.unsafe_outputs import check_outputs
 from fogsim.traffic.templates import PlacementError
 
 SCENARIO_FILE = "scenario.yaml"
@@ -406,6 +407,8 @@ def _check_files(document: Document, scenario: Scenario) -> None:
             check_sumo_file(str(key_path[1]), scenario.directory / path)
             if path == traffic.config:
                 check_configured_files(scenario.directory / path)
+            else:
+                check_outputs((scenario.directory / path,))
         except InputError as error:
             mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {error}")
     if mistakes:

@@ -1,6 +1,7 @@
 """Contents of a SUMO configuration file, read without SUMO, and its options that FogSim overrides."""
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 from fogsim.core.files.xml_reader import read_tree, root_tag
 from fogsim.errors import InputError
+from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, unsafe_option
 
 _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),
@@ -30,6 +32,7 @@ _ROUTES = ("route-files", "routes", "r")
 _FURTHER = (*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state")
 _OPENING = ("load-state", "scale")
 _REROUTING = "device.rerouting"
+_SEPARATORS = re.compile(r"[,;\s]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,10 @@ _UNSUPPORTED = (
     _UnsupportedOption(
         ("random", "abs-rand"), "false", ("", "0", "f", "no", "off", "-"), "a run must depend on its seed alone"
     ),
+    *(
+        _UnsupportedOption(names, "never", ("",), "SUMO would fetch schemas from the addresses that files name")
+        for names in (("xml-validation", "X"), ("xml-validation.net",), ("xml-validation.routes",))
+    ),
 )
 
 OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
@@ -65,16 +72,23 @@ def check_sumo_file(kind: str, path: Path) -> None:
 def check_configured_files(config: Path) -> None:
     """Check the network, route and additional files of a SUMO configuration with `check_sumo_file`.
 
-    A mesoscopic simulation is refused. Names with variables, or with separators that only SUMO knows, are not checked.
+    A mesoscopic simulation and outputs outside the run's folder are refused. The first elements of files whose names
+    have variables, or separators that only SUMO knows, are not checked.
     """
     configured_files(config)
     root = _root(config)
     if any(value.lower() in _TRUE for value in _values(root, ("mesosim",))):
         raise InputError(f"{config}: mesosim: {NO_LANES}")
+    for option, value in ((element.tag, value) for element in root.iter() for value in _written(element)):
+        reason = unsafe_option(option, value)
+        if reason is not None:
+            raise InputError(f"{config}: {option}: {reason}; leave it out")
     for kind, options in (("net", _NET), ("routes", _ROUTES), ("additional", _ADDITIONAL)):
         for path in _named(config, root, options):
             if not set(str(path).removeprefix(str(config.parent))).intersection("$; "):
                 check_sumo_file(kind, path)
+    texts = [expanded(value) for value in _values(root, (*_NET, *_ADDITIONAL, *_FURTHER))]
+    check_outputs(config.parent / name for text in texts for name in (*text.split(","), *_SEPARATORS.split(text)))
 
 
 def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
@@ -141,10 +155,14 @@ def _root(config: Path) -> Element:
 
 
 def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:
-    """Values of an option, which SUMO reads from either attribute, or from the element's text."""
-    for element in root.iter():
-        if element.tag in options:
-            yield (element.get("value") or element.get("v") or element.text or "").strip()
+    """Values of an option."""
+    return (value for element in root.iter() if element.tag in options for value in _written(element))
+
+
+def _written(element: Element) -> Iterator[str]:
+    """Values of an option's element: SUMO reads two attributes and the text."""
+    values = ((text or "").strip() for text in (element.get("value"), element.get("v"), element.text))
+    return (value for value in values if value)
 
 
 def _named(config: Path, root: Element, options: tuple[str, ...]) -> tuple[Path, ...]:

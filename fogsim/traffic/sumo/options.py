@@ -10,6 +10,7 @@ from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import MissingDependencyError, nearest, shown
 from fogsim.traffic.road.configuration import NO_LANES, OVERRIDES, configured_prefix, is_configured
 from fogsim.traffic.road.opendrive import is_opendrive
+from fogsim.traffic.road.unsafe_outputs import unsafe_option
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 
@@ -20,11 +21,8 @@ _LOG = "error-log"
 
 def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     """SUMO's command line, without the program's name, and without where outputs go."""
-    if setup.config is None:
-        source = ["--net-file", str(setup.net)]
-    else:
-        source = ["--configuration-file", str(setup.config), *OVERRIDES]
-    arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
+    source = ["--net-file", str(setup.net)] if setup.config is None else ["--configuration-file", str(setup.config)]
+    arguments = [*source, *OVERRIDES, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))
     for option, paths in (("--route-files", setup.routes), ("--additional-files", additional)):
@@ -68,15 +66,13 @@ OptionValue = bool | int | float | str
 """What an option is set to."""
 
 _SEED = "a run must depend on its own seed alone (fogsim run --seed)"
-_NO_RUN = "SUMO would write that file and end"
+_NO_RUN = "SUMO would print and end"
+_VALIDATION = "SUMO would fetch schemas from the addresses that files name"
 _TRACI = "SUMO runs inside FogSim, and waits for no clients"
 _WINDOW = "SUMO has no window here"
 
 OWN_OPTIONS: Mapping[str, str] = {
     "configuration-file": "give traffic.config",
-    "save-configuration": _NO_RUN,
-    "save-template": _NO_RUN,
-    "save-schema": _NO_RUN,
     "help": _NO_RUN,
     "version": _NO_RUN,
     "net-file": "give traffic.net",
@@ -96,8 +92,20 @@ OWN_OPTIONS: Mapping[str, str] = {
     "quit-on-end": _WINDOW,
     "gui-settings-file": _WINDOW,
     "breakpoints": _WINDOW,
+    "xml-validation": _VALIDATION,
+    "xml-validation.net": _VALIDATION,
+    "xml-validation.routes": _VALIDATION,
 }
 """Options that are FogSim's to set, or make no sense in a run, and what to do instead."""
+
+_SHORT = {
+    **dict.fromkeys(("c", "configuration"), "configuration-file"),
+    **dict.fromkeys(("n", "net"), "net-file"),
+    **dict.fromkeys(("r", "routes"), "route-files"),
+    **dict.fromkeys(("a", "additional"), "additional-files"),
+    "X": "xml-validation",
+}
+"""Other names of those that name files, where SUMO cannot be asked."""
 
 _EXPECTED: Mapping[str, tuple[str, tuple[type, ...]]] = {
     "BOOL": ("true or false", (bool,)),
@@ -130,9 +138,10 @@ def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
 
 def _mistake(name: str, value: OptionValue, known: Mapping[str, _KnownOption]) -> str | None:
     option = known.get(name)
-    first = name if option is None else option.name
-    if first in OWN_OPTIONS:
-        return f"this option of SUMO is not set here: {OWN_OPTIONS[first]}"
+    first = _SHORT.get(name, name) if option is None else option.name
+    reason = OWN_OPTIONS.get(first) or unsafe_option(first, str(value))
+    if reason is not None:
+        return f"this option of SUMO is not set here: {reason}"
     if first == "output-prefix" and "/" in str(value):
         return "SUMO's outputs go into the run's directory; the prefix must hold no folder"
     if not known:

@@ -1,6 +1,7 @@
 """Where the files go that SUMO writes: into one folder, whatever their names in SUMO's own files are."""
 
 import collections
+import os
 import shutil
 import tempfile
 import warnings
@@ -10,8 +11,8 @@ from pathlib import Path
 from fogsim.core.files.xml_reader import root_tag
 from fogsim.errors import InputError
 
-_TO_THE_ROOT = "../" * 40
-"""From any folder to the root: there is nothing above it."""
+_TO_THE_ROOT = "../" * (os.pathconf("/", "PC_PATH_MAX") // 5 + 1)
+"""From any folder to the root, which has nothing above it: from a deeper one, the path is too long for the system."""
 
 _TOKEN = "TIME"  # noqa: S105 - what SUMO puts the time for, in a prefix
 _END_OF_XML = 200

@@ -33,6 +33,10 @@ def test_what_sumo_would_not_take_is_told_by_its_key() -> None:
         ("remote-port", 8813, "inside FogSim"),
         ("end", 100, "duration_s"),
         ("output-prefix", "a/b", "no folder"),
+        ("save-config", "a.xml", "outside the run's folder"),
+        ("pedestrian.jupedsim.wkt", "a.txt", "outside the run's folder"),
+        ("fcd-output", "10.0.0.1:80", "not to a network address"),
+        ("xml-validation", "always", "fetch schemas"),
         ("step-method.ballistic", 1, "must be true or false, got 1"),
         ("device.ssm.probability", "often", "must be a number, got 'often'"),
         ("device.ssm.probability", True, "must be a number, got True"),
@@ -53,8 +57,13 @@ def test_where_sumo_cannot_be_asked_it_refuses_by_itself(monkeypatch: pytest.Mon
     scenario = with_options("={no-such-option: 1}")
     with pytest.raises(fogsim.SimulationError, match="No option with the name 'no-such-option' exists"):
         next(fogsim.run(override(scenario, ["renderer=none", "estimators=[]"])))
-    with pytest.raises(InputError, match="fogsim run --seed"):
-        with_options("={seed: 1}")
+    for option, message in [
+        ("seed: 1", "fogsim run --seed"),
+        ("X: always", "schemas"),
+        ("C: a.xml", "outside the run"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            with_options(f"={{{option}}}")
 
 
 def test_options_are_written_flat_or_as_set_makes_them_and_take_the_place_of_usual_ones() -> None:

@@ -1,0 +1,85 @@
+"""What SUMO's files and options must not ask for: files outside the run's folder, and network connections."""
+
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from fogsim.core.files.xml_reader import XmlFile
+from fogsim.errors import shown
+
+_WRITING = frozenset(
+    (
+        *("save-configuration", "save-config", "C", "save-template", "save-schema", "vtk-output"),
+        *("pedestrian.jupedsim.wkt", "pedestrian.jupedsim.py"),
+    )
+)
+"""Options whose files SUMO writes without its output prefix, by all their names."""
+
+_REMOVING = "save-state.period.keep"
+_NAME_ENDS = ("output-suffix", "save-state.suffix")
+_NOT_FILES = frozenset(("params", "explicit", "knownveh", "remove-vehicles", "filter-shapes", "output-prefix"))
+"""Last parts of the names of options whose values may look like an address."""
+
+_OUTPUTS = ("file", "output", "dest")
+_ADDRESS = re.compile(r"(?:\[[^\]]*\][^:]*|[^:]{2,}):\s*[+-]?\d+")
+_NO_ADDRESS = "SUMO's outputs go into files, not to a network address"
+_VARIABLE = re.compile(r"\$\{(.+?)\}")
+_MOST = 2**33
+"""Maximum size and number of elements of a file."""
+
+
+def expanded(value: str) -> str:
+    """A value with its environment variables, as SUMO replaces them."""
+    known = {**os.environ, "PID": "0"}
+    return _VARIABLE.sub(lambda found: known.get(found[1], ""), re.sub(r"(^|,)~", r"\1${HOME}", value)).strip()
+
+
+def _is_address(name: str) -> bool:
+    return _ADDRESS.fullmatch(expanded(name)) is not None
+
+
+def unsafe_option(name: str, value: str) -> str | None:
+    """Why a SUMO option may not have a value; None if it may."""
+    if name in _WRITING and value:
+        return "SUMO would write that file outside the run's folder"
+    if name == _REMOVING and value not in ("", "0"):
+        return "SUMO would remove files outside the run's folder"
+    if name in _NAME_ENDS and "/" in expanded(value):
+        return "SUMO's outputs go into the run's directory; the end of their names must hold no folder"
+    return _NO_ADDRESS if name.rpartition(".")[2] not in _NOT_FILES and _is_address(value) else None
+
+
+def check_outputs(paths: Iterable[Path]) -> None:
+    """Raise InputError if a SUMO file, or one that it includes, sends an output to a network address."""
+    waiting, seen = [path.resolve() for path in paths], set[Path]()
+    while waiting:
+        path = waiting.pop()
+        if path not in seen and path.is_file():
+            seen.add(path)
+            reader = _OutputReader(path)
+            XmlFile(path).read_all(reader, _MOST, _MOST)
+            waiting += reader.included
+
+
+class _OutputReader:
+    """Reads names of outputs and of included files."""
+
+    is_done = False
+
+    def __init__(self, path: Path) -> None:
+        self._folder = path.parent
+        self.included: list[Path] = []
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        names = [attributes[key] for key in _OUTPUTS if key in attributes]
+        if tag.endswith("param") and attributes.get("key", "").rpartition(".")[2] == "file":
+            names.append(attributes.get("value", ""))
+        for name in names:
+            if _is_address(name):
+                raise ValueError(f"{_NO_ADDRESS}, got {shown(name)}")
+        if tag.endswith("include"):
+            self.included.append((self._folder / expanded(attributes.get("href", ""))).resolve())
+
+    def end(self, tag: str) -> None:
+        pass

@@ -139,7 +139,7 @@ class _Host:
         # A fresh interpreter, not a fork (which a GL context does not survive) and not multiprocessing's spawn (which
         # runs the user's script again). Its own session keeps Ctrl-C for this process; it ends when the pipe does.
         self._child = subprocess.Popen(  # noqa: S603 - our own module
-            [sys.executable, "-m", "fogsim_envs.host", str(theirs.fileno())],
+            [sys.executable, "-P", "-m", "fogsim_envs.host", str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
             start_new_session=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},

@@ -57,7 +57,7 @@ def _started() -> "subprocess.Popen[bytes] | None":
 
     if not _is_first():
         return None
-    command = [sys.executable, "-c", f"from {__name__} import read_pictures; read_pictures({os.getpid()})"]
+    command = [sys.executable, "-P", "-c", f"from {__name__} import read_pictures; read_pictures({os.getpid()})"]
     quiet = subprocess.DEVNULL
     try:
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own

@@ -256,7 +256,7 @@ def _refuse_silence(address: str) -> None:
         socket.create_connection((host, int(port)), _CONNECTION_TIME).close()
     except (OSError, OverflowError) as error:
         raise InputError(f"no Ray cluster answers at {address}: {error}") from error
-    command = [sys.executable, "-m", "ray.scripts.scripts", "health-check", "--address", address]
+    command = [sys.executable, "-P", "-m", "ray.scripts.scripts", "health-check", "--address", address]
     try:
         subprocess.run(command, capture_output=True, timeout=_ANSWER_TIME, check=True)  # noqa: S603 - Ray's own, a checked address
     except subprocess.SubprocessError as error:

@@ -57,6 +57,12 @@ def test_a_child_that_is_killed_is_told(hosted: HostedLoop) -> None:
         hosted.advance(Command())
 
 
+def test_a_child_imports_nothing_from_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "contextlib.py").write_text("raise ImportError('of the working directory')")
+    monkeypatch.chdir(tmp_path)
+    HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"])).close()
+
+
 class _Pipe:
     """Asks for one thing, and keeps what is said."""
 

@@ -124,7 +124,7 @@ factors: {p: {mine: ['advice=own:Mine']}}
 """
     StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
     for name, content in read.items():
-        (town / name).write_text(content + "\n# changed\n")
+        (town / name).write_text(content + "\n")
         with pytest.raises(InputError, match=rf"{name.replace('.py', ':Mine')} was '[^']+' and is"):
             StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
         (town / name).write_text(content)

@@ -61,11 +61,11 @@ def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] |
     shading = field.airlight_shading
     if shading == 0 or (field.extinction == 0 and not field.banks):
         return None
-    heights, equivalent = _equivalent_heights(field, float(grid.eye[2]))
+    heights, equivalent, column = _equivalent_heights(field, float(grid.eye[2]))
     reach = np.minimum(grid.distances, grid.distances[-2])
     z = grid.eye[2] + grid.directions[..., 2:] * reach
     overhead = grid.extinction * np.interp(z, heights, equivalent)
-    at_ground = field.extinction * np.interp(field.ground, heights, equivalent)
+    at_ground = field.extinction * np.interp(field.ground, heights, column)
     excess = (1.0 + shading * at_ground) / (1.0 + shading * overhead) - 1.0
     transmittance = np.exp(-grid.depth)
     lost = transmittance[..., :-1] - transmittance[..., 1:]
@@ -74,8 +74,13 @@ def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] |
     return gathered[..., None] * np.array(field.airlight, dtype=np.float32)
 
 
-def _equivalent_heights(field: FogField, eye_height: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Heights [m], and the thickness of fog as dense as there that weighs as much as what is overhead [m]."""
+def _equivalent_heights(
+    field: FogField, eye_height: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Heights [m], and what is overhead as a thickness of fog as dense as there, and as the densest at its height [m].
+
+    Where there is no fog, both are the same, so that values can be interpolated across a sharp base.
+    """
     low = min(field.ground, eye_height) - 10.0
     high = min(max(field.top + 0.5 * field.top_edge, low + 20.0), eye_height + _DEEPEST)
     heights = np.linspace(low, high, _LEVELS)
@@ -84,4 +89,4 @@ def _equivalent_heights(field: FogField, eye_height: float) -> tuple[NDArray[np.
     upright, below = np.array((0.0, 0.0, 1.0)), np.array((0.0, 0.0, low))
     extinctions_on_ray(below, upright, heights - low, medium_of(bare), profile)
     column = np.cumsum(profile[::-1])[::-1] * (heights[1] - heights[0])
-    return heights, column / np.maximum(profile, 1e-6)
+    return heights, np.where(profile > 1e-6, column / np.maximum(profile, 1e-6), column), column

@@ -60,20 +60,24 @@ def _crossing(rise: float, slope: float) -> float:
 
 
 @kernel
-def _split_at_sharp_edge(
+def _split_at_sharp_edges(
     eye: NDArray[np.float64],
     direction: NDArray[np.float64],
     crossing: float,
+    other: float,
     distances: NDArray[np.float64],
     medium: Medium,
     pieces: NDArray[np.float64],
-) -> None:
-    """Put right the optical depth of the interval in which a ray crosses a sharp base or top."""
-    halves, values = np.empty(2), np.empty(2)
+) -> float:
+    """Put right the optical depth of the interval in which a ray crosses a sharp base or top, or both; its end [m]."""
+    middles, values = np.empty(3), np.empty(3)
     n = np.searchsorted(distances, crossing)
-    halves[0], halves[1] = 0.5 * (distances[n - 1] + crossing), 0.5 * (crossing + distances[n])
-    extinctions_on_ray(eye, direction, halves, medium, values)
-    pieces[n] = values[0] * (crossing - distances[n - 1]) + values[1] * (distances[n] - crossing)
+    start, end = distances[n - 1], distances[n]
+    beyond = min(other, end)
+    middles[0], middles[1], middles[2] = 0.5 * (start + crossing), 0.5 * (crossing + beyond), 0.5 * (beyond + end)
+    extinctions_on_ray(eye, direction, middles, medium, values)
+    pieces[n] = values[0] * (crossing - start) + values[1] * (beyond - crossing) + values[2] * (end - beyond)
+    return float(end)
 
 
 @kernel
@@ -100,10 +104,12 @@ def grid_depths(
         for n in range(last - 1):
             mean = (values[2 * n] + 4.0 * values[2 * n + 1] + values[2 * n + 2]) / 6.0
             pieces[n + 1] = mean * widths[n]
-        for sharp in rises:
-            crossing = _crossing(sharp, directions[m, 2])
-            if crossing < distances[last - 1]:
-                _split_at_sharp_edge(eye, directions[m], crossing, distances, medium, pieces)
+        one, other = _crossing(rises[0], directions[m, 2]), _crossing(rises[1], directions[m, 2])
+        near, far = min(one, other), max(one, other)
+        if near < distances[last - 1]:
+            end = _split_at_sharp_edges(eye, directions[m], near, far, distances, medium, pieces)
+            if end < far < distances[last - 1]:
+                _split_at_sharp_edges(eye, directions[m], far, math.inf, distances, medium, pieces)
         rise = max(directions[m, 2], _OUT_OF_FOG)
         rest = max(top - eye[2] - distances[last - 1] * directions[m, 2], 0.0) / rise
         if decay > 0.0:
@@ -227,8 +233,8 @@ FARTHEST = 20_000.0
 """What is farther than this and not endless is taken to be here [m]."""
 
 _PROBES = np.concatenate(([0.0], np.geomspace(0.5, 0.9 * FARTHEST, 128)))
-_SEEN = 7.0
-"""Optical depth behind which a thousandth of the contrast is left [-]."""
+_SEEN = 16.0
+"""Optical depth behind which not even lamps are seen (`fogsim.atmosphere.lamps.halos.FARTHEST`) [-]."""
 _FOG_LEFT = 1e-3
 """Optical depth ahead that matters no more [-]."""
 _EVEN_SHARE = 0.3

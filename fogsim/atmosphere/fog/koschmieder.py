@@ -263,9 +263,14 @@ def fogged_radiance(
     return out
 
 
+def _headroom(field: FogField, eye: tuple[float, float, float]) -> np.float32:
+    """Height of the fog's top above the eye [m], never 0: rays down from the top itself are in the fog."""
+    return np.float32(max(field.top - eye[2], 1e-6))
+
+
 def _banked_fog(field: FogField, eye: tuple[float, float, float]) -> BankedFog:
     return BankedFog(
-        headroom=np.float32(field.top - eye[2]),
+        headroom=_headroom(field, eye),
         extinction=np.float32(field.extinction),
         banks=_bank_rows(field.banks, eye),
         airlight=np.array(field.airlight, dtype=np.float32),
@@ -275,7 +280,7 @@ def _banked_fog(field: FogField, eye: tuple[float, float, float]) -> BankedFog:
 def _layered_fog(field: FogField, eye: tuple[float, float, float], droplets: str) -> LayeredFog:
     around = slant_airlight(field, eye[2], droplets)
     return LayeredFog(
-        headroom=np.float32(field.top - eye[2]),
+        headroom=_headroom(field, eye),
         extinction=np.float32(field.extinction),
         airlight=np.array(field.airlight, dtype=np.float32),
         share=around.share,

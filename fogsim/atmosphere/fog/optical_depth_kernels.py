@@ -128,6 +128,9 @@ def extinctions_on_ray(
         for i in range(at.shape[0]):
             station = here + rate * at[i]
             values[i] += extra * (_smoothstep(station, first, edge) - _smoothstep(station, last, edge))
+    # Clearings may cross beyond a bend.
+    for i in range(at.shape[0]):
+        values[i] = max(values[i], 0.0)
     if layer[DECAY] > 0.0 or not _is_within_layer(z + dz * at[0], z + dz * at[at.shape[0] - 1], layer):
         _thin_with_height(z, dz, at, layer, values)
     if medium.shelters.shape[0] > 0:
@@ -264,10 +267,10 @@ def _banks_depth(
         second_k += extra * _within(here + rate * at[1], first, last, edge)
         third_k += extra * _within(here + rate * at[2], first, last, edge)
         fourth_k += extra * _within(here + rate * at[3], first, last, edge)
-    depth: float = _WEIGHTS[0] * first_k
-    depth += _WEIGHTS[1] * second_k
-    depth += _WEIGHTS[2] * third_k
-    depth += _WEIGHTS[3] * fourth_k
+    depth: float = _WEIGHTS[0] * max(first_k, 0.0)
+    depth += _WEIGHTS[1] * max(second_k, 0.0)
+    depth += _WEIGHTS[2] * max(third_k, 0.0)
+    depth += _WEIGHTS[3] * max(fourth_k, 0.0)
     depth *= step
     return depth
 

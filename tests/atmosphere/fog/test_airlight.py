@@ -43,3 +43,12 @@ def test_a_path_upward_is_brighter_and_one_along_the_ground_as_it_was() -> None:
     # Seen level, all light comes from the height of the eye, over which 1.38 m less of fog lie than over the ground.
     excess = (1.0 + 0.1 * 0.02 * 60.0) / (1.0 + 0.1 * 0.02 * (60.0 - 1.38)) - 1.0
     assert level == pytest.approx(1000.0 * excess, abs=0.2)
+
+
+@pytest.mark.parametrize("base_edge", [0.0, 4.0])
+def test_under_lifted_fog_the_ground_has_all_of_it_overhead(base_edge: float) -> None:
+    lifted = FogField(0.03, (1000.0,) * 3, top=80.0, base=5.0, base_edge=base_edge, airlight_shading=0.1)
+    source = airlight_source(lifted, frustum_grid(lifted, CAMERA, POSE))
+    assert source is not None
+    assert source.min() > -1.0
+    assert 50.0 < source.max() < 1000.0 * 0.1 * 0.03 * 75.0

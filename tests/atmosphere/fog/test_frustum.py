@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Air, fogged_radiance, frustum_grid, radiance_through_grid
+from fogsim.atmosphere import Air, fogged_radiance, frustum_grid, optical_depth, radiance_through_grid
+from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogChange, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 from tests.atmosphere.fields import AIRLIGHT, BANK, CAMERA, POSE, UNEVEN, brute_force
@@ -148,3 +149,19 @@ def test_shading_does_not_touch_a_level_view_through_a_deep_layer() -> None:
     row = round(SMALL.horizon_row)
     one, other = (Air(dataclasses.replace(even, airlight_shading=s)).radiance(view, SMALL, POSE)[row] for s in (0, 0.1))
     assert np.allclose(other, one, rtol=0.02)
+
+
+def test_lamps_fade_in_dense_fog_with_a_soft_top() -> None:
+    field = FogField(extinction_from_visibility(50.0), (0.0, 0.0, 0.0), top=250.0, top_edge=20.0)
+    shape = (SMALL.height, SMALL.width)
+    view = View(np.full((*shape, 3), 3e4, np.float32), np.full(shape, 250.0, np.float32), np.zeros(shape, np.int32))
+    seen = Air(field).radiance(view, SMALL, POSE)[round(SMALL.horizon_row), 80, 1]
+    assert seen == pytest.approx(3e4 * math.exp(-250.0 * field.extinction), rel=0.05)
+
+
+def test_a_thin_layer_between_two_nodes_is_seen() -> None:
+    field = FogField(extinction_from_visibility(50.0), AIRLIGHT, top=110.0, base=100.0)
+    grid = frustum_grid(field, SMALL, POSE)
+    up = grid.directions[..., 2] > 0.01
+    exact = optical_depth(field, grid.eye, grid.eye + 2e5 * grid.directions[up])
+    assert np.allclose(grid.depth[up][:, -1], np.minimum(exact, 60.0), rtol=1e-3)

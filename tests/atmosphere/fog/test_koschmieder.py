@@ -72,3 +72,10 @@ def test_airlight_of_an_overcast_day() -> None:
     # physics: L∞ ≈ E_h / π · (0.8 … 1.0); 10 klx give 2500 … 3200 cd/m²
     assert airlight_from_illuminance(10_000.0)[1] == pytest.approx(0.406 * 10_000.0 / math.pi)
     assert airlight_from_illuminance(0.0) == (0.0, 0.0, 0.0)
+
+
+def test_from_the_top_of_the_fog_one_looks_down_into_it() -> None:
+    field = FogField(0.06, AIRLIGHT, top=POSE.position[2])
+    seen = fogged_radiance(view(0.0, 20.0), field, POSE.position, ray_from_pixel(CAMERA, POSE))
+    assert seen[100, 80, 1] == pytest.approx(3000.0 * (1 - math.exp(-0.06 * 20.0)), rel=1e-4)
+    assert seen[20, 80, 1] == pytest.approx(0.0, abs=0.01)

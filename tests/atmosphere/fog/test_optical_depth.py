@@ -58,3 +58,14 @@ def test_one_end_of_many_lines_may_be_given_once():
     assert optical_depth(field, np.zeros((1, 3)), ends[:1]) == pytest.approx([0.3])
     assert optical_depth(field, ends, np.zeros(3)) == pytest.approx([0.3, 0.6])
     assert optical_depth(field, (0.0, 0.0, 0.0), ends[:1]) == pytest.approx([0.3])
+
+
+def test_where_clearings_cross_there_is_no_less_than_no_fog() -> None:
+    clearings = (
+        FogBank((0.0, 0.0), (1.0, 0.0), 100.0, 300.0, 50.0, -0.03),
+        FogBank((0.0, 0.0), (0.0, 1.0), 100.0, 300.0, 50.0, -0.03),
+    )
+    field = FogField(0.03, AIRLIGHT, clearings, top=60.0)
+    assert extinction(field, (200.0, 200.0, 1.0)) == 0.0
+    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 1.0)) == 0.0
+    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 2.0)) == 0.0

@@ -67,7 +67,13 @@ class Air:
             self._own.prepare(camera, lit)
 
     def radiance(
-        self, view: View, camera: Camera, pose: CameraPose, lights: Lights = _UNLIT, time: float = 0.0
+        self,
+        view: View,
+        camera: Camera,
+        pose: CameraPose,
+        lights: Lights = _UNLIT,
+        time: float = 0.0,
+        by_sky: View | None = None,
     ) -> NDArray[np.float32]:
         """Luminance that reaches a camera.
 
@@ -83,6 +89,8 @@ class Air:
             Lit lamps.
         time : float
             Time since the run began [s], for fog that drifts or changes.
+        by_sky : View or None
+            The scene in the sky's light everywhere, where `view` is lit otherwise, as in tunnels.
 
         Returns
         -------
@@ -95,18 +103,23 @@ class Air:
             If the beam of a lit lamp has holes.
         """
         field = field_at(self.field, time)
-        lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
+        by_sky, lit = by_sky or view, view
+        with_lamps = []
+        if lights.streets is not None:
+            with_lamps.append(self._streets.on(by_sky, camera, pose, field, lights.streets))
         if lights.beams is not None:
-            by_beams = self._traffic.on(view, camera, pose, field, lights.beams)
+            with_lamps.append(self._traffic.on(by_sky, camera, pose, field, lights.beams))
+        for one in with_lamps:
             # Each adds to the sky's light alone.
-            lit = by_beams if lit is view else replace(lit, radiance=lit.radiance + (by_beams.radiance - view.radiance))
+            lit = one if lit is by_sky else replace(lit, radiance=lit.radiance + (one.radiance - by_sky.radiance))
         radiance = daytime_luminance(lit, field, camera, pose, self._droplets)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
         sources = lights.others
-        if lights.own and field.extinction > 0:
+        has_fog = field.extinction > 0 or bool(field.banks)
+        if lights.own and has_fog:
             sources = joined_sources((sources, self._road.sources(lights.own, camera, pose, field)))
-        if lights.beams is not None and field.extinction > 0:
+        if lights.beams is not None and has_fog:
             sources = joined_sources((sources, glow_of_beams(lights.beams, pose, field)))
         if len(sources.intensity):
             self._halos.add(radiance, view, camera, pose, field, sources)

@@ -8,7 +8,7 @@ from fogsim.camera import mounted_pose
 from fogsim.scenario import build
 from fogsim.simulation.ego import view_rendering
 from fogsim.simulation.ego.view_rendering import ViewRenderer
-from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
+from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, Structure, StructureKind, TrafficState
 from tests.helpers.vehicles import vehicles
 
 SETTINGS = ("renderer=cpu", "camera.width=80", "camera.height=60", "fog={visibility_m: 200}")
@@ -103,3 +103,21 @@ def test_a_closed_view_renderer_says_so(scenario: fogsim.Scenario) -> None:
     view_renderer.close()
     with pytest.raises(fogsim.FogSimError, match="closed"):
         seen(view_renderer, scenario, two_cars(10.0, 0.0))
+
+
+def test_lamps_in_tunnels_shine_by_day_as_at_dusk_on_the_bonnet_too() -> None:
+    settings = [*SETTINGS[:3], "fog={visibility_m: inf}", "camera.bonnet=true"]
+    dim = fogsim.load_scenario("motorway_fog_bank", settings)
+    lane = road((0.0, 0.0), 900.0, "a")
+    roof = Structure("t", StructureKind.TUNNEL, lane.centreline, 12.0, 5.2, 6.0)
+    network = RoadNetwork((lane,), lane.centreline, structures=(roof,))
+    view_renderer = ViewRenderer(build.world_config(dim), build.camera_config(dim), network, SignMap())
+    state, camera = two_cars(400.0, 0.0), build.camera_config(dim)
+    pose = mounted_pose(camera.on(), state.position[0], 0.0, camera.mount().setback)
+    day, dusk = (view_renderer.render(state, 0, pose, 0.0, illuminance=light)[1].copy() for light in (10_000.0, 100.0))
+    view = view_renderer.render(state, 0, pose, 0.0)[0]
+    bonnet, middle = view.instance == 16, (view.distance < 25.0) & (np.abs(np.arange(80) - 40) < 5)
+    view_renderer.close()
+    for part in (bonnet, middle & ~bonnet):
+        assert part.sum() > 50
+        assert day[part].mean() == pytest.approx(dusk[part].mean(), rel=0.05)

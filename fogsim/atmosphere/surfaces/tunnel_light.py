@@ -158,10 +158,16 @@ class TunnelLight:
         The tunnels.
     sky_illuminance : float
         Horizontal illuminance of the daylight outside [lx], positive.
+
+    Attributes
+    ----------
+    sky_illuminance : float
+        The daylight outside [lx]; another one from when it is set.
     """
 
     def __init__(self, tunnels: Sequence[Tunnel], sky_illuminance: float) -> None:
-        self._lit = [_space_and_lamps(tunnel, sky_illuminance) for tunnel in tunnels]
+        self.sky_illuminance = sky_illuminance
+        self._lit = [_space_and_lamps(tunnel) for tunnel in tunnels]
         boxes = [space.boxes for space, _ in self._lit]
         self._boxes: NDArray[np.float64] = np.concatenate(boxes) if boxes else np.zeros((0, 10))
 
@@ -195,19 +201,19 @@ class TunnelLight:
         radiance = np.array(view.radiance, np.float32)
         distance, rays = np.ascontiguousarray(view.distance, np.float32), ray_from_pixel(camera, pose)
         eye = np.array(pose.position, np.float64)
-        for space, lamps in self._lit:
+        for space, lamps_by_lux in self._lit:
+            lamps = lamps_by_lux._replace(illuminance=lamps_by_lux.illuminance / self.sky_illuminance)
             light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps)
         return dataclasses.replace(view, radiance=radiance)
 
 
-def _space_and_lamps(tunnel: Tunnel, sky_illuminance: float) -> tuple[TunnelSpace, Luminaires]:
+def _space_and_lamps(tunnel: Tunnel) -> tuple[TunnelSpace, Luminaires]:
+    """A tunnel, and its lamps under a sky that gives 1 lx."""
     boxes = tunnel.boxes()
     stations = np.concatenate([[0.0], np.cumsum(boxes[:-1, 6])])
     # What a lamp sends out, to all sides alike, lights its part of the road.
     flux = LAMPS_ON_ROAD * _SPACING * 2.0 * tunnel.half_width / _UTILANCE
-    lamps = Luminaires(
-        LAMPS_ON_ROAD / sky_illuminance, flux / (math.pi * _SIZE * _WIDTH), _SPACING, _SIZE, 0.5 * _WIDTH
-    )
+    lamps = Luminaires(LAMPS_ON_ROAD, flux / (math.pi * _SIZE * _WIDTH), _SPACING, _SIZE, 0.5 * _WIDTH)
     length = float(boxes[:, 6].sum())
     places = np.arange(-BEFORE, length + BEFORE + 2.0 * STEP, STEP)
     daylight = np.array([daylight_share(place, length, boxes[0, 7], boxes[0, 9]) for place in places.tolist()])

@@ -232,18 +232,17 @@ class ViewRenderer:
         self._sky = self._sky_of(self._daylight)
         if len(self._street_lamps) and self._by_lamplight:
             self._streets = street_lighting(self._street_lamps, self._sky)
-        if self._tunnels:
-            self._sky = max(self._sky, DARKEST_SKY)
         self._tunnel_light = TunnelLight(self._tunnels, self._sky)
 
     def _sky_of(self, illuminance: float) -> float:
         """Illuminance of the sky in which the scene is drawn [lx]."""
-        return max(illuminance, DARKEST_SKY) if self._by_lamplight else illuminance
+        return max(illuminance, DARKEST_SKY) if self._by_lamplight or self._tunnels else illuminance
 
     def _set_daylight(self, illuminance: float) -> None:
         if illuminance == self._daylight:
             return
-        self._daylight, self._sky = illuminance, self._sky_of(illuminance)
+        self._daylight = illuminance
+        self._sky = self._tunnel_light.sky_illuminance = self._sky_of(illuminance)
         self._streets = self._streets and replace(self._streets, sky_illuminance=self._sky)
         if self._renderer is not None:
             self._renderer.set_daylight(self._sky, self._sides)
@@ -283,14 +282,21 @@ class ViewRenderer:
         near, viewpoint = self._from_origin(state, pose)
         renderer = self._renderer_for(drawn, viewpoint)
         vehicles = traffic_batches(near, ego)
-        view = renderer.render(vehicles, drawn, viewpoint, lamplight=bool(lights.own))
+        by_sky = self._with_bonnet(
+            renderer.render(vehicles, drawn, viewpoint, lamplight=bool(lights.own)), drawn, ego, self._sky
+        )
+        view = by_sky
         if self._tunnel_light.is_seen_by(pose):
-            own = self._unlit().render(vehicles, drawn, viewpoint).radiance
-            view = self._tunnel_light.on(view, own, drawn, pose)
-        if self._bonnet is not None and ego is not None:
-            view = with_bonnet(view, drawn, self._bonnet, Instance.FIRST_VEHICLE + ego, self._sky)
-        radiance = self._air.radiance(view, drawn, pose, lights, time)
+            own = self._with_bonnet(self._unlit().render(vehicles, drawn, viewpoint), drawn, ego, DARKEST_SKY)
+            view = self._tunnel_light.on(by_sky, own.radiance, drawn, pose)
+        radiance = self._air.radiance(view, drawn, pose, lights, time, by_sky)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
+
+    def _with_bonnet(self, view: View, camera: Camera, ego: int | None, illuminance: float) -> View:
+        """A drawn view with the ego's bonnet, if it has one, under a sky [lx]."""
+        if self._bonnet is None or ego is None:
+            return view
+        return with_bonnet(view, camera, self._bonnet, Instance.FIRST_VEHICLE + ego, illuminance)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Describe what `render` draws."""

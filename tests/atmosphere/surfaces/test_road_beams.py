@@ -107,3 +107,11 @@ def test_beams_and_street_lamps_add_up() -> None:
 
     apart = drawn(lamps, None) + drawn(None, COMING) - drawn(None, None)
     assert drawn(lamps, COMING) == pytest.approx(apart, rel=1e-4, abs=1e-9)
+
+
+def test_light_in_tunnels_makes_surfaces_no_whiter() -> None:
+    seen = road()
+    by_tunnel_lamps = dataclasses.replace(seen, radiance=np.where(seen.radiance > 0.0, np.float32(4.0), seen.radiance))
+    lights = Lights((), LightSources.none(), beams=COMING)
+    lit = Air(fog(math.inf)).radiance(by_tunnel_lamps, CAMERA, POSE, lights, by_sky=seen)
+    np.testing.assert_allclose((lit - by_tunnel_lamps.radiance)[..., 1], added(), rtol=0.0, atol=1e-5)

@@ -283,12 +283,13 @@ def add_glow_cores(
 
 @kernel
 def _drawn_about(luminance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
-    """Sum of the luminance of the sixteen pixels about a place."""
-    drawn = 0.0
+    """Sum of the luminance of the sixteen pixels about a place, beyond that of the darkest, their background."""
+    drawn, least, count = 0.0, math.inf, 0
     for v in range(max(0, v0 - 1), min(luminance.shape[0], v0 + 3)):
         for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
-            drawn += _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
-    return drawn
+            here = _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
+            drawn, least, count = drawn + here, min(least, here), count + 1
+    return max(drawn - count * least, 0.0)
 
 
 @kernel

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.core.jit import kernel
 from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, LampLobes, LightSources
@@ -175,17 +176,19 @@ class RoadGlow:
     def sources(self, lamps: tuple[HeadLamp, ...], camera: Camera, pose: CameraPose, fog: FogField) -> LightSources:
         """Lit pieces of the road as sources of light."""
         patches = self._patches(lamps, camera.mount_height)
-        reached = patches.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * fog.extinction * patches.range_)
         cosine, sine = math.cos(pose.heading), math.sin(pose.heading)
         ahead, left, up = patches.middle.T
         rise = math.sin(pose.grade)
         place = np.stack((ahead * cosine - left * sine, ahead * sine + left * cosine, up + ahead * rise), axis=1)
+        eye = np.asarray(pose.position, dtype=np.float64)
+        dense = extinction(fog, eye + 0.5 * place)
+        reached = patches.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * dense * patches.range_)
         distance = np.linalg.norm(patches.middle, axis=1)
         slant = np.maximum(-up / distance, 0.01)
         upward = ROAD_ALBEDO * reached / math.pi
         count = len(reached)
         return LightSources(
-            position=np.asarray(pose.position, dtype=np.float64) + place,
+            position=eye + place,
             intensity=upward * slant,
             colour=np.ones((count, 3)),
             area=4.0 * patches.spread[:, 0] * patches.spread[:, 1] * slant,
@@ -206,7 +209,8 @@ def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSou
     eye = np.asarray(pose.position, dtype=np.float64)
     chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:_MOST]
     roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
-    kept = np.exp(-LOSS_OF_SPREAD_LIGHT * fog.extinction * roads[0].range_)
+    dense = extinction(fog, beams.position[chosen])[:, None]
+    kept = np.exp(-LOSS_OF_SPREAD_LIGHT * dense * roads[0].range_)
     flux = np.stack([road.flux for road in roads]) * kept * beams.scale[chosen, None]
     total = flux.sum(axis=1)
     ahead = (flux * np.stack([road.middle[:, 0] for road in roads])).sum(axis=1) / total

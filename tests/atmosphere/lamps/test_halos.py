@@ -14,7 +14,6 @@ from tests.atmosphere.night_scene import empty_view, fog, lamps, rays
 
 CAMERA = Camera(640, 480, 576.9, (319.5, 239.5), 1.5, 0.0)
 POSE = CameraPose((0.0, 0.0, 1.5), 0.0)
-BRIGHT = np.full((480, 640, 3), 1e9, np.float32)
 
 
 def drawn(field, sources, view=None, camera=CAMERA):
@@ -78,9 +77,9 @@ def test_tiny_lamps_are_never_lost_between_pixels(place):
 def test_direct_light_is_attenuated():
     place = (200.0, 0.1, 1.6)
     thin = fog(300)
-    lost = drawn(thin, lamps(place)) - drawn(
-        thin, lamps(place), dataclasses.replace(empty_view(CAMERA), radiance=BRIGHT)
-    )
+    view = empty_view(CAMERA)
+    view.radiance[239, 319] = 1e9
+    lost = drawn(thin, lamps(place)) - drawn(thin, lamps(place), view)
     assert flux(lost, place) == pytest.approx(100.0 / 200.0**2 * math.exp(-thin.extinction * 200.0), rel=0.01)
 
 
@@ -153,3 +152,9 @@ def test_colour_of_a_lamp_is_that_of_its_glow():
     ours = drawn(fog(100), lamps((40.0, 0.0, 1.5), colour=(2.0, 0.5, 0.25)))[240, ::40]
     assert ours[:, 0] == pytest.approx(4 * ours[:, 1], rel=1e-4)
     assert ours[:, 2] == pytest.approx(0.5 * ours[:, 1], rel=1e-4)
+
+
+def test_the_background_of_a_tiny_lamp_is_not_its_light():
+    place = (200.0, 0.0, 1.5)
+    dusk = dataclasses.replace(empty_view(CAMERA), radiance=np.full((480, 640, 3), 30.0, np.float32))
+    assert flux(drawn(fog(math.inf), lamps(place), dusk), place) == pytest.approx(100.0 / 200.0**2, rel=0.01)

@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.road_glow import ROAD_ALBEDO, RoadGlow, glow_of_beams
 from fogsim.lighting.beams import low_beam
-from fogsim.values import Camera, CameraPose, HeadLamp
+from fogsim.values import Camera, CameraPose, FogBank, FogField, HeadLamp, Lights, LightSources
 from fogsim.values.light import RoadBeams
 from tests.atmosphere.night_scene import empty_view, fog
 from tests.atmosphere.tables import read_table
@@ -74,3 +75,12 @@ def test_the_road_before_others_glows_where_their_lamps_light_it() -> None:
     many = glow_of_beams(beams(*((20.0 * n, 0.0) for n in range(1, 8))), POSE, fog(100))
     assert len(many.intensity) == 2
     assert many.position[:, 0].max() < 40.0
+
+
+def test_the_lit_road_glows_in_a_bank_as_in_even_fog() -> None:
+    even = fog(50)
+    bank = FogBank((-5000.0, 0.0), (1.0, 0.0), 0.0, 10000.0, 1.0, even.extinction)
+    banked = FogField(0.0, (0.0, 0.0, 0.0), (bank,))
+    lit = Lights(LOW, LightSources.none(), beams=beams((60.0, 3.5)))
+    one, other = (Air(field).radiance(empty_view(CAMERA), CAMERA, POSE, lit) for field in (even, banked))
+    np.testing.assert_allclose(other, one, rtol=1e-3)

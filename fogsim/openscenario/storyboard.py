@@ -22,7 +22,7 @@ from fogsim.openscenario.xml_tree import Node, NodeError
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
-_ROOM = 600  # Characters of a condition for what differs between its parts
+_ROOM = 600  # Most characters of conditions that are joined into one
 _REFERENCE = "CatalogReference"
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
@@ -50,8 +50,7 @@ class Storyboard:
     initial: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables that Init sets
     _begins: dict[int, Trigger] = field(default_factory=dict)
     _stops: dict[int, str] = field(default_factory=dict)  # Names of entries that stop acts
-    _over_marks: dict[str, str] = field(default_factory=dict)  # Of what is over, by entries
-    _end_marks: dict[int, list[str]] = field(default_factory=dict)  # Of what others have ended, by elements
+    _over_marks: dict[str, list[str]] = field(default_factory=dict)  # Conditions that entries have been over
     _stories: list[Node] = field(default_factory=list)
     _acts: list[Node] = field(default_factory=list)
     _never: list[Node] = field(default_factory=list)  # Acts and events that never begin
@@ -148,7 +147,7 @@ class Storyboard:
             first = f"({first}) delayed {trigger.delay:g} s"
         held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors if one in known}
         written = []
-        for number, running in enumerate(_alternatives(part for one in others for part in self._running(one))):
+        for number, running in enumerate(_joined((part for one in others for part in self._running(one)), " or ")):
             when = Trigger(f"({first}) and not happened({name}) and ({running})")
             called = f"{name}_ends_others" + (f"_{number + 1}" if number else "")
             written.append(timeline_entry(entry.node, called, when, held, until))
@@ -165,18 +164,15 @@ class Storyboard:
             return [f"happened({entry.names[0]})"]
         return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
 
-    def _ended(self, entry: Entry) -> list[str]:
-        """Marks of an event whose changes of speed others end that override it."""
-        if id(entry.node) not in self._end_marks:
-            marks = self._end_marks[id(entry.node)] = []
-            overriding = [one for one in self._others(entry) if one.node.get("priority") != "parallel"]
-            is_ended = len(entry.names) == 1 and (entry.effect.is_endless or entry.effect.changes_speed())
-            began = [name for one in overriding for name in one.names if is_ended]
-            edges = (f"(happened({one}) and not (happened({one}) delayed {STEP}))" for one in began)
-            for edge in _alternatives(edges):
-                when = f"happened({entry.names[0]}) delayed {STEP} and ({edge})"
-                marks.append(self._mark(entry.node, f"{entry.names[0]}_ended", Trigger(when)))
-        return self._end_marks[id(entry.node)]
+    def _overridden(self, entry: Entry) -> list[str]:
+        """Conditions that an event whose changes of speed would go on is ended by one that overrides it."""
+        if len(entry.names) > 1 or not (entry.effect.is_endless or entry.effect.changes_speed()):
+            return []
+        others = [one for one in self._others(entry) if one.node.get("priority") != "parallel"]
+        begun = (
+            f"(happened({entry.names[0]}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
+        )
+        return [begun.format(name) for one in others for name in one.names]
 
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
@@ -268,7 +264,10 @@ class Storyboard:
         phrases = []
         for act in self._acts:
             entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
-            phrase = " and ".join(self._played(one, one.names[-1]) for one in entries)
+            joined = _joined((self._played(one, one.names[-1]) for one in entries), " and ")
+            if len(joined) > 1:
+                joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
+            phrase = " and ".join(joined)
             stop = self._stops.get(id(act))
             phrases += [f"(({phrase}) or happened({stop}))" if stop else phrase] * bool(entries)
         return Trigger(" and ".join(phrases)) if phrases else AT_ONCE
@@ -276,22 +275,23 @@ class Storyboard:
     def _played(self, entry: Entry, name: str) -> str:
         effect, phrase = entry.effect, f"happened({name})"
         if effect.has_unknown_end:
-            message = "when a trajectory without times or places, or a relative speed by rate, is over is not known"
-            entry.node.refuse(message)
+            message = "when a trajectory without times or places is over is not known"
+            entry.node.refuse(f"{message}; nor is the end of a relative speed by rate")
         if effect.ends_itself:
             if effect.moves:
                 entry.node.refuse("together with a speed, the end of a change of lane by distance is not known")
             phrase = f"over({name})"
         elif effect.lasts > 0.0:
             phrase = f"{phrase} for {effect.lasts:g} s"
-        ended = self._ended(entry)
-        if effect.is_endless:
-            return f"({' or '.join(ended)})" if ended else "time < 0 s"
-        if effect.ends and name not in self._over_marks:
-            when = Trigger(" and ".join([phrase, *(f"({end})" for end in effect.ends)]))
-            self._over_marks[name] = self._mark(entry.node, f"{name}_over", when)
-        phrase = self._over_marks.get(name, phrase)
-        return f"({' or '.join([phrase, *ended])})" if ended else phrase
+        own = [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
+        if name not in self._over_marks:
+            overridden = self._overridden(entry)
+            # What is over stays over.
+            parts = [*own, *overridden] if effect.ends or overridden else []
+            marks = [self._mark(entry.node, f"{name}_over", Trigger(one)) for one in _joined(parts, " or ")]
+            self._over_marks[name] = marks
+        parts = [*own, *self._over_marks[name]] or ["time < 0 s"]
+        return parts[0] if len(parts) == 1 else f"({' or '.join(parts)})"
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
@@ -317,12 +317,12 @@ def _free_name(wanted: str, taken: set[str]) -> str:
     return next(one for one in (name, *numbered) if one not in taken)
 
 
-def _alternatives(parts: Iterable[str]) -> list[str]:
-    """Conditions of one of the parts each, as few as their length allows."""
+def _joined(parts: Iterable[str], by: str) -> list[str]:
+    """Conditions joined by ``and`` or ``or``, into as few as their length allows."""
     joined: list[str] = []
     for part in parts:
         if joined and len(joined[-1]) + len(part) < _ROOM:
-            joined[-1] += f" or {part}"
+            joined[-1] += f"{by}{part}"
         else:
             joined.append(part)
     return joined

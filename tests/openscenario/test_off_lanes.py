@@ -252,6 +252,26 @@ def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> Non
         read_openscenario(file)
 
 
+def _meeting(folder: Path, final: str, further: str) -> Path:
+    """A file in which Other arrives when the ego does, and further events of Other."""
+    meets = (
+        '<PrivateAction><SynchronizeAction masterEntityRef="Ego" targetToleranceMaster="1"><TargetPositionMaster>'
+        '<LanePosition roadId="7" laneId="-1" s="110"/></TargetPositionMaster><TargetPosition>'
+        f'<LanePosition roadId="7" laneId="1" s="330"/></TargetPosition>{final}</SynchronizeAction></PrivateAction>'
+    )
+    begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(420, 1)}\n{speed(9)}"}
+    events = event("meet", meets, after(1.0)) + further
+    return write(folder, {"Ego": CAR, "Other": CAR}, begin, {"Other": events}, stop=after(9.0))
+
+
+def test_an_event_that_overrides_ends_a_synchronisation(tmp_path: Path) -> None:
+    final = '<FinalSpeed><AbsoluteSpeed value="2"/></FinalSpeed>'
+    steps = run(_meeting(tmp_path, final, event("aside", _offset(_absolute(0.3)), after(3.0))))
+    then, later = (motion_at(steps, time, "Other")[2] for time in (3.5, 7.0))
+    assert later == pytest.approx(then, abs=0.05)
+    assert then > 9.5
+
+
 @pytest.mark.parametrize(
     ("final", "speed_there"),
     [
@@ -262,15 +282,7 @@ def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> Non
     ],
 )
 def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_there: float | None) -> None:
-    meets = (
-        '<PrivateAction><SynchronizeAction masterEntityRef="Ego" targetToleranceMaster="1"><TargetPositionMaster>'
-        '<LanePosition roadId="7" laneId="-1" s="110"/></TargetPositionMaster><TargetPosition>'
-        f'<LanePosition roadId="7" laneId="1" s="330"/></TargetPosition>{final}</SynchronizeAction></PrivateAction>'
-    )
-    events = event("meet", meets, after(1.0)) + event("next", speed(3), over("meet"))
-    begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(420, 1)}\n{speed(9)}"}
-    file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": events}, stop=after(9.0))
-    steps = run(file)
+    steps = run(_meeting(tmp_path, final, event("next", speed(3), over("meet"))))
     # The ego drives 80 m in 8 s, the other one 90 m against the road, 8.9 m of it before it begins to synchronise.
     x, _, speed_then = motion_at(steps, 8.0, "Other")
     assert (x, motion_at(steps, 8.0, "Ego")[0]) == pytest.approx((330.0 - 3.7, 110.0 + 3.7), abs=1.0)

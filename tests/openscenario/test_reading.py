@@ -144,8 +144,9 @@ def test_a_yaml_file_lays_expectations_upon_it(tmp_path: Path) -> None:
         "cut_in",
         "cut_in_ends_others",
         "brake",
+        "brake_over",
         "stop",
         "late",
     ]
-    assert read_scenario_document(file).where(("timeline", 7)).endswith("test.fog.yaml:6")
+    assert read_scenario_document(file).where(("timeline", 8)).endswith("test.fog.yaml:6")
     assert read_scenario_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")

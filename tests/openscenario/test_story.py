@@ -8,10 +8,12 @@ import pytest
 
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
+from fogsim.scenario.loading import load_scenario
 from fogsim.values import Ending
 from tests.openscenario.writing import (
     CAR,
     CASES,
+    QUIET,
     TWO_LANES,
     after,
     begun,
@@ -189,6 +191,14 @@ def test_an_endless_event_is_over_when_it_is_overridden_and_not_before(tmp_path:
     assert steps[-1].time == pytest.approx(4.3, abs=0.15)
 
 
+def test_acts_of_many_events_are_read(tmp_path: Path) -> None:
+    events = "".join(event(f"slower_{n}", _slows(RATE, n), after(n)) for n in range(1, 31))
+    across = event("across", changes_lane(1, "time", 1.0), after(7.0))
+    file = _two_cars(tmp_path, events + across, group(state("act", "a", "completeState")))
+    scenario = load_scenario(file, QUIET)
+    assert {"across_ends_others", "across_ends_others_2"} < {one.name for one in scenario.timeline}
+
+
 def test_an_act_that_is_stopped_is_over(tmp_path: Path) -> None:
     file = _two_cars(tmp_path, event("late", speed(5), after(50.0)), group(state("act", "a", "completeState")))
     text = file.read_text(encoding="utf-8")
@@ -200,7 +210,7 @@ def test_ends_that_are_not_known_are_refused(tmp_path: Path) -> None:
     by_rate = CONTINUES.replace(' continuous="true"', "").replace(
         'dynamicsShape="step" value="0" dynamicsDimension="time"', RATE
     )
-    with pytest.raises(InputError, match="or a relative speed by rate, is over is not known"):
+    with pytest.raises(InputError, match="nor is the end of a relative speed by rate"):
         read_openscenario(_two_cars(tmp_path, event("like", by_rate, after(1.0)), over("like")))
     two = event("two", f'{speed(5)}</Action><Action name="lane">{changes_lane(1, "time", 3.0)}', after(1.0))
     with pytest.raises(InputError, match="one of several actions of an event is over is not known; name the event"):

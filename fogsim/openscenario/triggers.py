@@ -96,10 +96,11 @@ class Triggers:
         else:
             raise NodeError(node, "FogSim has no such condition")
         now, before = f"({found.condition})", f"(({found.condition}) delayed {STEP})"
+        rises, falls = f"{now} and not {before}", f"not {now} and {before}"
         if edge == "falling":
-            return Trigger(f"not {now} and {before}", delay)
+            return Trigger(falls, delay)
         if edge != "none" and not is_single(node):
-            return Trigger(f"{now} and not {before}", delay)
+            return Trigger(rises if edge == "rising" else f"({rises}) or ({falls})", delay)
         if found.at is not None:
             return _at_time(max(found.at, 0.0) + delay)
         return replace(found, delay=found.delay + delay)
@@ -115,6 +116,9 @@ class Triggers:
                 phrase.append(CONDITIONS[test.tag](self, test, vehicle))
         if len(phrase) == 1:
             return self._edged(phrase[0], edge)
+        if rule == "any" and edge == "rising":
+            # One rises also where another is unknown, as the time to a vehicle that is not ahead.
+            phrase, edge = [(self._edged(one, edge),) for one in phrase], "none"
         joint = " and " if rule == "all" else " or "
         return self._edged((joint.join(_bracketed(" ".join(one), 2) for one in phrase),), edge)
 

@@ -1,6 +1,7 @@
 """Message signs as agents: PettingZoo's contract, what a sign observes, and a reward that no queue escapes."""
 
 import math
+import pickle
 from collections.abc import Iterator
 from typing import Any
 
@@ -61,6 +62,26 @@ def test_pettingzoos_checks_find_nothing(signs: FogCorridorEnv) -> None:
 def test_a_seed_gives_the_same_here_and_in_a_child_process(signs: FogCorridorEnv) -> None:
     signs.close()  # so that the first of the two runs in this process
     parallel_seed_test(lambda: parallel_env(overrides=SHORT, fog_distribution=FOG), num_cycles=2)
+
+
+def test_an_episode_comes_again_with_its_traffic(signs: FogCorridorEnv) -> None:
+    _, infos = signs.reset(seed=1)
+    drawn = signs.drawn
+    for _ in range(2):
+        again = signs.reset(options={"episode": drawn})[1]
+        assert signs.drawn == drawn
+        assert again == infos
+
+
+def test_copies_draw_different_episodes(signs: FogCorridorEnv) -> None:
+    signs.close()
+    fresh = parallel_env(overrides=SHORT, fog_distribution=FOG)
+    drawn = []
+    for copy in (pickle.loads(pickle.dumps(fresh)) for _ in range(2)):  # noqa: S301 - our own
+        copy.reset()
+        drawn.append(copy.drawn)
+        copy.close()
+    assert drawn[0] != drawn[1]
 
 
 def test_a_sign_shows_what_its_agent_chose_and_all_are_paid_the_same(signs: FogCorridorEnv) -> None:

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -21,7 +22,7 @@ from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Estimate, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.fast import FAST_FOG, FAST_ROAD, FAST_SCENARIO
+from fogsim_envs.task.fast import _WITHOUT_FRAMES, FAST_FOG, FAST_ROAD, FAST_SCENARIO
 from fogsim_envs.task.observation import (
     STATE_FEATURES,
     first_valid_estimate,
@@ -35,6 +36,7 @@ from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
 FAST = "fogsim/FogAdvisoryFast-v1"
 NO_ADVICE = np.array([12, 0])
+ROAD = str(Path(__file__).resolve().parents[1] / "data" / "road")
 WAY = Way(length=2000.0, limit=36.0, duration=200.0)
 WEIGHTS = TaskWeights()
 
@@ -198,8 +200,44 @@ def test_episodes_differ_and_come_again(fast: gymnasium.Env[Any, Any]) -> None:
     again, same = fast.reset(seed=7)
     assert info["drawn"] == same["drawn"] != other["drawn"]
     np.testing.assert_array_equal(first, again)
-    told = fast.reset(seed=7, options={"episode": info["drawn"]})[0]
-    np.testing.assert_array_equal(first, told)
+    moved = fast.step(NO_ADVICE)[0]
+    for seed in (8, None):
+        repeated, drawn = fast.reset(seed=seed, options={"episode": info["drawn"]})
+        assert drawn["drawn"] == info["drawn"]
+        np.testing.assert_array_equal(first, repeated)
+        np.testing.assert_array_equal(moved, fast.step(NO_ADVICE)[0])
+
+
+def test_an_episode_without_a_seed_gets_another_run(fast: gymnasium.Env[Any, Any]) -> None:
+    drawn = fast.reset(seed=7)[1]["drawn"]
+    unseeded = {name: value for name, value in drawn.items() if name != "seed"}
+    again = fast.reset(seed=8, options={"episode": unseeded})[1]["drawn"]
+    assert again["settings"] == drawn["settings"]
+    assert again["seed"] != drawn["seed"]
+
+
+def test_a_repeated_episode_is_of_the_same_scenario() -> None:
+    scenarios = [load_scenario(MOTORWAY, [f"duration_s={10 + i}"]) for i in range(8)]
+    source, rng = EpisodeSource(None, scenarios, None, (), "train"), np.random.default_rng(0)
+    seed, drawn = source.draw(rng, EpisodeChoice())
+    for _ in range(3):
+        again, repeated = source.draw(rng, EpisodeChoice(episode=drawn.episode.as_info()))
+        assert (again, repeated.scenario) == (seed, drawn.scenario)
+
+
+def test_a_scenario_in_place_of_the_own_road_is_run_as_it_is(fast: gymnasium.Env[Any, Any]) -> None:
+    task = fast.unwrapped
+    assert isinstance(task, FogAdvisoryV1Env)
+    with_frames = EpisodeSource(None, None, None, (), "train")
+    for source, name, overrides in [(task._source, ROAD, _WITHOUT_FRAMES), (with_frames, "clear_day", ())]:
+        for visibility, more in [(None, ()), (60.0, ("fog.visibility_m=60.0",))]:
+            choice = EpisodeChoice(scenario=name, visibility=visibility)
+            _, drawn = source.draw(np.random.default_rng(0), choice)
+            assert drawn.scenario == load_scenario(name, [*overrides, *more])
+    assert fast.reset(seed=1, options={"scenario": ROAD})[1]["drawn"]["settings"] == []
+    given = EpisodeSource(None, None, FogDistribution(), (), "train")
+    settings = given.draw(np.random.default_rng(0), EpisodeChoice(scenario="clear_day"))[1].episode.settings
+    assert [one.partition("=")[0] for one in settings] == ["fog"]
 
 
 def test_what_the_caller_fixes(fast: gymnasium.Env[Any, Any]) -> None:

@@ -81,5 +81,5 @@ def test_corridors_pickle_and_their_infos_are_numbers() -> None:
     for agent, info in infos.items():
         assert tree(info) == tree(first[agent])
         assert {type(value) for value in info.values()} == {float}
-    assert set(env.drawn) == {"settings", "driver", "light", "script"}
+    assert set(env.drawn) == {"settings", "driver", "light", "script", "seed"}
     env.close()

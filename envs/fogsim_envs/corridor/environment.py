@@ -36,7 +36,7 @@ from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traff
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rewards import advice_standard
 from fogsim_envs.task.episodes import FogDistribution
-from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+from fogsim_envs.task.sampling import Defaults, EpisodeChoice, EpisodeSource
 
 
 class SignedRoad(NamedTuple):
@@ -149,9 +149,10 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
     ) -> None:
         checked_timeout(timeout)
         self._timeout, self._weights = timeout, reward_weights or CorridorWeights()
-        drawn = _default_scenarios() if scenario is None else None
-        fog = _CORRIDOR_FOG if scenario is None and fog_distribution is None else fog_distribution
-        self._source = EpisodeSource(scenario, drawn, fog, tuple(overrides), split)
+        own = _default_scenarios() if scenario is None else ()
+        self._source = EpisodeSource(
+            scenario, None, fog_distribution, tuple(overrides), split, own, Defaults(_CORRIDOR_FOG)
+        )
         self._road = signed_road(self._source.first_scenario())
         self.possible_agents = [f"sign_{number}" for number in range(len(self._road.starts))]
         self.agents: list[str] = []
@@ -161,7 +162,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self.state_space = spaces.Box(0.0, 1.0, (size,), np.float32)
         self.drawn: dict[str, Any] = {}
         """What was drawn for the episode; as option ``episode`` of `reset` it repeats it."""
-        self._rng = np.random.default_rng()
+        self._rng: np.random.Generator | None = None
         self._simulation: TrafficSimulation | None = None
         self._observed: dict[str, NDArray[np.float32]] = {}
 
@@ -212,7 +213,8 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         if "driver" in known:
             raise InputError("options['driver']: is the ego's, and the road has none; it is drivers.speed_choice here")
         choice = checked_options(EpisodeChoice, known)
-        rng = self._rng if seed is None else np.random.default_rng(seed)
+        # Drawn only here, so that unpickled copies differ.
+        rng = self._rng if seed is None and self._rng is not None else np.random.default_rng(seed)
         run_seed, drawn = self._source.draw(rng, choice)
         scenario = drawn.scenario
         self._road, self._rng = self._checked_road(scenario), rng

@@ -30,7 +30,14 @@ from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_o
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
-from fogsim_envs.task.sampling import MOTORWAY, MOTORWAY_2, AnyScenario, EpisodeChoice, EpisodeSource
+from fogsim_envs.task.sampling import (
+    MOTORWAY,
+    MOTORWAY_2,
+    MOTORWAY_DEFAULTS,
+    AnyScenario,
+    EpisodeChoice,
+    EpisodeSource,
+)
 
 
 class OwnDriver:
@@ -128,7 +135,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
-    _default_motorway = MOTORWAY
+    _default_motorway, _defaults = MOTORWAY, MOTORWAY_DEFAULTS
     _observed_estimate = staticmethod(leading_estimate)
 
     def __init__(
@@ -156,7 +163,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         every = (*size, *overrides)
         self._source = EpisodeSource(
-            scenario, scenario_distribution, fog_distribution, every, split, self._default_motorway
+            scenario, scenario_distribution, fog_distribution, every, split, self._default_motorway, self._defaults
         )
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._is_measured, self._measured = metrics, RunMetrics()
@@ -191,9 +198,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         seed : int
             Seed of this and the following episodes; None goes on with the numbers of before.
         options : dict or None
-            What of the episode is not to be drawn: ``visibility`` where the fog is densest [m], ``scenario``, further
-            ``overrides`` (list of ``key.path=value``), ``driver`` of the ego, or a whole ``episode`` as
-            in ``info["drawn"]``.
+            What of the episode is not to be drawn: ``visibility`` where the fog is densest [m], ``scenario`` (which is
+            run as it is, instead of the motorway), further ``overrides`` (list of ``key.path=value``), ``driver`` of
+            the ego, or a whole ``episode`` as in ``info["drawn"]``.
 
         Raises
         ------
@@ -358,11 +365,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
                 "visibility_ahead_m": step.truth.visibility_ahead,
             },
             "reward_terms": terms,
-            "drawn": self._episode.as_info(),
         }
         if self._is_measured:
             info["metrics"] = self._unmeasured.copy() if step.ending is None else self._metrics()
-        return flat_numbers(info) if self._is_flat else info
+        return flat_numbers(info) if self._is_flat else {**info, "drawn": self._episode.as_info()}
 
     def _metrics(self) -> dict[str, float]:
         """Metrics of the episode so far, NaN where one is undefined."""

@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from fogsim.core.parameters import Range, checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.traffic import SPEED_CHOICES
 
@@ -48,12 +49,15 @@ class Episode:
         "day", "dusk", "night", or "" where the scenario says it.
     script : str
         Name of what the vehicles about the ego do, or "".
+    seed : int or None
+        Seed of the run, which also chooses among several scenarios; None for one that is drawn at the reset.
     """
 
     settings: tuple[str, ...] = ()
     driver: str = "unaffected"
     light: str = ""
     script: str = ""
+    seed: Seed | None = None
 
     def __post_init__(self) -> None:
         """Refuse a driver that is not known."""
@@ -66,6 +70,7 @@ class Episode:
             "driver": self.driver,
             "light": self.light,
             "script": self.script,
+            "seed": self.seed,
         }
 
 

@@ -23,7 +23,7 @@ from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env, FogAdvisoryV2Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
-from fogsim_envs.task.sampling import is_own_motorway
+from fogsim_envs.task.sampling import Defaults
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, EstimatorSurrogate, SurrogateTable
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
@@ -61,6 +61,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
     _measured_errors = MEASURED
+    _defaults = Defaults(FAST_FOG, FAST_SCENARIO, FAST_ROAD)
 
     def __init__(
         self,
@@ -86,16 +87,15 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
                 "observation, image_size: expected 'state' and None, since no frame is drawn here, got "
                 f"{observation!r} and {image_size!r}; fogsim/FogAdvisory-v1 draws frames"
             )
-        is_own = is_own_motorway(scenario, scenario_distribution)
         table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,
-            scenario_distribution=FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
-            fog_distribution=FAST_FOG if is_own and fog_distribution is None else fog_distribution,
+            scenario_distribution=scenario_distribution,
+            fog_distribution=fog_distribution,
             split=split,
             observation="state",
-            overrides=(*(FAST_ROAD if is_own else ()), *_WITHOUT_FRAMES, *overrides),
+            overrides=(*_WITHOUT_FRAMES, *overrides),
             image_size=None,
             continuous=continuous,
             discrete=discrete,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -48,7 +48,7 @@ class EpisodeChoice:
         if not isinstance(self.episode, Mapping):
             return self.episode
         keys = {one.name for one in fields(Episode)}
-        if set(self.episode) != keys:
+        if {*self.episode, "seed"} != keys:
             raise InputError(
                 f"options['episode']: expected info['drawn'], with {sorted(keys)}, got {shown(self.episode)}"
             )
@@ -62,11 +62,15 @@ class Drawn(NamedTuple):
     scenario: Scenario
 
 
-def is_own_motorway(
-    scenario: AnyScenario | None, distribution: ScenarioDistribution | Sequence[AnyScenario] | None
-) -> bool:
-    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too by default."""
-    return scenario is None and (distribution is None or isinstance(distribution, ScenarioDistribution))
+class Defaults(NamedTuple):
+    """What applies on an environment's own road alone."""
+
+    fog: FogDistribution | None = None  # Unless another is given
+    scenes: ScenarioDistribution | None = None  # Unless another is given
+    overrides: tuple[str, ...] = ()  # ``key.path=value`` each, before those that are given
+
+
+MOTORWAY_DEFAULTS, _NO_DEFAULTS = Defaults(FogDistribution(), ScenarioDistribution()), Defaults()
 
 
 def numbered(rng: np.random.Generator, split: int) -> tuple[int, np.random.Generator]:
@@ -92,48 +96,55 @@ class EpisodeSource:
         fog: FogDistribution | None,
         overrides: tuple[str, ...],
         split: str,
-        motorway: Path = MOTORWAY,
+        motorway: Path | tuple[Scenario, ...] = MOTORWAY,
+        defaults: Defaults = MOTORWAY_DEFAULTS,
     ) -> None:
         self._split = split_number(split)
-        self._drawn = ScenarioDistribution() if scenario is None and distribution is None else distribution
-        self._fog = FogDistribution() if fog is None and is_own_motorway(scenario, distribution) else fog
-        self._overrides = overrides
-        if isinstance(self._drawn, ScenarioDistribution) or self._drawn is None:
-            self._scenarios: tuple[AnyScenario, ...] = (motorway if scenario is None else scenario,)
+        self._overrides, self._given_fog = overrides, fog
+        self._scenes = distribution if isinstance(distribution, ScenarioDistribution) else None
+        is_drawn = distribution is not None and self._scenes is None
+        self._is_own = scenario is None and not is_drawn
+        self._defaults = defaults if self._is_own else _NO_DEFAULTS
+        self._scenes = self._scenes or self._defaults.scenes
+        self._scenarios: tuple[AnyScenario, ...]
+        if not is_drawn:
+            own = motorway if isinstance(motorway, tuple) else (motorway,)
+            self._scenarios = own if scenario is None else (scenario,)
         elif scenario is not None:
             raise InputError("scenario and scenario_distribution: give one scenario or several to draw from, not both")
         else:
-            self._scenarios = _several(self._drawn)
+            self._scenarios = _several(distribution)
         self._kept: dict[tuple[str | Path, tuple[str, ...]], Scenario] = {}
 
     def first_scenario(self) -> Scenario:
         """A scenario of them, for what all have in common."""
-        return self._loaded(self._scenarios[0], self._overrides)
+        return self._loaded(self._scenarios[0], (*self._defaults.overrides, *self._overrides))
 
     @property
     def may_be_dark(self) -> bool:
         """Whether lamps may be lit where light is drawn."""
-        return isinstance(self._drawn, ScenarioDistribution) and self._drawn.darkest < DAY_ILLUMINANCE
+        return self._scenes is not None and self._scenes.darkest < DAY_ILLUMINANCE
 
     def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
-        """Draw an episode; as many random numbers are used whatever is fixed."""
+        """Draw an episode; as many random numbers are used whatever is fixed.
+
+        A scenario that takes the place of the environment's own road is run as it is, in fog only if that was given.
+        """
         seed, own = numbered(rng, self._split)
+        stated = choice.stated_episode
+        if stated is not None and stated.seed is not None:
+            seed, own = stated.seed, np.random.default_rng(stated.seed)
         named = self._scenarios[int(own.integers(len(self._scenarios)))]
-        episode = choice.stated_episode or self._episode(own, choice.visibility)
-        if choice.driver is not None:
-            episode = Episode(episode.settings, choice.driver, episode.light, episode.script)
-        settings = [*episode.settings, *self._overrides]
-        if choice.visibility is not None and (self._fog is None or choice.episode is not None):
+        is_replaced = self._is_own and choice.scenario is not None
+        defaults, scenes = (_NO_DEFAULTS, None) if is_replaced else (self._defaults, self._scenes)
+        fog = self._given_fog or defaults.fog
+        episode = stated or _drawn(own, scenes, fog, choice.visibility)
+        episode = replace(episode, seed=seed, driver=choice.driver or episode.driver)
+        settings = [*episode.settings, *defaults.overrides, *self._overrides]
+        if choice.visibility is not None and (fog is None or stated is not None):
             settings.append(f"fog.visibility_m={choice.visibility!r}")
         written = choice.scenario if choice.scenario is not None else named
         return seed, Drawn(episode, self._loaded(written, (*settings, *choice.overrides)))
-
-    def _episode(self, rng: np.random.Generator, visibility: float | None) -> Episode:
-        episode = self._drawn.draw(rng) if isinstance(self._drawn, ScenarioDistribution) else Episode()
-        if self._fog is None:
-            return episode
-        fog = fog_setting(self._fog.draw(rng, visibility))
-        return Episode((*episode.settings, fog), episode.driver, episode.light, episode.script)
 
     def _loaded(self, scenario: AnyScenario, settings: tuple[str, ...]) -> Scenario:
         if isinstance(scenario, Scenario):
@@ -147,6 +158,19 @@ class EpisodeSource:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[scenario, settings] = load_scenario(scenario, settings)
         return self._kept[scenario, settings]
+
+
+def _drawn(
+    rng: np.random.Generator,
+    scenes: ScenarioDistribution | None,
+    fog: FogDistribution | None,
+    visibility: float | None,
+) -> Episode:
+    """What is drawn of an episode, in fog of a given visibility where it is densest [m]."""
+    episode = Episode() if scenes is None else scenes.draw(rng)
+    if fog is None:
+        return episode
+    return replace(episode, settings=(*episode.settings, fog_setting(fog.draw(rng, visibility))))
 
 
 def _several(scenarios: object) -> tuple[AnyScenario, ...]:

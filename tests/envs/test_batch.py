@@ -68,6 +68,37 @@ def test_an_episode_that_is_over_is_followed_by_the_next() -> None:
             assert infos["time_s"][i] == 0.0
 
 
+def test_the_next_episode_begins_with_the_next_step_if_asked() -> None:
+    envs, same = gymnasium.wrappers.vector.NormalizeObservation(made(4, autoreset_mode="NextStep")), made(4)
+    episodes, advice = envs.unwrapped, np.tile([12, 0], (4, 1))
+    envs.reset(seed=0)
+    same.reset(seed=0)
+    over = np.zeros(4, bool)
+    while not over.any():
+        _, rewards, terminated, truncated, infos = envs.step(advice)
+        observations, expected, *_, others = same.step(advice)
+        over = terminated | truncated
+    assert np.array_equal(rewards, expected)
+    assert np.array_equal(infos["ending"], others["final_info"]["ending"])
+    assert "final_obs" not in infos
+    _, rewards, terminated, truncated, infos = envs.step(np.tile([0, 2], (4, 1)))
+    assert not rewards[over].any()
+    assert not (terminated | truncated)[over].any()
+    assert not infos["time_s"][over].any()
+    assert np.array_equal(episodes._episodes.state[over], observations[over])
+    with pytest.raises(InputError, match="SAME_STEP or NEXT_STEP"):
+        made(2, autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED)
+
+
+def test_seeds_are_taken_as_gymnasium_takes_them() -> None:
+    envs, other = made(3), made(3)
+    first, _ = envs.reset(seed=np.int64(3))
+    assert np.array_equal(first, other.reset(seed=3)[0])
+    again, _ = envs.reset(seed=[3, 4, None])
+    assert np.array_equal(again[:2], first[:2])
+    assert np.array_equal(again[2], other.reset()[0][2])
+
+
 def test_episodes_are_those_of_the_fast_task() -> None:
     fast = gymnasium.make(FAST)
     envs = made(6)

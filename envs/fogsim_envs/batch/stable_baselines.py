@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from fogsim.errors import InputError
 from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 
 
@@ -18,6 +20,8 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
     """
 
     def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:
+        if envs.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
+            raise InputError('autoreset_mode: BatchVecEnv expects "SameStep"')
         self.envs, self._repeat, self.multiplier = envs, repeat, 0.0
         self._earned, self._cost = np.zeros(envs.num_envs), np.zeros(envs.num_envs)
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)

@@ -1,12 +1,14 @@
 """The vector environment."""
 
 from collections.abc import Sequence
+from numbers import Integral
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -53,14 +55,15 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
     Spaces, reward, ``info`` and baselines are those of `FogAdvisoryFastEnv`, and episodes are drawn as there: the same
     seed gives the same fog, light, script and driver. Traffic is simpler than SUMO's: Krauss' drivers who see only
     through the fog, of whom the ego alone changes lanes; who leaves the road enters it again. An episode that is over
-    is followed by the next in the same step (`AutoresetMode.SAME_STEP`); ``infos["final_obs"]`` and
-    ``infos["final_info"]`` have its end.
+    is followed by the next in the same step (`AutoresetMode.SAME_STEP`), and ``infos["final_obs"]`` and
+    ``infos["final_info"]`` have its end; or in the next step, whose action is ignored there (`NEXT_STEP`).
 
     ### Arguments
     num_envs : how many episodes at once
     fog_distribution, scenario_distribution, split, continuous, discrete, reward_weights, surrogate : as in
         `FogAdvisoryFastEnv`
     rule : `RuleConstants` of the built-in adviser
+    autoreset_mode : `AutoresetMode` SAME_STEP or NEXT_STEP, or its value, "SameStep" or "NextStep"
 
     ### Version history
     * v1: first version
@@ -81,7 +84,12 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         reward_weights: TaskWeights | None = None,
         surrogate: str | Path | None = None,
         rule: RuleConstants | None = None,
+        autoreset_mode: AutoresetMode | Literal["SameStep", "NextStep"] = AutoresetMode.SAME_STEP,
     ) -> None:
+        mode = AutoresetMode(autoreset_mode)
+        if mode is AutoresetMode.DISABLED:
+            raise InputError("autoreset_mode: expected SAME_STEP or NEXT_STEP, got DISABLED")
+        self.metadata = {**self.metadata, "autoreset_mode": mode}
         if continuous and discrete:
             raise InputError("continuous and discrete: expected one of them at most")
         self.num_envs = num_envs
@@ -106,18 +114,21 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         if self._rule.quantile not in KNOWN_QUANTILES:
             raise InputError(f"rule.quantile: expected one of {KNOWN_QUANTILES}, got {self._rule.quantile!r}")
         self._episodes = Episodes.empty(num_envs)
+        self._generators: list[np.random.Generator] = []
+        self._over = np.empty(0, np.int64)
         self._has_begun = False
 
     @checked_parameters
     def reset(
-        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], Infos]:
         """Begin all episodes.
 
         Parameters
         ----------
-        seed : int, or sequence of int
-            Seed of each environment; a single one is that of the first, and the others have the following ones.
+        seed : int, or sequence of int or None
+            Seed of each environment; a single one is that of the first, and the others have the following ones. None
+            goes on with the numbers of before.
         options : None
             There are none.
 
@@ -128,13 +139,19 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         """
         if options:
             raise InputError(f"reset(): expected no options, got {sorted(options)}")
-        if seed is not None or not self._has_begun:
-            first = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else seed
-            seeds = range(first, first + self.num_envs) if isinstance(first, int) else first
-            if len(seeds) != self.num_envs:
-                raise InputError(f"seed: expected {self.num_envs} seeds, one for each environment, got {len(seeds)}")
-            self._generators = [gymnasium.utils.seeding.np_random(int(one))[0] for one in seeds]
-        self._has_begun = True
+        seeds: Sequence[int | None]
+        if isinstance(seed, Integral):
+            seeds = range(int(seed), int(seed) + self.num_envs)
+        else:
+            seeds = [None] * self.num_envs if seed is None else seed
+        if len(seeds) != self.num_envs:
+            raise InputError(f"seed: expected {self.num_envs} seeds, one for each environment, got {len(seeds)}")
+        before = self._generators
+        self._generators = [
+            before[i] if one is None and before else seeding.np_random(None if one is None else int(one))[0]
+            for i, one in enumerate(seeds)
+        ]
+        self._has_begun, self._over = True, np.empty(0, np.int64)
         self._begin(np.arange(self.num_envs))
         return self._episodes.state.copy(), self._infos()
 
@@ -165,11 +182,16 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         ego = self._episodes.ego
         ego["advised"], ego["lamps"] = self._commanded(checked_action(actions, self.action_space, type(self).__name__))
         advance(self._episodes, self._weights, self._table, self._rule)
+        if len(self._over):
+            self._begin(self._over)
         rewards, ending = self._episodes.terms.sum(axis=1), ego["ending"]
         truncated = ending == ENDINGS.index("time")
         terminated = (ending > 0) & ~truncated
         over = np.flatnonzero(ending)
-        if not len(over):
+        is_next_step = self.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+        if is_next_step:
+            self._over = over
+        if is_next_step or not len(over):
             return self._episodes.state.copy(), rewards, terminated, truncated, self._infos()
         final = {"final_obs": self._episodes.state.copy(), "final_info": self._infos()}
         self._begin(over)

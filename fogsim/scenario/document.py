@@ -18,9 +18,10 @@ _TAKES_THE_PLACE_OF = {
     ("fog", "banks"): ("visibility_m",),
     ("traffic", "config"): ("net", "routes", "additional"),
     ("traffic", "net"): ("config",),
+    ("camera", "field_of_view_deg"): ("focal_length_px",),
 }
-"""Setting the key on the left removes the keys that exclude it: ``--set fog.visibility_m=80`` makes any fog
-homogeneous."""
+"""Setting the key on the left, in any unit, removes the keys that exclude it: ``--set fog.visibility_m=80`` makes any
+fog homogeneous."""
 
 _FOREIGN, _TIMELINE = "scenario", "timeline"
 
@@ -66,9 +67,20 @@ def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str,
         _set(result, path, value, text)
         parent = result.get(path[0])
         if isinstance(parent, dict):
-            for sibling in _TAKES_THE_PLACE_OF.get((path[0], path[1] if len(path) > 1 else ""), ()):
-                parent.pop(sibling, None)
+            for other in _displaced(path[0], path[1] if len(path) > 1 else "", parent):
+                del parent[other]
     return result
+
+
+def _displaced(block: str, key: str, parent: Mapping[Any, Any]) -> list[Any]:
+    """Keys of a block that setting one of them removes."""
+    siblings = [
+        sibling
+        for (where, name), siblings in _TAKES_THE_PLACE_OF.items()
+        if where == block and (name == key or same_quantity(name, key))
+        for sibling in siblings
+    ]
+    return [other for other in parent if any(other == one or same_quantity(str(other), one) for one in siblings)]
 
 
 def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) -> None:

@@ -27,6 +27,14 @@ from fogsim.values import Display
 
 _ROUNDING = 1e-6
 
+_GOES_WITH = {
+    "advised_stretch": "stretch",
+    "signs": "signs",
+    "equipped_share": "equipped",
+    "harmonisation": "signs, equipped or law",
+}
+"""Keys that mean nothing without a value of `advised`."""
+
 _NEAREST_SIGNS = 10.0
 """Smallest distance between two message signs [m]."""
 
@@ -240,8 +248,8 @@ class DriversSection(Section):
         return {**written, "compliance_by_display": own}
 
     @model_validator(mode="after")
-    def _stretch_is_advised(self) -> Self:
-        # Who says whom the advice goes to may leave the stretch of another choice there.
-        if "advised_stretch" in self.model_fields_set and "advised" not in self.model_fields_set:
-            raise ValueError("advised_stretch goes with advised: stretch, which is missing")
+    def _receivers_are_given(self) -> Self:
+        # With `advised`, keys of another choice may stay.
+        for key in sorted(self.model_fields_set & _GOES_WITH.keys()) if "advised" not in self.model_fields_set else ():
+            raise ValueError(f"{key} goes with advised: {_GOES_WITH[key]}, which is missing")
         return self

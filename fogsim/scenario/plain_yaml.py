@@ -98,6 +98,10 @@ def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
     except ReaderError as error:
         line = 1 + text[: error.position].count("\n")
         raise PlainYamlError(f"the character {shown(text[error.position])} is not allowed", line) from error
+    except (ValueError, OverflowError) as error:
+        # PyYAML's own conversions.
+        message = "a \\U escape is no character, or the version of %YAML is too long"
+        raise PlainYamlError(message, loader.line + 1) from error
 
 
 class _Walk:

@@ -1,5 +1,7 @@
 """Creating a scenario of your own from an existing one."""
 
+import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -8,10 +10,15 @@ from fogsim.core.files.atomic import write_json, write_text
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.registry.user_code import import_nothing
 from fogsim.errors import InputError, shown
+from fogsim.openscenario import is_openscenario
+from fogsim.scenario.document import read_document
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
+from fogsim.traffic.road.configuration import input_files
 
 _NAME_KEY = re.compile(r"^name:.*$", re.MULTILINE)
+
+_FOREIGN_KEY = re.compile(r"^scenario:.*$", re.MULTILINE)
 
 _HEAD = """\
 # yaml-language-server: $schema=fogsim.schema.json
@@ -28,6 +35,8 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,100}", name) or set(name) == {"."}:
         raise InputError(f"a scenario's name has letters, digits, '_', '.' and '-', up to 100; got {shown(name)}")
     refuse_unwritable_folder(parent, "--in")
+    if is_openscenario(scenario_file(source)):
+        raise InputError(f"--from {source}: expected a YAML scenario; begin one with the line scenario: FILE.xosc")
     old, text = load_scenario(source, may_import=import_nothing), scenario_file(source).read_text(encoding="utf-8")
     folder = parent / name
     if folder.exists():
@@ -35,8 +44,13 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     traffic = old.traffic
     beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
+    if traffic.config is not None and traffic.config not in outside:
+        beside += _configured_files(old.directory, traffic.config)
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
+    foreign = read_document(scenario_file(source)).data.get("scenario")
+    if foreign is not None:
+        text = _FOREIGN_KEY.sub(lambda _: f"scenario: {json.dumps(str((old.directory / foreign).resolve()))}", text)
     head = _HEAD.format(source=source, folder=folder, schema=_SCHEMA_FILE)
     made = [folder / SCENARIO_FILE]
     folder.mkdir(parents=True)
@@ -52,3 +66,15 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     return (*made, folder / _SCHEMA_FILE)
+
+
+def _configured_files(directory: Path, config: Path) -> list[Path]:
+    """Files that a SUMO configuration names, as seen from the scenario's folder."""
+    named = [Path(os.path.relpath(path, directory)) for path in input_files(directory / config)]
+    for path in named:
+        if ".." in path.parts or not (directory / path).is_file():
+            raise InputError(
+                f"{directory / config}: {shown(str(path))} is no file in the scenario's folder; copy it there, and "
+                "name it by its place there"
+            )
+    return named

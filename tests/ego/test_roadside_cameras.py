@@ -8,7 +8,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
-from fogsim.scenario import build
+from fogsim.scenario import build, override
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras, as_log_normal, over_road
 from fogsim.units import extinction_from_visibility
@@ -129,6 +129,11 @@ def test_a_section_goes_by_the_last_report_of_a_sensor_wherever_that_was_seen() 
     for one in (report, dataclasses.replace(report, number=1, place=120.0, extinction=0.001)):
         meters.hear([one])
     assert {section.reported for section in meters.measure(fog)} == {0.001}
+
+
+def test_a_scenario_with_a_roadside_camera_takes_overrides() -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [CAMERAS])
+    assert override(scenario, ["duration_s=10"]).duration_s == 10.0
 
 
 def test_what_cannot_be_is_refused() -> None:

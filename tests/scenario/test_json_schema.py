@@ -1,17 +1,20 @@
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
 
 from fogsim import InputError, catalogue, load_scenario
+from fogsim.errors import LeftOutWarning
 from fogsim.scenario.json_schema import json_schema, scenario_json_schema
 from fogsim.scenario.plain_yaml import parse_yaml
 from fogsim.scenario.starting import begin_scenario
 from fogsim.study.plan import StudyFile
 
 ROOT = Path(__file__).parents[2]
+GRID = ROOT / "tests" / "data" / "grid"
 STUDIES = sorted((ROOT / "scenarios" / "studies").glob("*.yaml"))
 
 
@@ -108,3 +111,34 @@ def test_files_that_lie_elsewhere_are_named_by_their_place(tmp_path):
     second = load_scenario(tmp_path / "second")
     assert second.traffic.routes == (tmp_path / "first" / "motorway.rou.xml",)
     assert (tmp_path / "second" / "first" / "motorway.net.xml").is_file()
+
+
+def test_files_of_a_configuration_are_copied_or_refused(tmp_path):
+    old = tmp_path / "old"
+    old.mkdir()
+    for file in GRID.glob("grid.*"):
+        shutil.copy(file, old)
+    text = "name: old\nduration_s: 5\ntraffic: {config: grid.sumocfg, ego: veh5}\nfog: {visibility_m: 100}\n"
+    (old / "scenario.yaml").write_text(text)
+    begin_scenario("new", str(old), tmp_path)
+    assert load_scenario(tmp_path / "new").traffic.config is not None
+    moved = (old / "grid.sumocfg").read_text().replace("grid.net.xml", "../grid.net.xml")
+    (old / "grid.sumocfg").write_text(moved)
+    shutil.move(old / "grid.net.xml", tmp_path)
+    with pytest.raises(InputError, match=r"'\.\./grid\.net\.xml' is no file in the scenario's folder"):
+        begin_scenario("third", str(old), tmp_path)
+    assert not (tmp_path / "third").exists()
+
+
+def test_a_scenario_of_openscenario_is_not_copied_as_yaml(tmp_path):
+    file = ROOT / "tests" / "data" / "openscenario" / "slow_lead.xosc"
+    with pytest.raises(InputError, match=r"expected a YAML scenario; begin one with the line scenario: FILE\.xosc"):
+        begin_scenario("mine", str(file), tmp_path)
+    (tmp_path / "on_top").mkdir()
+    shutil.copy(file, tmp_path / "on_top")
+    shutil.copy(file.with_name("two_lanes.xodr"), tmp_path / "on_top")
+    shutil.copytree(file.with_name("catalogs"), tmp_path / "on_top" / "catalogs")
+    (tmp_path / "on_top" / "scenario.yaml").write_text("scenario: slow_lead.xosc\nname: a\nfog: {visibility_m: 100}\n")
+    with pytest.warns(LeftOutWarning):
+        begin_scenario("mine", str(tmp_path / "on_top"), tmp_path)
+    assert f'scenario: "{tmp_path}/on_top/slow_lead.xosc"' in (tmp_path / "mine" / "scenario.yaml").read_text()

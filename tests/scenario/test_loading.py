@@ -167,6 +167,14 @@ def test_homogeneous_fog_takes_the_place_of_banks() -> None:
     back = override(scenario, ["fog.outside_visibility_m=inf"])
     assert back.fog.visibility_m is None
     assert back.fog.outside_visibility_m == math.inf
+    for name in ("tunnel_exit_into_fog", "motorway_fog_bank"):
+        for setting in ("fog.visibility_m=80", "fog.visibility=80 m"):
+            assert load_scenario(name, [setting]).fog.visibility_m == 80.0
+
+
+def test_a_field_of_view_takes_the_place_of_a_focal_length() -> None:
+    scenario = load_scenario("motorway_fog_bank", ["camera.focal_length_px=900", "camera.field_of_view_deg=20"])
+    assert scenario.camera.focal_length_px is None
 
 
 def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
@@ -199,6 +207,9 @@ def test_a_resolved_scenario_loads_again(folder: Path) -> None:
 def test_advised_stretches_that_do_not_fit() -> None:
     for settings, message in [
         (["drivers.advised_stretch.display=in_car"], "advised_stretch goes with advised: stretch, which is missing"),
+        (["drivers.signs.spacing_m=200"], "signs goes with advised: signs, which is missing"),
+        (["drivers.equipped_share=0.3"], "equipped_share goes with advised: equipped, which is missing"),
+        (["drivers.harmonisation={}"], "harmonisation goes with advised: signs, equipped or law, which is missing"),
         (
             ["drivers.advised=stretch", "drivers.advised_stretch={start_m: 9, end_m: 9}"],
             "start_m must be less than end",

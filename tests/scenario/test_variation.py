@@ -67,6 +67,11 @@ def test_draws_are_of_their_distribution_and_the_same_across_the_grid() -> None:
     assert max(float(case.values["x"]) for case in skewed) <= 200
 
 
+def test_draws_that_no_number_holds_are_drawn_again() -> None:
+    for case in varied({"x": {"lognormal": ["300 m", 1000]}, "run": "50 seeds"}).cases:
+        assert "inf" not in str(case)
+
+
 def test_names_give_way_to_values() -> None:
     data = {
         "a": "$x",
@@ -118,6 +123,7 @@ def test_mistakes_are_told() -> None:
         ({"x": {"from": "1 m", "to": "2 s", "step": "1 m"}}, "same unit, got m and s"),
         ({"x": {"from": "near", "to": 2, "step": 1}}, "vary.x.from: expected a number"),
         ({"x": {"from": 0, "to": 1, "step": 1e-9}}, "vary.x.step: 1000000000 values are more than 100000"),
+        ({"x": {"from": -1e308, "to": 1e308, "step": 1}}, "vary.x.step: more than 100000 values"),
         ({"x": {"uniform": [2, 1]}, "run": "2 seeds"}, "vary.x.uniform: expected its lower and upper end"),
         ({"x": {"uniform": [1]}, "run": "2 seeds"}, "vary.x.uniform: expected two values"),
         (

@@ -97,7 +97,9 @@ class RoadsideReports(MeasuredReports):
 
     @model_validator(mode="after")
     def _measured_or_seen(self) -> Self:
-        written = [key for key in ("deviation", "wrong") if key in self.model_fields_set]
+        # A resolved scenario has the defaults of both.
+        fields = type(self).model_fields
+        written = [key for key in ("deviation", "wrong") if getattr(self, key) != fields[key].default]
         if self.camera is not None and written:
             raise ValueError(
                 f"{' and '.join(written)} is of sensors that measure with noise, and camera replaces them: its errors "

@@ -26,6 +26,7 @@ _DISTRIBUTIONS = {
 _LIMITS = ("at_least", "at_most")
 _EXPECTED = "expected a list, {from, to, step}, 20 seeds, or {uniform: [low, high]}"
 _MOST_DRAWS = 10_000
+_LARGEST_EXPONENT = 709.0  # of a floating-point number
 
 Value = str | float | int | bool
 """Value of a name in one case."""
@@ -101,7 +102,7 @@ class Draws:
         low, high = self.limits
         for _ in range(_MOST_DRAWS):
             drawn = self._shaped(float(generator.random()), float(generator.standard_normal()))
-            if low <= drawn <= high:
+            if math.isfinite(drawn) and low <= drawn <= high:
                 return number_with_unit(drawn, self.unit)
         raise LevelsError(f"none of {_MOST_DRAWS} draws of {self.name} lies between its limits, {low:g} and {high:g}")
 
@@ -111,7 +112,9 @@ class Draws:
             return first + (second - first) * uniform
         if self.distribution == "loguniform":
             return float(first * (second / first) ** uniform)
-        return first + second * normal if self.distribution == "normal" else first * math.exp(second * normal)
+        if self.distribution == "normal":
+            return first + second * normal
+        return first * math.exp(second * normal) if second * normal < _LARGEST_EXPONENT else math.inf
 
     @property
     def is_logarithmic(self) -> bool:
@@ -242,6 +245,8 @@ def _range(written: dict[str, object]) -> Levels:
     (first, last, step), unit = _numbers({key: written[key] for key in _RANGE})
     if step == 0 or (last - first) / step < 0:
         raise LevelsError(f"a step of {shown(written['step'])} does not lead there", "step")
+    if not math.isfinite((last - first) / step):
+        raise LevelsError(f"more than {_MOST_VALUES} values", "step")
     number = math.floor((last - first) / step + 1e-9) + 1
     if number > _MOST_VALUES:
         raise LevelsError(f"{number} values are more than {_MOST_VALUES}", "step")

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fogsim.errors import printable
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.results import ENDLESS, metres, span_text
 from fogsim.values.estimate import Estimate, fog_category
@@ -68,9 +69,9 @@ class Clip:
         panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
         for axes, (method, readings) in zip(panels, self._readings.items(), strict=True):
             _draw(axes, readings)
-            axes.set_title(method, loc="left", fontsize="medium")
+            axes.set_title(printable(method), loc="left", fontsize="medium", parse_math=False)
         panels[-1].set_xlabel("time [s]")
-        figure.suptitle(title, fontsize="large")
+        figure.suptitle(printable(title), fontsize="large", parse_math=False)
         return figure
 
 

@@ -160,7 +160,7 @@ def estimates_of(
             sightings = None if watch is None else watch.sightings(picture.time)
             estimates = bench.estimates(picture.image, picture.time, sightings or ())
         except InputError as error:
-            message = f"{_place(source, picture)}: {error}"
+            message = f"{place_of(source, picture)}: {error}"
             if not fitted:
                 raise InputError(message) from error
             yield FrameEstimates(replace(picture, image=None, error=message), ())
@@ -172,7 +172,8 @@ def estimates_of(
         raise InputError(f"none of the {count} images can be read" if count > 1 else "the only image cannot be read")
 
 
-def _place(source: Source, picture: Picture) -> str:
+def place_of(source: Source, picture: Picture) -> str:
+    """Path of an image, or of its video with the number of the frame."""
     return picture.name if isinstance(picture.name, str) else f"{source.paths[0]}, frame {picture.name}"
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from fogsim.errors import InputError
 from fogsim.offline.calibration_deviations import CalibrationDeviations
 from fogsim.offline.drive.road_scale import RoadMotion
-from fogsim.offline.image_files import Pixels
+from fogsim.offline.image_files import IMAGE_FAULTS, Pixels
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Response
 from fogsim.vision.lines.segments import RoadSegments, road_segments
@@ -243,7 +243,7 @@ def _stated_focal_length(path: Path) -> float | None:
     try:
         with Image.open(path) as image:
             value = image.getexif().get_ifd(_EXIF_IFD).get(_EXIF_FOCAL_LENGTH_35MM)
-    except (OSError, UnidentifiedImageError, ValueError, SyntaxError):
+    except IMAGE_FAULTS:
         # No image for Pillow, such as a video, and so without metadata.
         return None
     return float(value) if isinstance(value, int | float) and value > 0 else None

@@ -2,6 +2,8 @@
 
 import io
 import math
+import struct
+import tokenize
 import warnings
 import zipfile
 from collections.abc import Iterable
@@ -35,6 +37,12 @@ _TOP_TO_BOTTOM, _LEFT_TO_RIGHT = (3, 4, 7, 8), (2, 3, 6, 7)
 
 _MOST_BYTES = 2**31
 """Largest file of an image or a depth map [bytes]."""
+
+IMAGE_FAULTS = (
+    *(OSError, SyntaxError, ValueError, EOFError, TypeError, LookupError, ArithmeticError, struct.error),
+    Image.DecompressionBombError,
+)
+"""What Pillow raises for damaged files."""
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -88,7 +96,7 @@ def _checked(path: Path, data: bytes) -> int:
         return 1
     except Image.DecompressionBombError as error:
         raise InputError(f"{path}: by its header the image is larger than any camera's: {error}") from error
-    except (OSError, SyntaxError, ValueError, EOFError, MemoryError) as error:
+    except (*IMAGE_FAULTS, MemoryError) as error:
         raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
     if parts > 1 and image.format in _PARTS:
         raise InputError(f"{path}: expected one image, got {parts} {_PARTS[image.format]}")
@@ -130,7 +138,7 @@ def _numbers(path: Path) -> NDArray[np.float64]:
         loaded = np.load(io.BytesIO(read_bytes(path, _MOST_BYTES)), allow_pickle=False)
     except InputError:
         raise
-    except (ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+    except (ValueError, EOFError, MemoryError, SyntaxError, zipfile.BadZipFile, tokenize.TokenError) as error:
         reason = (str(error) or "too little memory").splitlines()[0]
         raise InputError(f"{path}: cannot be read as an array of numbers: {reason}") from error
     if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in "fiu":

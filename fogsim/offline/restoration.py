@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.errors import InputError
-from fogsim.offline.estimation import estimates_of
+from fogsim.offline.estimation import estimates_of, place_of
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source
 from fogsim.offline.video_source import VideoWriter, refuse_unfit_video
@@ -72,9 +72,11 @@ class Restored:
 def _restored_images(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[Restored]:
     """Restore the images of a source in turn.
 
-    `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept.
+    `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept. An image that
+    does not fit the camera is not restored; if it is the first, the calibration is of another camera.
     """
     last: Estimate | None = None
+    fitted = False
     for picture, estimate in _estimated(source, camera, wish):
         if picture.image is None:
             yield Restored(picture, None, reason=picture.error)
@@ -86,7 +88,14 @@ def _restored_images(source: Source, camera: Camera, wish: RestorationWish) -> I
             if last is None or not last.valid:
                 yield Restored(picture, None, reason=f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}")
                 continue
-        yield _restored(picture, picture.image, camera, wish, last, held)
+        try:
+            done = _restored(picture, picture.image, camera, wish, last, held)
+        except InputError as error:
+            if not fitted:
+                raise InputError(f"{place_of(source, picture)}: {error}") from error
+            done = Restored(picture, None, reason=str(error))
+        fitted = True
+        yield done
 
 
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
@@ -105,18 +114,15 @@ def _restored(
     extinction = None if estimate is None else estimate.extinction
     if wish.visibility is not None:
         extinction = extinction_from_visibility(wish.visibility)
-    try:
-        done = restore_contrast(
-            image,
-            camera,
-            extinction,
-            _airlight(image, camera, wish, estimate),
-            method=wish.method,
-            most_gain=wish.most_gain,
-            tone_map=wish.tone_map,
-        ).image
-    except InputError as error:
-        raise InputError(f"{picture.name}: {error}") from error
+    done = restore_contrast(
+        image,
+        camera,
+        extinction,
+        _airlight(image, camera, wish, estimate),
+        method=wish.method,
+        most_gain=wish.most_gain,
+        tone_map=wish.tone_map,
+    ).image
     shown = np.concatenate([image, done], axis=1) if wish.beside else done
     return Restored(picture, shown, extinction, held=held)
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageSequence
 
 from fogsim.errors import InputError
-from fogsim.offline.image_files import ANIMATED_FORMATS, Pixels, read_image
+from fogsim.offline.image_files import ANIMATED_FORMATS, IMAGE_FAULTS, Pixels, read_image
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ class Animation:
                 for frame in ImageSequence.Iterator(image):
                     frame.load()
                     times.append(times[-1] + 1e-3 * (frame.info.get("duration", 0) or _USUAL_FRAME_MS))
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        except IMAGE_FAULTS:
             return None  # `read_image` says why
         return cls(path, temporal, tuple(times[:-1]))
 
@@ -170,7 +170,7 @@ class Animation:
                 try:
                     image.seek(index)
                     yield Picture(index, time, np.array(image.convert("RGB")))
-                except (OSError, SyntaxError, ValueError, EOFError) as error:
+                except IMAGE_FAULTS as error:
                     yield Picture(index, time, None, f"{self.path}: the animation is damaged or cut off: {error}")
                     return
 

@@ -131,6 +131,18 @@ def test_mistakes_end_in_one_line_and_exit_code_2(
 
 def test_an_image_of_another_size_is_refused(folder: Path, command: Command) -> None:
     cv2.imwrite(str(folder / "small.png"), np.zeros((24, 32, 3), np.uint8))
+    (folder / "fog2.png").write_bytes((folder / "fog.png").read_bytes())
     done = command("restore", "small.png", *FOG, "--out", "out.png", cwd=folder)
     assert done.returncode == 2
     assert "small.png: the image has 32 × 24 pixels, the camera 320 × 240" in done.stderr
+    done = command("restore", "fog.png", "small.png", "fog2.png", *FOG, "--out", "clear", cwd=folder)
+    assert done.returncode == 2
+    assert "  small.png: the image has 32 × 24 pixels" in done.stderr
+    assert sorted(path.name for path in (folder / "clear").iterdir()) == ["fog.png", "fog2.png"]
+
+
+def test_a_video_of_another_size_is_named(folder: Path, foggy: np.ndarray, command: Command) -> None:
+    put_video(folder / "drive.mp4", [foggy])
+    (folder / "camera.yaml").write_text(CAMERA.replace("width: 320", "width: 322"), encoding="utf-8")
+    done = command("restore", "drive.mp4", *FOG, "--out", "clear.mp4", cwd=folder)
+    assert "drive.mp4, frame 0: the image has 320 × 240 pixels" in done.stderr

@@ -136,6 +136,7 @@ DEPTHS: dict[str, bytes] = {
     "shape": saved(np.ones((COLS, ROWS))),
     "number": saved(np.float64(3.0)),
     "cut": saved(np.ones((ROWS, COLS)))[:-100],
+    "bracket": saved(np.ones((ROWS, COLS))).replace(b"80)", b"80,"),
     "archive": b"PK\x03\x04 and no more",
     "endless": saved(np.ones((2, 2))).replace(b"(2, 2)", b"(2**60,)"),
     "negative": saved(np.full((ROWS, COLS), -1.0)),
@@ -187,8 +188,20 @@ READABLE: dict[str, bytes] = {
     "colours.webp": encoded(COLOURS, "WEBP"),
 }
 BOMB = b"BM" + struct.pack("<IHHIIiiHHIIiiII", 54, 0, 0, 54, 40, 40_000, 40_000, 1, 24, 0, 0, 0, 0, 0, 0)
+TWO_FRAMES = encoded(COLOURS, "GIF", save_all=True, append_images=[COLOURS.rotate(180)])
+
+
+def with_an_empty_page(tiff: bytes) -> bytes:
+    """The number that follows the entries of a page is where the next one begins."""
+    (page,) = struct.unpack_from("<I", tiff, 4)
+    end = page + 2 + 12 * int.from_bytes(tiff[page : page + 2], "little")
+    return tiff[:end] + struct.pack("<I", len(tiff)) + tiff[end + 4 :] + bytes(6)
+
+
 UNREADABLE: dict[str, bytes] = {name: data for name, data in BROKEN.items() if name != "float.tif"} | {
     "cut.webp": READABLE["colours.webp"][:-1000],
+    "pages.tif": with_an_empty_page(encoded(COLOURS, "TIFF")),
+    "moving.gif": TWO_FRAMES[: TWO_FRAMES.rindex(struct.pack("<BHHHH", 0x2C, 0, 0, COLS, ROWS)) + 10],
     "cut.gif": encoded(COLOURS, "GIF")[:900],
     "whole.tif": encoded(Image.fromarray(np.zeros((ROWS, COLS), np.int32)), "TIFF"),
     "none.exr": b"v/1\x01" + bytes(100),

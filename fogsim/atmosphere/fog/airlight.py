@@ -64,8 +64,10 @@ def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] |
     heights, equivalent, column = _equivalent_heights(field, float(grid.eye[2]))
     reach = np.minimum(grid.distances, grid.distances[-2])
     z = grid.eye[2] + grid.directions[..., 2:] * reach
-    overhead = grid.extinction * np.interp(z, heights, equivalent)
     at_ground = field.extinction * np.interp(field.ground, heights, column)
+    # Nodes below the base stand for the fog that begins there, over which lies as much as over the ground.
+    is_below = z < field.base - 0.5 * field.base_edge
+    overhead = np.where(is_below, at_ground, grid.extinction * np.interp(z, heights, equivalent))
     excess = (1.0 + shading * at_ground) / (1.0 + shading * overhead) - 1.0
     transmittance = np.exp(-grid.depth)
     lost = transmittance[..., :-1] - transmittance[..., 1:]

@@ -18,7 +18,7 @@ HEARTBEAT_PERIOD = 1.0
 
 
 def serve(connection: "Connection[Any, Any]") -> None:
-    """Answer requests, each a verb and its argument, with ``("done", result or error)``.
+    """Answer requests, each a verb and its argument, with ``("done", result or error)``, up to "close".
 
     While one is worked on, which takes minutes where kernels are to be compiled, ``("working", None)`` is sent every
     `HEARTBEAT_PERIOD`.
@@ -28,6 +28,8 @@ def serve(connection: "Connection[Any, Any]") -> None:
     try:
         while True:
             verb, argument = connection.recv()
+            if verb == "close":
+                return
             try:
                 with _heartbeat(connection):
                     if verb == "open":

@@ -4,6 +4,7 @@ libsumo holds one simulation in a process, but scripts hold several environments
 say. The first environment runs its simulation here; a further one runs it in a child process, and no one notices.
 """
 
+import contextlib
 import math
 import os
 import subprocess
@@ -191,6 +192,9 @@ class _Host:
 
     def close(self) -> None:
         """End the child process; closing twice is allowed."""
+        # A process that was forked since then keeps the pipe open, so the child does not see it end.
+        with contextlib.suppress(OSError):
+            self._connection.send(("close", None))
         self._connection.close()
         try:
             self._child.wait(_CLOSE_TIMEOUT)

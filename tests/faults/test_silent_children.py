@@ -63,6 +63,14 @@ def test_a_child_imports_nothing_from_the_working_directory(tmp_path: Path, monk
     HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"])).close()
 
 
+def test_a_forked_process_does_not_keep_a_child_alive() -> None:
+    loop = HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"]))
+    inherited = os.dup(loop._connection.fileno())
+    loop.close()
+    os.close(inherited)
+    assert loop._child.returncode == 0
+
+
 class _Pipe:
     """Asks for one thing, and keeps what is said."""
 

@@ -1,7 +1,6 @@
 """The vector environment."""
 
 from collections.abc import Sequence
-from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -140,7 +139,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         if options:
             raise InputError(f"reset(): expected no options, got {sorted(options)}")
         seeds: Sequence[int | None]
-        if isinstance(seed, Integral):
+        if isinstance(seed, int | np.integer):
             seeds = range(int(seed), int(seed) + self.num_envs)
         else:
             seeds = [None] * self.num_envs if seed is None else seed

@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fogsim.study.plan import Study
@@ -135,6 +136,8 @@ def svg_of(figure: Figure, name: str) -> str:
     """A figure as SVG; the same study gives the same bytes, since ids of elements derive from `name`."""
     text = io.StringIO()
     FigureCanvasSVG(figure)
+    for label in figure.findobj(Text):
+        label.set_parse_math(False)  # a user's name can have dollar signs
     with mpl.rc_context({"svg.hashsalt": name}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()

@@ -9,8 +9,10 @@ import cv2
 import pytest
 from early_motorway import ROUTES
 from made_up_cases import finding
+from matplotlib.figure import Figure
 
 from fogsim.scenario import Scenario, load_scenario
+from fogsim.study.drawing import svg_of
 from fogsim.testing import artefacts
 from fogsim.testing.artefacts import AFTER, BEFORE, KeepFailures
 from fogsim.testing.results import finding_from_json
@@ -31,6 +33,12 @@ def scenario(tmp_path: Path) -> Scenario:
     traffic = f"traffic: {{net: {net}, routes: [{ROUTES}], ego: ego}}"
     file.write_text(f"name: a\n{traffic}\nfog: {{visibility: 80 m}}\n{EXPECTED}")
     return load_scenario(file)
+
+
+def test_a_name_is_drawn_as_it_is() -> None:
+    figure = Figure()
+    figure.subplots().set_ylabel("agent $^$")
+    assert "agent $^$" in svg_of(figure, "a")
 
 
 def test_a_failure_has_a_plot_and_a_video_around_it(

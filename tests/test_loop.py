@@ -13,11 +13,24 @@ from early_motorway import EARLY, ROUTES
 
 import fogsim
 from fogsim.errors import SimulationError
-from fogsim.scenario import Scenario, build
+from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
 from fogsim.traffic.sumo_traffic import SumoTraffic
-from fogsim.values import Command, Display, Ending, FogChange, FogField, Lamp, SpeedAdvice, Step, Stretch, StretchAdvice
+from fogsim.values import (
+    Command,
+    Display,
+    Ending,
+    FogBank,
+    FogChange,
+    FogField,
+    Lamp,
+    SpeedAdvice,
+    Step,
+    Stretch,
+    StretchAdvice,
+)
+from tests.helpers.attached import GRID
 from tests.helpers.command import run_python
 
 SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=4")
@@ -165,6 +178,34 @@ def test_a_restarted_loop_replays_a_fresh_one() -> None:
     with fogsim.ClosedLoop(small()) as loop:
         first = drive(loop)
         assert drive(loop) == first
+
+
+def test_a_restarted_loop_lays_road_and_fog_along_the_egos_new_route(tmp_path: Path) -> None:
+    (tmp_path / "demand.rou.xml").write_text(
+        """<routes><routeDistribution id="ways">
+        <route id="west" edges="B0A0" probability="0.5"/><route id="east" edges="A0B0" probability="0.5"/>
+        </routeDistribution><vehicle id="ego" depart="0" route="ways"/></routes>""",
+        encoding="utf-8",
+    )
+    (tmp_path / "own.sumocfg").write_text(
+        f'<configuration><net-file value="{GRID / "grid.net.xml"}"/><route-files value="demand.rou.xml"/></configuration>',
+        encoding="utf-8",
+    )
+    fog = ("fog.outside_visibility_m=1000", "fog.banks=[{start_m: 5, end_m: 40, edge_m: 5, visibility_m: 50}]")
+    scenario = scenario_from_config(tmp_path / "own.sumocfg", "ego", ["renderer=none", "estimators=[]", *fog])
+
+    def began(loop: ClosedLoop, seed: int) -> tuple[list[float], tuple[FogBank, ...]]:
+        route, fog = loop.start(seed).truth.route, loop._fog
+        assert route is not None
+        assert fog is not None
+        return route[0].tolist(), fog.banks
+
+    with ClosedLoop(scenario) as loop:
+        again = [began(loop, seed) for seed in range(4)]
+    assert len({tuple(start) for start, _ in again}) == 2
+    for seed, found in enumerate(again):
+        with ClosedLoop(scenario) as loop:
+            assert found == began(loop, seed), seed
 
 
 def test_a_run_that_is_over_does_not_go_on() -> None:

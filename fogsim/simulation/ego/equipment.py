@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from fogsim.atmosphere import field_at, with_change
 from fogsim.camera import CAR, BodyPitch, knocked, mounted_pose
 from fogsim.core.randomness import Streams
@@ -110,7 +112,7 @@ class EgoEquipment:
         streams : Streams
             Random numbers of this run.
         network : callable
-            Gives roads and signs; asked the first time only, and again for an ego of another kind.
+            Gives roads and signs; what is drawn is kept while the route stays the same.
         body : str
             Body kind of the ego; see `TrafficState.types`.
 
@@ -128,8 +130,12 @@ class EgoEquipment:
             self.close()
             self._fog = self._fog_now = None
             self._mount_camera(body)
+        found = network()
+        if self._network is not None and not np.array_equal(found[0].route, self._network[0].route):
+            self.close()
+            self._fog = self._fog_now = None
         if self._view_renderer is None:
-            self._network = road, _ = network()
+            self._network = road, _ = found
             self._meters = RoadMeters(self._config.advice.sections, road.route, road.route_limits)
             self._reporters = FogReports(self._config.reports, road.route)
             self._way = KnownWay(road.route, carriageways(road.lanes))

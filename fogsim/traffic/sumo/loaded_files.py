@@ -123,7 +123,7 @@ class LoadedRoads:
         self._file, self._additional = net, additional
         self._net: RoadMap | None = None
         self._structures: tuple[Structure, ...] | None = None
-        self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
+        self._known: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
 
     def plan(self, setup: TrafficSetup) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
@@ -135,16 +135,17 @@ class LoadedRoads:
             return None
         self._structures = structures(planned.additional)
         roads = road_network(net, planned.edges, self._structures), sign_map(net, planned.additional)
-        self._planned = planned.edges, roads
+        self._known = planned.edges, roads
         return roads
 
     def along(self, api: Api, route: tuple[str, ...]) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs along the ego's route in a simulation that runs."""
-        if self._planned is not None and self._planned[0] == route:
-            return self._planned[1]
+        if self._known is not None and self._known[0] == route:
+            return self._known[1]
         net = self.net(api)
         signs = sign_map(net, self._additional or loaded_additional(api))
-        return road_network(net, route, self.structures(api)), signs
+        self._known = route, (road_network(net, route, self.structures(api)), signs)
+        return self._known[1]
 
     def net(self, api: Api) -> RoadMap:
         """The network."""

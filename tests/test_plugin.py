@@ -1,6 +1,7 @@
 """In a simulation that the user has started: over a connection, and in a loop that the user writes."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,7 +16,7 @@ from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import Command, Lamp, SpeedAdvice, Step
+from fogsim.values import Command, EgoControl, Lamp, SpeedAdvice, Step
 from tests.helpers.attached import ARGUMENTS, GRID, libsumo_in_town, traci_in_town
 
 SMALL = ("camera.width=96", "camera.height=72")
@@ -152,6 +153,23 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
     assert {0, 2, 5} <= changed  # top speeds, headways, and wishes to change lanes
     assert EGO in present
     assert {v: conduct(libsumo, v) for v in present} == {v: before[v] for v in present}
+
+
+def test_an_ego_driven_by_hand_is_given_back_at_the_end(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego=EGO, visibility=math.inf, settings=SMALL)
+    before = None
+    for _ in range(80):
+        libsumo.simulationStep()
+        if EGO in libsumo.simulation.getDepartedIDList():
+            before = conduct(libsumo, EGO)
+        step = session.observe()
+        if step is not None:
+            session.advise(step, Command(control=EgoControl(0.0)))
+    assert before != conduct(libsumo, EGO)
+    session.close()
+    assert before == conduct(libsumo, EGO)
+    libsumo.simulationStep()
+    assert libsumo.vehicle.getSpeedWithoutTraCI(EGO) == libsumo.vehicle.getSpeed(EGO)
 
 
 def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:

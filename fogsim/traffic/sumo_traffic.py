@@ -421,6 +421,7 @@ class SumoTraffic:
         """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""
         run = self._running
         run.roster.reload()
+        run.driving.apply(None, run.roster.present)
         run.speeds.release(run.roster.present)
         run.lanes.release(run.roster.present)
         run.actions.release(run.roster.present)

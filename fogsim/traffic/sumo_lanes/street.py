@@ -165,7 +165,7 @@ class PersonReader:
         return self._near
 
     def _is_within(self, person: str, here: NDArray[np.float64], reach: float) -> bool:
-        x, y, _ = self._position(person)
+        x, y = self._position(person)[:2]  # SUMO gives no height in a vehicle that waits to be inserted
         return math.hypot(x - here[0], y - here[1]) < reach
 
     def _is_footway(self, lane: str) -> bool:

@@ -25,8 +25,8 @@ DEMAND = """<routes>
 </routes>"""
 
 
-def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
-    setup = replace(setup_of(folder, DEMAND, step=0.5), net=NET)
+def snapshots(folder: Path, steps: int, demand: str = DEMAND) -> list[TrafficSnapshot]:
+    setup = replace(setup_of(folder, demand, step=0.5), net=NET)
     with contextlib.closing(libsumo_traffic(setup)) as traffic:
         seen = []
         traffic.start(0)
@@ -37,6 +37,19 @@ def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
                 break
             seen.append(snapshot)
     return seen
+
+
+def test_persons_in_a_car_that_waits_to_enter_are_left_out(tmp_path: Path) -> None:
+    demand = """<routes>
+    <vehicle id="block" depart="0" departPos="6"><route edges="CE"/><stop lane="CE_1" endPos="6.2" duration="9"/></vehicle>
+    <vehicle id="waiting" depart="1"><route edges="CE"/></vehicle>
+    <person id="p" depart="1"><ride from="CE" to="CE" lines="car"/></person>
+    <vehicle id="car" depart="triggered" line="car"><route edges="CE"/></vehicle>
+    <vehicle id="ego" depart="4"><route edges="WC CE"/></vehicle>
+    </routes>"""
+    seen = snapshots(tmp_path, 2, demand)
+    assert [snapshot.state.persons.ids for snapshot in seen] == [(), ()]
+    assert "car" not in seen[-1].state.ids
 
 
 def test_lights_and_walkers_near_the_ego_are_told(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 
 from fogsim.core.files.xml_reader import XmlFile
@@ -57,9 +58,15 @@ def check_outputs(paths: Iterable[Path]) -> None:
         path = waiting.pop()
         if path not in seen and path.is_file():
             seen.add(path)
-            reader = _OutputReader(path)
-            XmlFile(path).read_all(reader, _MOST, _MOST)
-            waiting += reader.included
+            waiting += _checked_file(path, path.stat().st_mtime_ns, path.stat().st_size)
+
+
+@lru_cache(maxsize=256)
+def _checked_file(path: Path, changed: int, size: int) -> tuple[Path, ...]:  # noqa: ARG001 - a changed file is read again
+    """Files that a checked file includes; `changed` [ns] and `size` [bytes] are its own."""
+    reader = _OutputReader(path)
+    XmlFile(path).read_all(reader, _MOST, _MOST)
+    return tuple(reader.included)
 
 
 class _OutputReader:

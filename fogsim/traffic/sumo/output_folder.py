@@ -29,7 +29,7 @@ class OutputFolder:
 
     SUMO puts its option ``output-prefix`` before the last part of every name of an output, of absolute names too, so
     that a prefix that leads through the root to this folder brings all of them there. Files of one name from different
-    folders become one; sockets, ``stdout`` and ``/dev/null`` stay what they are.
+    folders become one; ``stdout`` and ``/dev/null`` stay what they are.
 
     Parameters
     ----------

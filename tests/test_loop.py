@@ -187,10 +187,8 @@ def test_a_restarted_loop_lays_road_and_fog_along_the_egos_new_route(tmp_path: P
         </routeDistribution><vehicle id="ego" depart="0" route="ways"/></routes>""",
         encoding="utf-8",
     )
-    (tmp_path / "own.sumocfg").write_text(
-        f'<configuration><net-file value="{GRID / "grid.net.xml"}"/><route-files value="demand.rou.xml"/></configuration>',
-        encoding="utf-8",
-    )
+    files = f'<net-file value="{GRID / "grid.net.xml"}"/><route-files value="demand.rou.xml"/>'
+    (tmp_path / "own.sumocfg").write_text(f"<configuration>{files}</configuration>", encoding="utf-8")
     fog = ("fog.outside_visibility_m=1000", "fog.banks=[{start_m: 5, end_m: 40, edge_m: 5, visibility_m: 50}]")
     scenario = scenario_from_config(tmp_path / "own.sumocfg", "ego", ["renderer=none", "estimators=[]", *fog])
 

@@ -41,7 +41,8 @@ def snapshots(folder: Path, steps: int, demand: str = DEMAND) -> list[TrafficSna
 
 def test_persons_in_a_car_that_waits_to_enter_are_left_out(tmp_path: Path) -> None:
     demand = """<routes>
-    <vehicle id="block" depart="0" departPos="6"><route edges="CE"/><stop lane="CE_1" endPos="6.2" duration="9"/></vehicle>
+    <vehicle id="block" depart="0" departPos="6"><route edges="CE"/>
+    <stop lane="CE_1" endPos="6.2" duration="9"/></vehicle>
     <vehicle id="waiting" depart="1"><route edges="CE"/></vehicle>
     <person id="p" depart="1"><ride from="CE" to="CE" lines="car"/></person>
     <vehicle id="car" depart="triggered" line="car"><route edges="CE"/></vehicle>

@@ -27,6 +27,9 @@ _LEAST_JUMP, _LARGEST_JUMP = 0.5, 8.0
 """Sideways jumps from a lane to another that count as a change of lane [m]. Smaller ones are bends, or changes that the
 simulation makes smooth by itself; larger ones are vehicles moved by hand."""
 
+_LARGEST_TURN = 0.3
+"""Vehicles that turn farther between two states have turned off at a junction [rad]."""
+
 _TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
 
@@ -127,4 +130,5 @@ def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[
     middle = last.heading[old] + 0.5 * turn
     jump = moved[:, 1] * np.cos(middle) - moved[:, 0] * np.sin(middle)
     reach = _TOP_SPEED * (state.time - last.time) + _LARGEST_JUMP
-    return np.where(np.hypot(moved[:, 0], moved[:, 1]) <= reach, jump, np.inf)
+    driven = (np.hypot(moved[:, 0], moved[:, 1]) <= reach) & (np.abs(turn) < _LARGEST_TURN)
+    return np.where(driven, jump, np.inf)

@@ -155,6 +155,13 @@ def test_bends_and_moves_by_hand_are_no_changes_of_lane() -> None:
     assert smoothing.smoothed(lifted) is lifted
 
 
+def test_a_turn_within_one_step_is_no_change_of_lane() -> None:
+    smoothing = LaneChangeSmoothing()
+    smoothing.smoothed(ego_at(0.0, 0.0, 0.0, "road_0"))
+    turned = ego_at(1.0, 8.0, 2.0, "side_0", heading=np.pi / 2)
+    assert smoothing.smoothed(turned) is turned
+
+
 def test_who_leaves_on_the_way_is_forgotten() -> None:
     smoothing = LaneChangeSmoothing()
     smoothing.smoothed(ego_at(0.0, 0.0, 0.0, "road_0"))

@@ -188,6 +188,19 @@ def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
     assert positions(look=True) == positions(look=False)
 
 
+def test_the_users_own_subscriptions_keep_their_results(connection: Any) -> None:
+    speed, vehicles = traci.constants.VAR_SPEED, traci.constants.CMD_GET_VEHICLE_VARIABLE
+    with fogsim.attach(connection, ego="veh3", visibility=math.inf, settings=SMALL, drivers=False) as session:
+        while session.observe() is None:
+            connection.simulationStep()
+        connection.vehicle.subscribeContext("veh3", vehicles, 1.0, [speed])
+        for _ in range(3):
+            connection.simulationStep()
+            assert session.observe() is not None
+            results = connection.vehicle.getContextSubscriptionResults("veh3")
+            assert results == {"veh3": {speed: connection.vehicle.getSpeed("veh3")}}
+
+
 def test_an_ego_that_leaves_is_none_again(libsumo: Any) -> None:
     seen = users_loop(libsumo, 300)
     there = [step is not None for step in seen]

@@ -300,8 +300,14 @@ class SubscribedReader(VehicleReader):
     def _surroundings(self) -> Mapping[str, Mapping[int, Any]]:
         vehicle = self._api.vehicle
         reach = self._radius + _MARGIN
+        found = vehicle.getContextSubscriptionResults(self._ego)
+        users = {seen: dict(row) for seen, row in found.items()}
         vehicle.subscribeContext(self._ego, _VEHICLES, reach, tuple(_MOVING), end=self._roster.time)
-        rows: dict[str, Mapping[int, Any]] = dict(vehicle.getContextSubscriptionResults(self._ego))
+        found = vehicle.getContextSubscriptionResults(self._ego)
+        rows: dict[str, Mapping[int, Any]] = dict(found)
+        # traci keeps all results of an ego in one place: the user's own stay there alone.
+        found.clear()
+        found.update(users)
         # SUMO sends nothing of vehicles that another simulator has put off the lanes.
         for missing in self._roster.present.intersection((self._ego, *self._read)).difference(rows):
             rows[missing] = {number: getattr(vehicle, name)(missing) for number, name in _MOVING.items()}

@@ -112,6 +112,19 @@ def test_a_run_without_outputs_leaves_no_folder(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(done.files)
 
 
+def test_trip_statistics_that_a_configuration_asks_for_are_written(
+    town: Source, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scenario, folder = town
+    asked = '<statistic-output value="stat.xml"/><duration-log.statistics value="true"/>'
+    files = '<net-file value="grid.net.xml"/><route-files value="grid.trips.xml"/>'
+    (folder / "town.sumocfg").write_text(f"<configuration>{files}{asked}</configuration>")
+    record_run(scenario, 1, tmp_path / "run", recorders=("table",))
+    statistics = ET.parse(tmp_path / "run" / "sumo_outputs" / "stat.xml")  # noqa: S314 - SUMO has just written it
+    assert statistics.find("vehicleTripStatistics") is not None
+    assert capfd.readouterr().out == ""
+
+
 def test_options_of_a_scenario_bring_outputs_and_earlier_ones_give_way(tmp_path: Path) -> None:
     scenario = scenario_from_config(
         GRID / "grid.sumocfg",

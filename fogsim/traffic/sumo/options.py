@@ -37,7 +37,7 @@ def _usual(setup: TrafficSetup) -> dict[str, str]:
     """Options as they are where no one has chosen."""
     quiet = {
         **dict.fromkeys(("no-step-log", "duration-log.disable", "no-warnings"), "true"),
-        **dict.fromkeys(("verbose", "duration-log.statistics"), "false"),
+        "verbose": "false",
     }
     # Vehicles are not teleported: collisions stay where they happen and are counted. They are contacts, where SUMO by
     # default counts each gap below a vehicle's minimum (2.5 m). A simulation of the user's own keeps what its

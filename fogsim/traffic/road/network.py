@@ -214,7 +214,7 @@ def _map_of(net: Any, lefthand: bool) -> RoadMap:
     drawn = ~walked & np.array([_kind(lane) is not None for lane in lanes], np.bool_)
     between = [not lane.getEdge().getFunction() and set(lane.getPermissions()) != {"pedestrian"} for lane in lanes]
     side = 1.0 if lefthand else -1.0
-    signs = (limit_sign(edge, side) for edge in net.getEdges(withInternal=False))
+    signs = (limit_sign(edge, side) for edge in net.getEdges(withInternal=False) if _carriageway(edge))
     return RoadMap(
         edges=edge_ranges([edge.getID() for edge in edges], [len(edge.getLanes()) for edge in edges]),
         lanes=tuple(_lane(lane, lefthand) for lane in lanes),

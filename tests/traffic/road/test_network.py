@@ -109,6 +109,13 @@ def test_signs_stand_on_the_side_that_vehicles_keep_to(tmp_path: Path) -> None:
         assert apart @ to_the_left > 5.0
 
 
+def test_only_roads_for_vehicles_have_speed_limit_signs(tmp_path: Path) -> None:
+    for users, has_signs in (("rail", False), ("pedestrian", False), ("bus", True)):
+        file = tmp_path / f"{users}.net.xml"
+        file.write_text(NET.read_text(encoding="utf-8").replace("<lane ", f'<lane allow="{users}" '), encoding="utf-8")
+        assert bool(read_net(file).limit_signs) is has_signs, users
+
+
 def test_a_lane_of_no_length_has_no_sign(tmp_path: Path) -> None:
     lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="9" shape="{4}"/></edge>'
     edges = lane.format("a", "n", "m", 10, "0,0 0,0 9,0"), lane.format("b", "m", "n", 20, "9,0 9,0")

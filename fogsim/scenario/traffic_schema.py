@@ -83,7 +83,7 @@ class ChangeLane(Event):
     """`change_lane`: change lane, whoever is there (cut in)."""
 
     lanes: Whole = Field(ge=-4, le=4)
-    """How many lanes to the left; negative to the right."""
+    """How many lanes to the left, negative to the right; in left-hand traffic the other way round."""
 
     stay_s: Period = 60.0
     """How long it stays there."""

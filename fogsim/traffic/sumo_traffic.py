@@ -154,7 +154,9 @@ class SumoTraffic:
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
             script=script,
-            actions=ScriptedActions(api, speeds, script.lamps, changes, session),
+            actions=ScriptedActions(
+                api, speeds, script.lamps, changes, session, lambda: self._roads.net(api).left_hand
+            ),
             session=session,
             mark=mark,
             persons=PersonReader(api, self._link.shared),

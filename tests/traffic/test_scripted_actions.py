@@ -134,6 +134,18 @@ def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: SumoT
     assert not any(indicated[62:])
 
 
+def test_in_left_hand_traffic_lanes_count_to_the_right_and_so_does_the_indicator(tmp_path: Path) -> None:
+    net = tmp_path / "left.net.xml"
+    net.write_text(NET.read_text(encoding="utf-8").replace("<net ", '<net lefthand="true" ', 1), encoding="utf-8")
+    setup = setup_in(tmp_path, net, car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25))
+    with contextlib.closing(libsumo_traffic(setup)) as traffic:
+        traffic.start(1)
+        assert traffic.begin([ChangeLane("lead", 1, indicator=1.0)]) == ()
+        (snapshot,) = driven(traffic, 1)
+    lamps = int(snapshot.state.lamps[snapshot.state.ids.index("lead")])
+    assert lamps & (Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT) == Lamp.INDICATOR_RIGHT
+
+
 @pytest.mark.parametrize("gap", [15.0, -20.0])
 def test_a_vehicle_comes_onto_the_road_near_another(motorway: SumoTraffic, gap: float) -> None:
     get = load_libsumo().vehicle

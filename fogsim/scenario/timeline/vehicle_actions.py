@@ -168,7 +168,7 @@ class LaneAction(Section):
     """A vehicle changes lane, whoever is there, as far as it does not hit anybody."""
 
     lanes: Annotated[Whole, Field(ge=-4, le=4)] | None = None
-    """How many lanes to the left; negative to the right."""
+    """How many lanes to the left, negative to the right; in left-hand traffic the other way round."""
 
     to: Annotated[Whole, Field(ge=0, le=20)] | Literal["oncoming"] | None = None
     """Or the lane to go to: its number from the right, from 0; or `oncoming`, the one beyond the left lane, where the
@@ -190,8 +190,8 @@ class LaneAction(Section):
     """How long it stays there."""
 
     offset_m: Annotated[Number, Field(ge=-10, le=10)] | None = None
-    """Distance of its middle from the lane's middle afterwards, to the left; `lanes: 0` moves it in its own lane, or,
-    on a `path`, to the left of that."""
+    """Distance of its middle from the lane's middle afterwards, to the left (in left-hand traffic: to the right);
+    `lanes: 0` moves it in its own lane, or, on a `path`, to the left of that."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

@@ -145,6 +145,7 @@ class _Indicating:
     change: ChangeLane
     begins: float
     ends: float
+    lamp: Lamp
 
 
 @dataclass(slots=True)
@@ -200,8 +201,7 @@ class Lamps:
             row = state.ids.index(vehicle)
             lit = int(lamps[row])
             if vehicle in self._indicating:
-                left = self._indicating[vehicle].change.lanes > 0
-                lit |= int(Lamp.INDICATOR_LEFT if left else Lamp.INDICATOR_RIGHT)
+                lit |= int(self._indicating[vehicle].lamp)
             lamps[row] = settled(self.switched(vehicle, lit))
         return replace(state, lamps=lamps.astype(np.int32))
 
@@ -211,10 +211,11 @@ _USUAL_DURATION = 3.0
 
 
 class Playing:
-    """Plays what has begun."""
+    """Plays what has begun; in left-hand traffic, lanes count to the right."""
 
-    def __init__(self, lamps: Lamps) -> None:
+    def __init__(self, lamps: Lamps, left_hand: Callable[[], bool] = lambda: False) -> None:
         self._lamps = lamps
+        self._left_hand = left_hand
         self._courses: dict[str, _Course] = {}
         self._due_changes: list[_Indicating] = []
 
@@ -243,9 +244,12 @@ class Playing:
             case ChangeLane():
                 begins = motion.time + action.indicator
                 lasting = _USUAL_DURATION if action.duration is None else action.duration
-                indicating = _Indicating(action, begins, begins + lasting)
+                indicates = action.indicator > 0.0
+                to_the_left = (action.lanes > 0) != (indicates and self._left_hand())
+                lamp = Lamp.INDICATOR_LEFT if to_the_left else Lamp.INDICATOR_RIGHT
+                indicating = _Indicating(action, begins, begins + lasting, lamp)
                 self._due_changes.append(indicating)
-                if action.indicator > 0.0:
+                if indicates:
                     self._lamps.indicate(indicating)
             case SetLamps():
                 self._lamps.switch(action)

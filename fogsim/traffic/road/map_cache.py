@@ -32,7 +32,7 @@ class RoadMap:
 
     `edges` are ranges of lane indices, from the side that vehicles keep to. `drawn` (n,) marks lanes to draw, and
     `between` (n,) lanes between junctions that are not only for pedestrians. `areas` are junctions. `location` is the
-    offset added to the source's coordinates [m] and their projection, as in the file.
+    offset added to the source's coordinates [m] and their projection, as in the file. `left_hand`: vehicles keep left.
     """
 
     edges: Mapping[str, range]
@@ -43,6 +43,7 @@ class RoadMap:
     limit_signs: tuple[Sign, ...]
     signal_heads: tuple[SignalHead, ...]
     location: tuple[str, str] | None
+    left_hand: bool
 
     def middle_lane(self, edge: str) -> Lane:
         """Middle lane of an edge; of two, the inner one."""
@@ -139,6 +140,7 @@ def _arrays_of(roads: RoadMap) -> _Arrays:
         "links": np.array([link for head in heads for link in head.links], np.int64),
         "link_counts": np.array([len(head.links) for head in heads], np.int64),
         "location": _text(roads.location or ()),
+        "left_hand": np.array(roads.left_hand),
     }
 
 
@@ -165,6 +167,7 @@ def _map_of(arrays: Mapping[str, NDArray[Any]]) -> RoadMap:
         limit_signs=tuple(Sign(name, kind, p[0], (p[1], p[2], p[3]), p[4], p[5]) for name, kind, p in places),
         signal_heads=tuple(_heads(arrays)),
         location=(location[0], location[1]) if location else None,
+        left_hand=bool(arrays["left_hand"]),
     )
 
 

@@ -224,6 +224,7 @@ def _map_of(net: Any, lefthand: bool) -> RoadMap:
         limit_signs=tuple(sign for sign in signs if sign is not None),
         signal_heads=tuple(head for edge in edges for head in _heads(edge, side)),
         location=_location(net),
+        left_hand=lefthand,
     )
 
 

@@ -1,7 +1,7 @@
 """Actions of a script in SUMO: imposed speeds, changes of lane, lamps, traffic lights and persons who walk."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
@@ -143,12 +143,18 @@ class ScriptedActions:
     """Plays in SUMO what the script has begun."""
 
     def __init__(
-        self, api: Api, speeds: SpeedControl, lamps: Lamps, lane_changes: LaneChangeSmoothing, session: str
+        self,
+        api: Api,
+        speeds: SpeedControl,
+        lamps: Lamps,
+        lane_changes: LaneChangeSmoothing,
+        session: str,
+        left_hand: Callable[[], bool],
     ) -> None:
         self._api = api
         self._step = float(api.simulation.getDeltaT())
         self._speeds = speeds
-        self._playing = Playing(lamps)
+        self._playing = Playing(lamps, left_hand)
         self._lane_changes = lane_changes
         self._signals = _SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")

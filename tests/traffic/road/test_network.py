@@ -7,6 +7,7 @@ import sumo
 
 from fogsim.errors import InputError
 from fogsim.scene import build_scene
+from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.signs import sign_map
 from fogsim.values import LaneEnd, LaneKind, LaneMarking, SignMap
@@ -93,6 +94,7 @@ def test_where_vehicles_keep_to_the_left_lines_lie_the_other_way_round(tmp_path:
         {lane.lane_id: lane for lane in road_network(read_net(path), ["A0B0"]).lanes} for path in (GRID, file)
     )
     assert set(usual) == set(left)
+    assert [compacted(read_net(path)).left_hand for path in (GRID, file)] == [False, True]
     for name in ("A0B0_0", "A0B0_1"):
         assert (left[name].left, left[name].right) == (usual[name].right, usual[name].left)
         assert left[name].outermost is not usual[name].outermost

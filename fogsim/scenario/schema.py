@@ -39,7 +39,7 @@ class InformedMethod(Method):
     """A method that uses the visibility."""
 
     informed_by: Literal["belief", "truth", "sensors"] = "belief"
-    """Source of the visibility: the ego's belief, the truth, or for advised sections the reports of roadside sensors."""
+    """Source of the visibility: the ego's belief, the truth or, for advised sections, reports of roadside sensors."""
 
 
 class ControllerSection(Method):

@@ -133,7 +133,7 @@ def test_values_of_wrong_types(tmp_path: Path) -> None:
 def test_tables_of_places(tmp_path: Path) -> None:
     for text, told in [
         (CSV + "2,50.0,9," + "x" * 200_000, ":4: not valid CSV: field larger than field limit"),
-        (CSV + '2,"50', "line 4: latitude|longitude must be a number"),
+        (CSV + '2,"50', "line 4: fewer cells than columns"),
         (CSV.replace("50.001", "nan"), "line 3: latitude must be a number"),
         (CSV.replace("\n1,", "\n1e300,"), "line 3: time_s must be a number"),
         ("time,lat,lon\n0001-01-01,1,2\n0001-01-01,1,2", "line 2: expected a time as|two positions"),

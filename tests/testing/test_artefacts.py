@@ -79,5 +79,5 @@ def test_what_goes_wrong_is_told_and_does_no_harm(
 
     monkeypatch.setattr(artefacts, "run", broken)
     work = KeepFailures({"a": (finding_from_json(finding("failed")),)})
-    assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:70)"
+    assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:78)"
     assert json.loads((tmp_path / "a.json").read_text())["status"] == "failed"

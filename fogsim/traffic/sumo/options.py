@@ -21,8 +21,11 @@ _LOG = "error-log"
 
 def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     """SUMO's command line, without the program's name, and without where outputs go."""
-    source = ["--net-file", str(setup.net)] if setup.config is None else ["--configuration-file", str(setup.config)]
-    arguments = [*source, *OVERRIDES, "--step-length", repr(setup.step_length), "--seed", str(seed)]
+    if setup.config is None:
+        source = ["--net-file", str(setup.net)]
+    else:
+        source = ["--configuration-file", str(setup.config), *OVERRIDES]
+    arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))
     for option, paths in (("--route-files", setup.routes), ("--additional-files", additional)):

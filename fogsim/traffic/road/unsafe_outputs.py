@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
-from fogsim.core.files.xml_reader import XmlFile
+from fogsim.core.files.xml_reader import XmlFile, open_unpacked
 from fogsim.errors import shown
 
 _WRITING = frozenset(
@@ -26,6 +26,14 @@ _OUTPUTS = ("file", "output", "dest")
 _ADDRESS = re.compile(r"(?:\[[^\]]*\][^:]*|[^:]{2,}):\s*[+-]?\d+")
 _NO_ADDRESS = "SUMO's outputs go into files, not to a network address"
 _VARIABLE = re.compile(r"\$\{(.+?)\}")
+_ADDRESS_END = re.compile(rb":\s*[+-]?\d+\s*[\"']")
+_INDIRECT = (b"${", b"&#", b"include", b"<!DOCTYPE", b"\0")
+"""Bytes without which an address stands in a file as it is, and no other file is included."""
+_PLAIN = re.compile(
+    rb"(?:\xef\xbb\xbf)?\s*<(?!\?xml[^>]*encoding\s*=\s*(?![\"'](?:utf-8|us-ascii|iso-8859-1)[\"']))", re.IGNORECASE
+)
+"""Beginning of a file whose encoding has the letters of ASCII."""
+_CHUNK, _LONGEST_END = 2**22, 100
 _MOST = 2**33
 """Maximum size and number of elements of a file."""
 
@@ -65,8 +73,23 @@ def check_outputs(paths: Iterable[Path]) -> None:
 def _checked_file(path: Path, changed: int, size: int) -> tuple[Path, ...]:  # noqa: ARG001 - a changed file is read again
     """Files that a checked file includes; `changed` [ns] and `size` [bytes] are its own."""
     reader = _OutputReader(path)
-    XmlFile(path).read_all(reader, _MOST, _MOST)
+    if _needs_reading(path):
+        XmlFile(path).read_all(reader, _MOST, _MOST)
     return tuple(reader.included)
+
+
+def _needs_reading(path: Path) -> bool:
+    """Whether a file may name an address or include another: a quick look at its bytes spares the reading of most."""
+    with open_unpacked(path) as file:
+        text = file.read(_CHUNK)
+        if _PLAIN.match(text) is None:
+            return True
+        while text:
+            if any(mark in text for mark in _INDIRECT) or _ADDRESS_END.search(text):
+                return True
+            chunk = file.read(_CHUNK)
+            text = text[-_LONGEST_END:] + chunk if chunk else b""
+    return False
 
 
 class _OutputReader:

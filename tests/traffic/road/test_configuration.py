@@ -1,9 +1,11 @@
+import gzip
 from pathlib import Path
 
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.traffic.road.configuration import OVERRIDES, check_configured_files, configured_files, ignored_options
+from fogsim.traffic.road.unsafe_outputs import check_outputs
 
 
 def config(folder: Path, content: str) -> Path:
@@ -97,3 +99,19 @@ def test_outputs_of_additional_and_included_files_have_no_addresses(tmp_path: Pa
         path = config(tmp_path, f'<configuration><n value="{NET}"/>{files}</configuration>')
         with pytest.raises(InputError, match=r"in\.xml:1: .*not to a network address, got '10\.0\.0\.1:80'"):
             check_configured_files(path)
+
+
+def test_addresses_are_found_however_a_file_writes_them(tmp_path: Path) -> None:
+    path, element = tmp_path / "a.add.xml", '<additional>{}<edgeData id="e" file="10.0.0.1{}80"/></additional>'
+    far = element.format(f"<!-- {'x' * 2**22} -->", ":").encode()
+    for written in (
+        far,
+        gzip.compress(far),
+        element.format("", "&#58;").encode(),
+        f'<?xml version="1.0" encoding="UTF-16"?>{element.format("", ":")}'.encode("utf-16"),
+    ):
+        path.write_bytes(written)
+        with pytest.raises(InputError, match="not to a network address"):
+            check_outputs([path])
+    path.write_text(element.format("", "_"), encoding="utf-8")
+    check_outputs([path])

@@ -83,7 +83,7 @@ class DenseFogKnown:
         believed = (
             step.belief.visibility_quantile(0.5)
             if profile is None
-            else profile.visibility_quantile(ahead + _BEHIND_EDGE, 0.5)
+            else profile.visibility_quantile(max(ahead + _BEHIND_EDGE, 0.0), 0.5)
         )
         if believed >= _KNOWN_FOG:
             self._known = None

@@ -216,15 +216,6 @@ def test_an_episode_without_a_seed_gets_another_run(fast: gymnasium.Env[Any, Any
     assert again["seed"] != drawn["seed"]
 
 
-def test_a_repeated_episode_is_of_the_same_scenario() -> None:
-    scenarios = [load_scenario(MOTORWAY, [f"duration_s={10 + i}"]) for i in range(8)]
-    source, rng = EpisodeSource(None, scenarios, None, (), "train"), np.random.default_rng(0)
-    seed, drawn = source.draw(rng, EpisodeChoice())
-    for _ in range(3):
-        again, repeated = source.draw(rng, EpisodeChoice(episode=drawn.episode.as_info()))
-        assert (again, repeated.scenario) == (seed, drawn.scenario)
-
-
 def test_a_scenario_in_place_of_the_own_road_is_run_as_it_is(fast: gymnasium.Env[Any, Any]) -> None:
     task = fast.unwrapped
     assert isinstance(task, FogAdvisoryV1Env)
@@ -262,16 +253,6 @@ def test_options_that_are_none(fast: gymnasium.Env[Any, Any]) -> None:
     ]:
         with pytest.raises(InputError, match=message):
             fast.reset(options=options)
-
-
-def test_splits_share_no_seed() -> None:
-    drawn = {}
-    for split in ("train", "test"):
-        source, rng = EpisodeSource(MOTORWAY, None, None, (), split), np.random.default_rng(0)
-        drawn[split] = {source.draw(rng, EpisodeChoice())[0] for _ in range(100)}
-    assert not drawn["train"] & drawn["test"]
-    with pytest.raises(InputError, match="unknown split"):
-        EpisodeSource(None, None, None, (), "validation")
 
 
 @pytest.mark.parametrize(("distribution", "drawn"), [(None, 5), (ScenarioDistribution(), 5), ([MOTORWAY], 1)])

@@ -215,8 +215,8 @@ def test_sizes_must_agree(folder: Path) -> None:
 
 def test_bits_must_agree(folder: Path) -> None:
     cv2.imwrite(str(folder / "left.png"), noise(np.uint16, 3, 65535))
-    for name, told in [("image.png", "image.png: the image has 8 bits, the camera 12"), ("left.png", "are 0 … 4095")]:
-        with pytest.raises(InputError, match=told):
+    for name, fault in [("image.png", "image.png: the image has 8 bits, the camera 12"), ("left.png", "are 0 … 4095")]:
+        with pytest.raises(InputError, match=fault):
             run(folder, image=folder / name, camera=dataclasses.replace(CAMERA, bits=12))
 
 

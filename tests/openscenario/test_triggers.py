@@ -113,8 +113,8 @@ def test_edges_of_comparisons(read: Callable[..., dict[str, Any]], edge: str, to
 
 def test_an_edge_at_equality_is_one_of_the_comparison_as_written(read: Callable[..., dict[str, Any]]) -> None:
     speed, edge = '<SpeedCondition value="3" rule="lessOrEqual"/>', STANDS.replace("none", "rising")
-    told = "(not (ego.speed <= 3 m/s)) delayed 0.001 s and (ego.speed <= 3 m/s)"
-    assert told in read((STAND_STILL, speed), (STANDS, edge))["end_when"]
+    rises = "(not (ego.speed <= 3 m/s)) delayed 0.001 s and (ego.speed <= 3 m/s)"
+    assert rises in read((STAND_STILL, speed), (STANDS, edge))["end_when"]
     assert (
         "ego.speed rises above 3 m/s"
         in read((STAND_STILL, speed), (STANDS, STANDS.replace("none", "falling")))["end_when"]

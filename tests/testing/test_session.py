@@ -15,10 +15,10 @@ from fogsim.testing.session import begin_session
 
 
 def test_all_cases_are_run_and_judged(tmp_path: Path) -> None:
-    told = {"a0": complete("passed"), "a1": complete("failed"), "b0": complete("passed"), "c0": BROKEN}
+    planned = {"a0": complete("passed"), "a1": complete("failed"), "b0": complete("passed"), "c0": BROKEN}
     tests = [made_up_test(keys, tmp_path / f"{keys[0]}.fog.yaml") for keys in (["a0", "a1"], ["b0"], ["c0"])]
     seen: list[tuple[int, int]] = []
-    outcomes = run_tests(tests, tmp_path / "out", MadeUpEngine(told), watch=lambda *both: seen.append(both))
+    outcomes = run_tests(tests, tmp_path / "out", MadeUpEngine(planned), watch=lambda *both: seen.append(both))
     assert [one.is_passed for one in outcomes] == [False, True, False]
     assert outcomes[2].broken[0].message == BROKEN["message"]
     assert seen == [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2)]
@@ -47,23 +47,23 @@ def test_expectations_that_are_not_asked_for_do_not_count(tmp_path: Path) -> Non
 
 def test_what_was_done_counts_when_resumed_and_only_then(tmp_path: Path) -> None:
     test = made_up_test(["a", "b", "c"])
-    told = {key: complete("passed") for key in "abc"}
+    planned = {key: complete("passed") for key in "abc"}
     with pytest.raises(KeyboardInterrupt):
-        run_tests([test], tmp_path, MadeUpEngine(told, stop_after=2))
-    resumed = MadeUpEngine(told)
+        run_tests([test], tmp_path, MadeUpEngine(planned, stop_after=2))
+    resumed = MadeUpEngine(planned)
     (outcome,) = run_tests([test], tmp_path, resumed, resume=True)
     assert (resumed.ran, len(outcome.results)) == (["c"], 3)
-    anew = MadeUpEngine(told)
+    anew = MadeUpEngine(planned)
     run_tests([test], tmp_path, anew)
     assert anew.ran == ["a", "b", "c"]
 
 
 def test_results_of_other_versions_do_not_count(tmp_path: Path) -> None:
-    test, told = made_up_test(["a"]), {"a": complete("passed")}
-    run_tests([test], tmp_path, MadeUpEngine(told))
+    test, planned = made_up_test(["a"]), {"a": complete("passed")}
+    run_tests([test], tmp_path, MadeUpEngine(planned))
     for distribution, ran in (("platform", []), ("numpy", []), ("fogsim", ["a"])):
         set_version(tmp_path, distribution)
-        resumed = MadeUpEngine(told)
+        resumed = MadeUpEngine(planned)
         run_tests([test], tmp_path, resumed, resume=True)
         assert resumed.ran == ran, distribution
 
@@ -76,16 +76,16 @@ def set_version(out: Path, distribution: str) -> None:
 
 
 def test_a_directory_that_is_being_written_keeps_its_results(tmp_path: Path) -> None:
-    test, told = made_up_test(["a"]), {"a": complete("passed")}
-    run_tests([test], tmp_path, MadeUpEngine(told))
+    test, planned = made_up_test(["a"]), {"a": complete("passed")}
+    run_tests([test], tmp_path, MadeUpEngine(planned))
     with WriterLock(tmp_path), pytest.raises(InputError, match="is writing there"):
-        run_tests([test], tmp_path, MadeUpEngine(told))
+        run_tests([test], tmp_path, MadeUpEngine(planned))
     assert (tmp_path / "results" / "a.json").exists()
 
 
 def test_a_result_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
-    told = {"a": {**complete("failed"), "metrics": {"mine": True}}, "b": complete("passed")}
-    (outcome,) = run_tests([made_up_test(["a", "b"])], tmp_path, MadeUpEngine(told))
+    planned = {"a": {**complete("failed"), "metrics": {"mine": True}}, "b": complete("passed")}
+    (outcome,) = run_tests([made_up_test(["a", "b"])], tmp_path, MadeUpEngine(planned))
     assert [one.message for one in outcome.broken] == ["its result cannot be read"]
     assert not outcome.is_passed
 

@@ -215,6 +215,25 @@ def test_a_kernel_that_cannot_be_kept_is_compiled(tmp_path: Path, monkeypatch: p
     assert used.use() == (42.0, 2)
 
 
+def test_code_of_an_earlier_source_is_never_taken_for_that_of_this_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
+    used = _kernel(tmp_path, "*")
+    assert used.use() == (42.0, 1)
+    (tmp_path / "doubling.py").write_text(KERNEL.replace("2.0", "30.0"), encoding="utf-8")
+
+    def nearly_full(path: Path, content: bytes) -> None:
+        if path.suffix == ".nbc":
+            raise OSError(28, "No space left on device")
+        write_entry(path, content)
+
+    with monkeypatch.context() as disk:
+        disk.setattr("fogsim.core.compiling.code_libraries.write_entry", nearly_full)
+        assert used.use()[0] == 630.0
+    assert used.use()[0] == 630.0
+
+
 def test_a_file_in_place_of_a_folder_of_roads_gives_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path))
     folder = write_generated("roads", TEXTS)

@@ -90,6 +90,18 @@ def test_a_link_in_place_of_the_part_is_not_followed(tmp_path: Path) -> None:
     assert not (tmp_path / "a").is_symlink()
 
 
+def test_two_writers_of_one_file_are_one(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "file") as file:
+        file.write(b"the first ")
+        with pytest.raises(InputError, match="another process is writing it"):
+            write_bytes(tmp_path / "file", b"other")
+        file.write(b"writer's")
+    assert (tmp_path / "file").read_bytes() == b"the first writer's"
+    (tmp_path / "file.part").write_bytes(b"left by a process that was killed")
+    write_bytes(tmp_path / "file", b"other")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("file", b"other")]
+
+
 def test_a_file_keeps_its_permissions_and_a_new_one_has_the_usual(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
     for name in ("old", "linked"):

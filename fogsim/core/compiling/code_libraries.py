@@ -5,6 +5,7 @@ that copy again in each caller of a caller. What is linked is simplified here, o
 """
 
 import contextlib
+import hashlib
 import io
 import pickle
 from collections.abc import Iterator
@@ -28,9 +29,15 @@ class KeptCode(caching.IndexDataCacheFile):  # type: ignore[misc] # numba is unt
         cache._cache_file = cls(cache.cache_path, cache._impl.filename_base, locator.get_source_stamp())
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep a kernel; where it cannot be written, as on a full disk, the next process compiles again."""
+        """Keep a kernel; where it cannot be written, as on a full disk, the next process compiles again.
+
+        Code comes before the index, in a file named after it: whatever ends or joins this, none gets another's code.
+        """
         with contextlib.suppress(OSError):
-            super().save(key, data)
+            overloads = self._load_index()
+            number = int.from_bytes(hashlib.sha256(self._dump(data)).digest()[:8])
+            self._save_data(overloads.setdefault(key, self._data_name(number)), data)
+            self._save_index(overloads)
 
     def _load_index(self) -> Any:
         if read_entry(Path(self._index_path)) is None:

@@ -6,6 +6,7 @@ replaced.
 
 import contextlib
 import errno
+import fcntl
 import json
 import os
 import stat
@@ -88,17 +89,34 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
         return
     part = partial_path(path)
-    try:
-        with naming(part):
-            # The path may be a link.
-            part.unlink(missing_ok=True)
-            with part.open("wb") as file:
-                yield file
+    with naming(part), _opened_alone(part) as file:
+        try:
+            yield file
+            file.flush()
             publish(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise
+        except BaseException:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise
+
+
+@contextlib.contextmanager
+def _opened_alone(part: Path) -> Iterator[BinaryIO]:
+    """An empty file that no other process is writing; InputError if one is."""
+    # What an earlier process left: a link would be followed, and a file can be write-protected.
+    if part.is_symlink() or not (part.is_file() and os.access(part, os.W_OK)):
+        part.unlink(missing_ok=True)
+    part.touch()
+    with part.open("r+b") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{part}: another process is writing it; wait for its end, or give another name") from None
+        except OSError:
+            # This file system has no locks.
+            pass
+        file.truncate()
+        yield file
 
 
 def _opened_stream(path: Path) -> BinaryIO:

@@ -1,9 +1,10 @@
 """Runs of a study in parallel processes of this machine; completed runs are kept however it ends."""
 
 import contextlib
-import multiprocessing
+import multiprocessing.util
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -79,22 +80,32 @@ def _pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
     open_standard_streams()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["fogsim.study.execution", module])
-    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_leave_signals_to_parent)
+    others = multiprocessing.active_children()
+    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_prepare_worker)
     try:
         yield pool
     except BaseException:
         for worker in multiprocessing.active_children():
-            worker.terminate()
+            if worker not in others:
+                worker.terminate()
         pool.shutdown(wait=True, cancel_futures=True)
         raise
     pool.shutdown(wait=True)
 
 
-def _leave_signals_to_parent() -> None:
+def _prepare_worker() -> None:
     """Let Ctrl-C, which a terminal sends to all processes, end the one that waits for the runs, which ends this one."""
     for signum in (signal.SIGINT, signal.SIGHUP):
         signal.signal(signum, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    # The last of all: Python would wait for threads that a user's method has left.
+    multiprocessing.util.Finalize(None, _end, exitpriority=-100)
+
+
+def _end() -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _end_with_parent() -> None:

@@ -208,6 +208,18 @@ def test_methods_may_catch_their_own_errors_and_be_named_tuples(folder: Path) ->
         ADVISERS.find("mine:ExitsInAdvise", folder)().advise(None, 30.0, 0.0, None)
 
 
+def test_a_method_that_changes_the_working_directory_changes_it_for_nobody_else(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "import os\nos.chdir('/')\nclass Method:\n    def advise(self, *_):\n        os.chdir('/')\n"
+    (folder / "wandering.py").write_text(text)
+    monkeypatch.chdir(folder)
+    method = ADVISERS.find("wandering:Method", folder)()
+    assert Path.cwd().samefile(folder)
+    method.advise(None, 30.0, 0.0, None)
+    assert Path.cwd().samefile(folder)
+
+
 def test_a_call_that_takes_too_long_fails_the_run(folder: Path, command: Command) -> None:
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "'mine:Dawdles'"))
     done = command("run", "short.fog.yaml", "--out", "out", "--method-timeout", "0.2", cwd=folder)

@@ -1,5 +1,7 @@
 import json
+import multiprocessing
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -56,10 +58,27 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
     def interrupt(run: StudyRun, _: str | None) -> None:
         raise KeyboardInterrupt
 
+    stranger = multiprocessing.get_context("forkserver").Process(target=time.sleep, args=(600,))
+    stranger.start()
     with pytest.raises(KeyboardInterrupt):
         ProcessPool(2, __import__("slow_work").work).run(runs, tmp_path, interrupt)
+    assert stranger.is_alive()
+    stranger.kill()
+    stranger.join()
     assert result_file(tmp_path, runs[0]).exists()
     assert not result_file(tmp_path, runs[1]).exists()
+
+
+def test_a_thread_that_a_method_leaves_keeps_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lingering_work.py").write_text(
+        "import threading, time\ndef work(scenario, seed, result):\n"
+        "    late = lambda: (time.sleep(60), result.touch())\n    threading.Thread(target=late).start()\n",
+        encoding="utf-8",
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    run = StudyRun(0, {}, 0, SCENARIO, "k0")
+    ProcessPool(1, __import__("lingering_work").work).run([run], tmp_path, lambda *_: None)
+    assert not result_file(tmp_path, run).exists()
 
 
 def test_the_death_of_the_server_of_processes_costs_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

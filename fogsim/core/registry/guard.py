@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from fogsim.core.registry.user_code import described
+from fogsim.core.registry.user_code import described, working_directory_kept
 from fogsim.errors import InputError, MethodError
 
 
@@ -97,9 +97,7 @@ def guarded_call(call: Callable[..., Any], title: str, file: Path | None, limit:
     @functools.wraps(call)
     def guard(*arguments: Any, **options: Any) -> Any:
         try:
-            if limit is None:
-                return call(*arguments, **options)
-            with time_limit(limit):
+            with working_directory_kept(), contextlib.nullcontext() if limit is None else time_limit(limit):
                 return call(*arguments, **options)
         except (KeyboardInterrupt, MethodError):
             raise

@@ -7,6 +7,7 @@ import hashlib
 import importlib
 import importlib.util
 import inspect
+import os
 import re
 import sys
 import traceback
@@ -111,7 +112,8 @@ def _no_class(name: str, file: Path, known: list[str]) -> InputError:
 
 def _module(name: str, file: Path, home: Path) -> ModuleType:
     try:
-        return _imported(_match(name)["module"], file, home)
+        with working_directory_kept():
+            return _imported(_match(name)["module"], file, home)
     except KeyboardInterrupt:
         raise
     except InputError:
@@ -149,6 +151,21 @@ def _found_first(folder: Path) -> Iterator[None]:
         sys.path.remove(str(folder))
 
 
+@contextlib.contextmanager
+def working_directory_kept() -> Iterator[None]:
+    """Undo a change of the working directory by a user's code: relative paths of inputs and results start there."""
+    try:
+        before = Path.cwd()
+    except FileNotFoundError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        # Always: the user's may be gone by now.
+        os.chdir(before)
+
+
 def described(error: BaseException, file: Path | None, otherwise: str = "") -> str:
     """An error of a user's code in one line: its class, its text, and its place in their file or elsewhere."""
     text = " ".join(f"{type(error).__name__}: {error}".split())
@@ -173,7 +190,8 @@ def _announced(group: str, _: tuple[str, ...]) -> Mapping[str, metadata.EntryPoi
 def load_announced(point: metadata.EntryPoint) -> Any:
     """Import the object of an installed package's entry point."""
     try:
-        return point.load()
+        with working_directory_kept():
+            return point.load()
     except KeyboardInterrupt:
         raise
     except BaseException as error:

@@ -1,6 +1,7 @@
 """The directory of a data set: its files, its identity, and its progress."""
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -23,6 +24,9 @@ LAYERS = ("frames", "depth", "instance", "semantic", "transmission", "sign_map",
 """Folders of the images."""
 
 _RECORDS = "records"
+
+_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+"""Last bytes of a PNG file that is not cut off."""
 
 
 class _ImageEntry(BaseModel, strict=True):
@@ -99,7 +103,7 @@ class DatasetDirectory:
 
     def has(self, number: int) -> bool:
         """Whether a frame has all its files and a complete record; otherwise it is made again."""
-        return all(self._layer(layer, number).is_file() for layer in LAYERS) and self._found(number) is not None
+        return all(_is_whole(self._layer(layer, number)) for layer in LAYERS) and self._found(number) is not None
 
     def beyond(self, frames: int) -> int:
         """Number of all frames if there are more than `frames`, otherwise 0."""
@@ -112,7 +116,8 @@ class DatasetDirectory:
         """Write a frame: its images, then its record; InputError if one of its files exists with other content."""
         for layer in LAYERS:
             path, data = self._layer(layer, number), png(layers[layer])
-            if path.exists() and read_bytes(path) != data:
+            # One that was cut off, as when a machine stops, is replaced.
+            if path.exists() and not data.startswith(read_bytes(path)):
                 raise InputError(
                     f"{path} is there and is not what this data set has there; move it away to have it made again"
                 )
@@ -149,6 +154,16 @@ class DatasetDirectory:
 
     def _record(self, number: int) -> Path:
         return self.path / _RECORDS / f"{number:06d}.json"
+
+
+def _is_whole(image: Path) -> bool:
+    """Whether a PNG file is there and not cut off."""
+    try:
+        with image.open("rb") as file:
+            file.seek(-len(_PNG_END), os.SEEK_END)
+            return file.read() == _PNG_END
+    except OSError:
+        return False
 
 
 def _key(layer: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
@@ -88,8 +89,10 @@ def run_study(
     if engine is not None and processes is not None:
         raise InputError("processes are this machine's: give either processes or an engine")
     engine = engine or ProcessPool(processes or os.cpu_count() or 1)
-    directory = StudyDirectory(out, study)
+    refuse_unwritable_folder(out)
+    out.mkdir(parents=True, exist_ok=True)
     with WriterLock(out):
+        directory = StudyDirectory(out, study)
         missing = directory.missing()
         done = len(study.runs) - len(missing)
         watch(done, None)

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, ValidationError
 from fogsim.core.files.atomic import partial_path, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.core.files.readers import read_json
+from fogsim.core.files.writer_lock import LOCK_NAME
 from fogsim.errors import InputError, shown
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import result_file
@@ -46,7 +47,7 @@ class StudyDirectory:
             self._check_same(manifest, described)
         else:
             # A process that was killed there, or a full disk, may have left this much.
-            begun = {partial_path(manifest)}
+            begun = {partial_path(manifest), path / LOCK_NAME}
             if path.exists() and set(path.iterdir()) - begun:
                 raise InputError(f"--out {path} holds something else than a study; choose another directory")
             path.mkdir(parents=True, exist_ok=True)

@@ -275,6 +275,11 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
     telling = [one for one in differences if one.metric in main and one.metric not in remarks]
     figures = [*_figures(study, done, remarks, profiles, telling)]
     (folder / "figures").mkdir(exist_ok=True)
+    # Of an earlier call with other metrics, another baseline or fewer seeds.
+    for old in (folder / "figures").glob("*.svg"):
+        if old.stem not in {figure.name for figure in figures} and old.with_suffix(".csv").is_file():
+            old.unlink()
+            old.with_suffix(".csv").unlink()
     for figure in figures:
         write_text(folder / "figures" / f"{figure.name}.svg", figure.svg)
         write_csv(folder / "figures" / f"{figure.name}.csv", figure.columns, figure.rows)

@@ -167,10 +167,22 @@ def begin_session(out: Path, *, resume: bool, kind: SessionKind = "tests") -> It
             was = ", ".join(f"{name} {last.versions.get(name)} (now {now[name]})" for name in changed)
             raise InputError(f"--out {out} holds a campaign of {was}; choose another directory")
         if changed or not resume:
-            shutil.rmtree(results_folder(out), ignore_errors=True)
+            _remove_results(results_folder(out))
         write_json(session, {"kind": kind, "versions": now, "not_passed": last.not_passed})
         results_folder(out).mkdir(exist_ok=True)
         yield results_folder(out)
+
+
+def _remove_results(folder: Path) -> None:
+    try:
+        shutil.rmtree(folder)
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        why = error.strerror or error
+        raise InputError(
+            f"{folder}: results of an earlier call, which do not count, cannot be removed: {why}"
+        ) from error
 
 
 def results_folder(out: Path) -> Path:

@@ -50,6 +50,15 @@ def test_a_damaged_record_is_not_there(directory: DatasetDirectory, kind: str) -
         directory.record(0)
 
 
+def test_an_image_that_was_cut_off_is_made_again(directory: DatasetDirectory) -> None:
+    image = directory.path / "depth" / "000000.png"
+    for size in (0, 5, 50):
+        image.write_bytes(image.read_bytes()[:size])
+        assert not directory.has(0)
+        directory.write(0, dict.fromkeys(LAYERS, np.zeros((4, 4), np.uint8)), {"image": ENTRY, "annotations": []})
+        assert directory.has(0)
+
+
 def test_a_damaged_identity_is_refused_in_one_line(directory: DatasetDirectory) -> None:
     for kind in ["empty", "cut off", "list", "null", "number", "NaN", "deep", "not UTF-8", "no entry"]:
         (directory.path / IDENTITY).write_bytes(DAMAGES[kind])

@@ -181,7 +181,13 @@ def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
     chosen = dataclasses.replace(study, metrics=("distance_m", "max_drac_mps2"), wanted_interval=0.025)
     rows = rows_of(study)
     rows[3] = {**{k: rows[3][k] for k in ("run", "policy", "fog", "seed")}, "status": "failed", "message": "a < b"}
+    written(study, rows_of(study), tmp_path)
+    (tmp_path / "figures" / "mine.svg").touch()
     page = written(chosen, rows, tmp_path)
+    # Figures of the metrics before are gone.
+    left = {path.name for path in (tmp_path / "figures").glob("*.svg")}
+    assert "mine.svg" in left
+    assert left.isdisjoint({"collisions.svg", "traffic_mean_speed_mps.svg"})
     assert "PARTIAL: 1 of 32 runs missing or failed" in page
     assert "a &lt; b" in page
     assert "<td>max_drac_mps2</td><td>no run has a value</td>" in page

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from fogsim.cli.app import app
 from fogsim.core.files.atomic import write_json
+from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
 from fogsim.simulation import chosen_methods
 from fogsim.study import StudyRun, load_study, run_study
@@ -138,6 +139,14 @@ def test_cells_with_the_same_scenario_share_one_run(tmp_path: Path) -> None:
     assert (len(rows), len(engine.run_numbers), done[-1]) == (8, len({run.key for run in study.runs}), 8)
     assert len(engine.run_numbers) == 4
     assert {row["status"] for row in rows} == {"complete"}
+
+
+def test_a_directory_that_is_written_keeps_the_description_of_its_study(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with WriterLock(tmp_path / "out"):
+        with pytest.raises(InputError, match="is writing there"):
+            run_study(load_study(study_file(tmp_path)), tmp_path / "out", processes=1)
+        assert not (tmp_path / "out" / "study.json").exists()
 
 
 def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:

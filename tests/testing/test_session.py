@@ -98,6 +98,19 @@ def test_a_failed_run_is_repeated_when_resumed(tmp_path: Path) -> None:
     assert (resumed.ran, outcome.broken) == (["a"], [])
 
 
+def test_earlier_results_that_cannot_be_removed_never_count(tmp_path: Path) -> None:
+    (tmp_path / "scratch").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "session.json").write_text("{}")
+    # rmtree removes no link.
+    (tmp_path / "out" / "results").symlink_to(tmp_path / "scratch")
+    with (
+        pytest.raises(InputError, match="results: results of an earlier call"),
+        begin_session(tmp_path / "out", resume=False),
+    ):
+        pass
+
+
 def test_results_of_a_campaign_are_kept(tmp_path: Path) -> None:
     """Tests, another FogSim and a damaged description are refused; another platform is not."""
 

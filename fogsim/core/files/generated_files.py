@@ -30,7 +30,7 @@ def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
             f"in the environment variable {VARIABLE}"
         ) from error
     if missing:
-        keep_newest(folder.parent, _MOST_KEPT)
+        keep_newest(folder.parent, _MOST_KEPT, folder)
     return folder
 
 

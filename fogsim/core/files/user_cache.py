@@ -43,10 +43,15 @@ def replace_file(path: Path, content: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
-def keep_newest(folder: Path, most: int) -> None:
-    """Remove all files and folders in a folder of the cache except the `most` newest."""
+def keep_newest(folder: Path, most: int, written: Path | None = None) -> None:
+    """Remove all files and folders in a folder of the cache except the `most` newest, and `written`.
+
+    What has just been written is the oldest if the clock has been set back.
+    """
     with contextlib.suppress(OSError):
         for old in sorted(folder.iterdir(), key=lambda path: path.lstat().st_mtime)[:-most]:
+            if old == written:
+                continue
             if old.is_dir() and not old.is_symlink():
                 shutil.rmtree(old, ignore_errors=True)
             else:

@@ -34,6 +34,8 @@ def write_coverage(out: Path, odd: OddFile, runs: Sequence[StudyRun]) -> tuple[l
         write_json(folder / f"{stem}_coverage.json", slim)
         merging.append(slim)
     if not merging:
+        for name in ("coverage.json", "coverage.html"):
+            (out / name).unlink(missing_ok=True)
         return [f"ODD {odd.name}: no coverage, all runs ended with errors"], []
     report = merged(merging)
     write_json(out / "coverage.json", report.to_dict())

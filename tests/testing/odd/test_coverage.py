@@ -142,8 +142,10 @@ def test_results_without_this_coverage_do_not_count(tmp_path: Path) -> None:
     assert with_odd.odd is not None
     first, second = (run_campaign(one, tmp_path / "out", ThisProcess(passes)) for one in (plain, with_odd))
     assert {one.run.key for one in first.results}.isdisjoint(one.run.key for one in second.results)
+    (tmp_path / "out" / "coverage.json").write_text("an earlier call's")
     summary, _ = write_coverage(tmp_path / "out", with_odd.odd, [one.run for one in second.results])
     assert summary == ["ODD fog: no coverage, all runs ended with errors"]
+    assert not (tmp_path / "out" / "coverage.json").exists()
 
 
 def test_without_the_extra_only_a_campaign_with_an_odd_is_refused(

@@ -80,9 +80,9 @@ class ScenePlan:
     ) -> None:
         self.pavement = pavement
         lanes = _with_length([lane for lane in network.lanes if len(lane.centreline) > 1])
-        driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
-        if not driven:
+        if not lanes:
             raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
+        driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
         index, terrain = LaneIndex(lanes), Terrain(lanes)
         # Lanes across a junction show only where its area does not reach.
         crossing = [lane for lane in lanes if lane.kind is LaneKind.JUNCTION]
@@ -91,7 +91,7 @@ class ScenePlan:
         within = {lane.lane_id for lane in across}
         edges = _free_sides([lane for lane in lanes if lane.lane_id not in within], index)
         rails, posts = _furniture(edges, index)
-        bridges = gantries(signs.signs, driven)
+        bridges = gantries(signs.signs, driven) if driven else []
         hanging = [sign for gantry in bridges for sign in gantry.signs]
         shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng), **sign_shapes(signs.signs)}
         shapes |= structure_shapes(network.structures)

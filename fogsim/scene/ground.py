@@ -209,8 +209,11 @@ class GroundPlan:
 
     def _kept_off(self, lane: Lane) -> Iterator[tuple[Points, float]]:
         """Spans of a footway where no road lies across it, each with half its width [m]."""
-        driven = self._driven_index
         line, half = refined(cleaned(lane.centreline), LONGEST), lane.width / 2
+        if not self._driven:
+            yield line, half
+            return
+        driven = self._driven_index
         least = min(half, 0.8) - _ASTRAY
         if np.any(driven.clearance(refined(line, _LOOK), same_level=2.5, within=1.0) < least):
             line = refined(line, _LOOK)

@@ -41,7 +41,7 @@ def area_mesh(area: PavedArea) -> Mesh | None:
 
 def walkable(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> list[PavedArea]:
     """Areas without those for walking that vehicles drive over, as where a footway ends at a junction."""
-    if not any(area.kind is LaneKind.FOOTWAY for area in areas):
+    if not lanes or not any(area.kind is LaneKind.FOOTWAY for area in areas):
         return list(areas)
     places = np.concatenate([refined(cleaned(lane.centreline), _PIECE)[:, :2] for lane in lanes])
     places = places[np.argsort(places[:, 0], kind="stable")]

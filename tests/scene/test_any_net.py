@@ -14,6 +14,7 @@ from fogsim.values import (
     PavedArea,
     RoadNetwork,
     Scene,
+    Sign,
     SignMap,
     Structure,
     StructureKind,
@@ -145,3 +146,13 @@ def test_street_lamps_stand_on_the_left_where_vehicles_keep_to_it() -> None:
     assert len(heads) >= 5
     # Arms reach from the pole to the road.
     assert (index.clearance(heads) < index.clearance(feet) - 1.0).all()
+
+
+def test_footways_are_drawn_where_there_is_no_road() -> None:
+    line, none = np.array([[-40.0, 0, 0], [40, 0, 0]]), LaneMarking.NONE
+    way = Lane("w", "w", line, 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
+    corner = PavedArea("a", np.array([[40.0, -2, 0], [44, -2, 0], [44, 2, 0], [40, 2, 0]]), LaneKind.FOOTWAY)
+    sign = Sign("s", "speed_limit", 10.0, (0.0, -3.0, 2.6), 0.0, 0.9)
+    scene = build_scene(RoadNetwork((way,), line, (corner,)), SignMap((sign,)), np.random.default_rng(5))
+    for x in (0.0, 42.0):
+        assert max(road_under(scene.ground, x, 0.0, (Surface.MATT,))) == pytest.approx(KERB)

@@ -15,7 +15,7 @@ from fogsim.core.files.readers import FARTHEST
 from fogsim.core.files.xml_reader import read_elements, root_tag
 from fogsim.core.garbage import no_garbage_collection
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.traffic.road.map_cache import RoadMap, cached_map, compacted, edge_ranges, is_worth_caching, keep_map
 from fogsim.traffic.road.signs import limit_sign
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, SignalHead, Structure
@@ -206,19 +206,20 @@ _ADJOINING = 0.6  # two carriageways whose borders are nearer than this share a 
 def _map_of(net: Any, lefthand: bool) -> RoadMap:
     """Map of a network that was read with its internal edges.
 
-    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
+    Without any road, tracks and waterways are drawn, too, as lanes without lines.
     """
     edges = net.getEdges()
     lanes = [lane for edge in edges for lane in edge.getLanes()]
     walked = np.array([lane.getEdge().getFunction() == _WALKING_AREA for lane in lanes], np.bool_)
-    drawn = ~walked & np.array([_kind(lane) is not None for lane in lanes], np.bool_)
+    kinds = [_kind(lane) for lane in lanes]
+    has_roads = LaneKind.CARRIAGEWAY in kinds
     between = [not lane.getEdge().getFunction() and set(lane.getPermissions()) != {"pedestrian"} for lane in lanes]
     side = 1.0 if lefthand else -1.0
     signs = (limit_sign(edge, side) for edge in net.getEdges(withInternal=False) if _carriageway(edge))
     return RoadMap(
         edges=edge_ranges([edge.getID() for edge in edges], [len(edge.getLanes()) for edge in edges]),
         lanes=tuple(_lane(lane, lefthand) for lane in lanes),
-        drawn=drawn if drawn.any() else ~walked,
+        drawn=~walked & np.array([kind is not None or not has_roads for kind in kinds], np.bool_),
         between=np.array(between, np.bool_),
         areas=(*_junctions(net), *_walking_areas(net)),
         limit_signs=tuple(sign for sign in signs if sign is not None),
@@ -377,7 +378,16 @@ class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if tag == "net":
             self.is_lefthand = attributes.get("lefthand", "false") != "false"
-        self.startElement(tag, attributes)
+        elif attributes.get("function") == "normal":
+            attributes["function"] = ""  # Networks of early versions write it out, which sumolib does not know.
+        elif tag == "junction":
+            attributes.setdefault("intLanes", "")
+        try:
+            self.startElement(tag, attributes)
+        except KeyError as error:
+            name = str(error.args[0])
+            lacks = "nothing before it has the id" if name in attributes.values() else "it lacks the attribute"
+            raise ValueError(f"not a SUMO network: {lacks} {shown(name)}") from error
 
     def end(self, tag: str) -> None:
         self.endElement(tag)
@@ -386,7 +396,7 @@ class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has 
 def road_network(roads: RoadMap, route: Sequence[str], structures: tuple[Structure, ...] = ()) -> RoadNetwork:
     """Lanes, footways, junctions and structures of a network, and the axis of the ego's route.
 
-    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
+    Without any road, tracks and waterways are drawn, too, as lanes without lines.
     """
     lanes = tuple(lane for lane, is_drawn in zip(roads.lanes, roads.drawn.tolist(), strict=True) if is_drawn)
     for lane in lanes:

@@ -124,10 +124,11 @@ def _net_offset(roads: RoadMap) -> tuple[float, float]:
 
 
 class _Roads:
-    """Straight pieces of all lanes for vehicles."""
+    """Straight pieces of all lanes for vehicles; where there are none, of all lanes."""
 
     def __init__(self, roads: RoadMap) -> None:
         lanes = [lane for lane, is_between in zip(roads.lanes, roads.between.tolist(), strict=True) if is_between]
+        lanes = lanes or list(roads.lanes)
         lines = [lane.centreline for lane in lanes]
         self._start = np.concatenate([line[:-1] for line in lines])
         self._step = np.concatenate([np.diff(line, axis=0) for line in lines])

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, nearest_of, shown
 from fogsim.traffic.road.configuration import NO_LANES, configured_files
 from fogsim.traffic.road.demand import read_configured_demand, read_demand
 from fogsim.traffic.road.map_cache import RoadMap
@@ -22,6 +22,9 @@ CLOCK_TICK = 1e-3
 
 _SHOWN = 8
 """Vehicles that a message names."""
+
+_NEAREST = 3
+"""Edges that a message names."""
 
 _MOST_WARNINGS = 3
 """Warnings of SUMO's that a message repeats."""
@@ -143,8 +146,15 @@ class LoadedRoads:
         if self._known is not None and self._known[0] == route:
             return self._known[1]
         net = self.net(api)
-        signs = sign_map(net, self._additional or loaded_additional(api))
-        self._known = route, (road_network(net, route, self.structures(api)), signs)
+        unknown = [edge for edge in route if edge not in net.edges]
+        if unknown:
+            near = ", ".join(nearest_of(unknown[0], net.edges, _NEAREST))
+            raise InputError(
+                f"{self._file or loaded_net(api)}: the ego drives on edge {shown(unknown[0])}, which this network does "
+                f"not have (nearest: {near}); name the network that SUMO has loaded"
+            )
+        network = road_network(net, route, self.structures(api))
+        self._known = route, (network, sign_map(net, self._additional or loaded_additional(api)))
         return self._known[1]
 
     def net(self, api: Api) -> RoadMap:

@@ -1,4 +1,5 @@
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -160,3 +161,34 @@ def test_in_a_network_of_tracks_alone_they_are_drawn_as_lanes_without_lines() ->
     assert {lane.kind for lane in network.lanes} == {LaneKind.CARRIAGEWAY}
     assert {line for lane in network.lanes for line in (lane.left, lane.right)} == {LaneMarking.NONE}
     assert len(build_scene(network, SignMap(), np.random.default_rng(1)).ground.faces) > 0
+
+
+def test_tracks_are_drawn_next_to_footways_where_there_is_no_road(tmp_path: Path) -> None:
+    text = (
+        NET.read_text(encoding="utf-8").replace("<lane ", '<lane allow="rail" ').replace('"rail" ', '"pedestrian" ', 1)
+    )
+    file = tmp_path / "station.net.xml"
+    file.write_text(text, encoding="utf-8")
+    lanes = road_network(read_net(file), ["bank"]).lanes
+    assert {lane.kind for lane in lanes} == {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}
+
+
+def test_networks_of_early_versions_are_read(tmp_path: Path) -> None:
+    text, file = NET.read_text(encoding="utf-8"), tmp_path / "early.net.xml"
+    early = re.sub(r' intLanes="[^"]*"', "", text).replace('<edge id="bank"', '<edge id="bank" function="normal"')
+    file.write_text(early, encoding="utf-8")
+    assert read_net(file).edges == read_net(NET).edges
+
+
+def test_what_a_network_lacks_is_named(tmp_path: Path) -> None:
+    text, file = NET.read_text(encoding="utf-8"), tmp_path / "torn.net.xml"
+    for torn, lacks in (
+        (re.sub(r'<net version="[^"]*"', "<net", text), "<net>: not a SUMO network: it lacks the attribute 'version'"),
+        (
+            text.replace('<edge id="bank"', '<edge id="banks"'),
+            "not a SUMO network: nothing before it has the id 'bank'",
+        ),
+    ):
+        file.write_text(torn, encoding="utf-8")
+        with pytest.raises(InputError, match=lacks):
+            read_net(file)

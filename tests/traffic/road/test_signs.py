@@ -118,3 +118,12 @@ def test_a_sign_over_a_lane_hangs_high_and_all_stand_at_the_height_of_their_road
     assert signs["low"].position[2] == pytest.approx(5 + 1.5)
     assert signs["over"].value == pytest.approx(20.0)
     assert signs["beside"].value == 72.0
+
+
+def test_in_a_network_of_footways_alone_signs_stand_at_their_height(tmp_path: Path) -> None:
+    net = tmp_path / "path.net.xml"
+    path = ONE_EDGE.format(location="").replace('"0,0 100,0"/', '"0,0,5 100,0,15" allow="pedestrian"/')
+    net.write_text(path, encoding="utf-8")
+    shape = '<poi id="s" type="fogsim.sign.stop" x="50" y="-8" angle="90"/>'
+    (sign,) = sign_map(read_net(net), [additional(tmp_path, shape)]).signs
+    assert sign.position[2] == pytest.approx(10 + 2.6)

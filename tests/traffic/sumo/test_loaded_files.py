@@ -6,8 +6,15 @@ from typing import Any
 
 import pytest
 
-from fogsim.errors import SimulationError
-from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.sumo.loaded_files import (
+    LoadedRoads,
+    check_step_length,
+    describe_seen,
+    loaded_additional,
+    loaded_net,
+)
+from tests.helpers.attached import GRID
 
 
 def simulation(step: float = 0.1, **options: str) -> Any:
@@ -38,3 +45,10 @@ def test_files_that_are_here_are_found(tmp_path: Path) -> None:
     assert loaded_additional(api) == (net,)
     with pytest.raises(SimulationError, match="there is no such file"):
         loaded_net(simulation(net_file="nowhere.net.xml"))
+
+
+def test_a_network_without_the_egos_way_is_refused() -> None:
+    roads = LoadedRoads(GRID / "grid.net.xml", ())
+    expected = r"grid\.net\.xml: the ego drives on edge 'A0B9', which this network does not have \(nearest: A0B0, "
+    with pytest.raises(InputError, match=expected):
+        roads.along(simulation(additional_files=""), ("A0B0", "A0B9"))

@@ -110,8 +110,10 @@ def test_changed_methods_and_files_that_they_read_are_refused(tmp_path: Path) ->
     shutil.copytree(Path(__file__).parents[1] / "data" / "grid", town)
     config = (town / "grid.sumocfg").read_text(encoding="utf-8")
     (town / "grid.sumocfg").write_text(config.replace("<input>", '<input><weight-files value="weights.xml"/>'))
-    adviser = "class Mine:\n    def advise(self, time, fog):\n        return None\n"
+    adviser = "import aids\nclass Mine:\n    def advise(self, time, fog):\n        return None\n"
     read = {"weights.xml": "<meandata/>", "edges.txt": "edge:A0A1", "range.json": "{}", "own.py": adviser}
+    read |= {"aids/__init__.py": "from .deep import x", "aids/deep.py": "x = 1"}
+    (town / "aids").mkdir()
     for name, content in read.items():
         (town / name).write_text(content)
     text = """
@@ -126,7 +128,7 @@ factors: {p: {mine: ['advice=own:Mine']}}
     StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
     for name, content in read.items():
         (town / name).write_text(content + "\n")
-        with pytest.raises(InputError, match=rf"{name.replace('.py', ':Mine')} was '[^']+' and is"):
+        with pytest.raises(InputError, match=rf"{'own:Mine' if name.endswith('.py') else name} was '[^']+' and is"):
             StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
         (town / name).write_text(content)
 

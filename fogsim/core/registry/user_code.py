@@ -201,13 +201,52 @@ def load_announced(point: metadata.EntryPoint) -> Any:
 
 
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:
-    """Version of a user's method: of its package, or a digest of its file; None for FogSim's methods."""
+    """Version of a user's method: of its package, or a digest of its sources; None for FogSim's methods."""
     if is_class_name(name):
-        return digest_of(module_file(name, folder))
+        return digest_of(*_sources(_match(name)["module"], module_file(name, folder), (folder or Path.cwd()).resolve()))
     point = announced(group).get(name)
     return None if point is None or point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
-def digest_of(file: Path) -> str:
-    """Version of a file: a digest of its content."""
-    return f"sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:16]}"
+def digest_of(*files: Path) -> str:
+    """Version of files: a digest of their content."""
+    return f"sha256:{hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()[:16]}"
+
+
+def _sources(module: str, file: Path, home: Path) -> list[Path]:
+    """File of a module, then all files of its folder that it imports, directly or not."""
+    sources = list(dict.fromkeys([file, *_files_of(module, home)]))
+    for source in sources:  # grows on the way
+        for level, name in _imported_names(source, source.stat().st_mtime_ns):
+            start = source.parents[level - 1] if 0 < level <= len(source.parents) else home
+            sources += [one for one in _files_of(name, start) if one not in sources]
+    return sources
+
+
+def _files_of(module: str, start: Path) -> list[Path]:
+    """Files of a module and its packages in a folder; without any if it is not from there."""
+    parts = module.split(".")
+    bases = [start.joinpath(*parts[:number]) for number in range(1, len(parts) + 1)]
+    return [
+        file for base in bases for file in (base / "__init__.py", base.with_name(f"{base.name}.py")) if file.is_file()
+    ]
+
+
+@functools.lru_cache
+def _imported_names(file: Path, _: int) -> tuple[tuple[int, str], ...]:
+    """Level (0 for absolute) and name of each import in a file, read again after the file has changed."""
+    try:
+        nodes = [*ast.walk(ast.parse(file.read_bytes(), str(file)))]
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+        return ()
+    plain = [(0, one.name) for node in nodes if isinstance(node, ast.Import) for one in node.names]
+    # What is imported from a package may be a module of it.
+    return (
+        *plain,
+        *(
+            (node.level, ".".join(filter(None, (node.module, one.name))))
+            for node in nodes
+            if isinstance(node, ast.ImportFrom)
+            for one in node.names
+        ),
+    )

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 from fogsim.core.files.atomic import write_json, write_text
@@ -14,7 +15,7 @@ from fogsim.openscenario import is_openscenario
 from fogsim.scenario.document import read_document
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
-from fogsim.traffic.road.configuration import input_files
+from fogsim.traffic.road.configuration import included_files, input_files, seldom_files
 
 _NAME_KEY = re.compile(r"^name:.*$", re.MULTILINE)
 
@@ -44,8 +45,13 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     traffic = old.traffic
     beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
+    further: tuple[Path, ...] = ()
     if traffic.config is not None and traffic.config not in outside:
-        beside += _configured_files(old.directory, traffic.config)
+        config = old.directory / traffic.config
+        beside += _in_folder(old.directory, input_files(config), config)
+        further = seldom_files(config)
+    included = included_files(old.directory / path for path in beside if path not in outside)
+    beside += _in_folder(old.directory, (*included, *further), scenario_file(source))
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
     foreign = read_document(scenario_file(source)).data.get("scenario")
@@ -68,13 +74,13 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     return (*made, folder / _SCHEMA_FILE)
 
 
-def _configured_files(directory: Path, config: Path) -> list[Path]:
-    """Files that a SUMO configuration names, as seen from the scenario's folder."""
-    named = [Path(os.path.relpath(path, directory)) for path in input_files(directory / config)]
+def _in_folder(directory: Path, files: Iterable[Path], source: Path) -> list[Path]:
+    """Files that `source` names, or others for it, as seen from the scenario's folder."""
+    named = [Path(os.path.relpath(path, directory)) for path in files]
     for path in named:
         if ".." in path.parts or not (directory / path).is_file():
             raise InputError(
-                f"{directory / config}: {shown(str(path))} is no file in the scenario's folder; copy it there, and "
-                "name it by its place there"
+                f"{source}: {shown(str(path))} is no file in the scenario's folder; copy it there, and name it by its "
+                "place there"
             )
     return named

@@ -130,6 +130,31 @@ def test_files_of_a_configuration_are_copied_or_refused(tmp_path):
     assert not (tmp_path / "third").exists()
 
 
+def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path):
+    old = tmp_path / "old"
+    old.mkdir()
+    for file in GRID.glob("grid.*"):
+        shutil.copy(file, old)
+    more = '<additional-files value="a.add.xml"/><gui-settings-file value="view.xml"/></input>'
+    text = (old / "grid.sumocfg").read_text()
+    (old / "grid.sumocfg").write_text(text.replace("</input>", more))
+    (old / "view.xml").write_text("<viewsettings/>")
+    (old / "more").mkdir()
+    (old / "a.add.xml").write_text('<additional><include href="more/b.add.xml"/></additional>')
+    (old / "more" / "b.add.xml").write_text(
+        '<additional><variableSpeedSign id="v" lanes="A0B0_0" file="v.xml"/></additional>'
+    )
+    (old / "more" / "v.xml").write_text('<vss><step time="0" speed="9"/></vss>')
+    text = "name: old\nduration_s: 5\ntraffic: {config: grid.sumocfg, ego: veh5}\nfog: {visibility_m: 100}\n"
+    (old / "scenario.yaml").write_text(text)
+    begin_scenario("new", str(old), tmp_path)
+    for name in ("view.xml", "a.add.xml", "more/b.add.xml", "more/v.xml"):
+        assert (tmp_path / "new" / name).read_text() == (old / name).read_text()
+    (old / "more" / "v.xml").unlink()
+    with pytest.raises(InputError, match=r"'more/v\.xml' is no file in the scenario's folder"):
+        begin_scenario("third", str(old), tmp_path)
+
+
 def test_a_scenario_of_openscenario_is_not_copied_as_yaml(tmp_path):
     file = ROOT / "tests" / "data" / "openscenario" / "slow_lead.xosc"
     with pytest.raises(InputError, match=r"expected a YAML scenario; begin one with the line scenario: FILE\.xosc"):

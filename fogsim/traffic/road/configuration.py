@@ -2,12 +2,12 @@
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from fogsim.core.files.xml_reader import read_tree, root_tag
+from fogsim.core.files.xml_reader import read_elements, read_tree, root_tag
 from fogsim.errors import InputError
 from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, unsafe_option
 
@@ -30,6 +30,15 @@ _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
 _ROUTES = ("route-files", "routes", "r")
 _FURTHER = (*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state")
+_SELDOM = (
+    *("gui-settings-file", "g", "alternative-net-file", "N", "edgedata-files", "data-files", "m", "selection-file"),
+    *("device.fcd-replay.files", "device.fcd-replay.file", "device.ssm.filter-edges.input-file"),
+    *("astar.all-distances", "astar.landmark-distances"),
+)
+"""Files that do not decide a run, but without some of which SUMO does not start."""
+_READ_BY = frozenset(("rerouter", "variableSpeedSign"))
+"""Elements whose attribute ``file`` is one that SUMO reads."""
+_MOST_BYTES = 50_000_000  # of a file that may name others
 _OPENING = ("load-state", "scale")
 _REROUTING = "device.rerouting"
 _SEPARATORS = re.compile(r"[,;\s]+")
@@ -147,6 +156,39 @@ def is_configured(config: Path, option: str) -> bool:
 def input_files(config: Path) -> tuple[Path, ...]:
     """Every file that a SUMO configuration makes SUMO read: network, routes, additional, weights, state."""
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
+
+
+def seldom_files(config: Path) -> tuple[Path, ...]:
+    """Further files that a SUMO configuration names, such as settings of its window, as far as they are there."""
+    return tuple(path for path in _named(config, _root(config), _SELDOM) if path.is_file())
+
+
+def included_files(files: Iterable[Path]) -> tuple[Path, ...]:
+    """Files that route and additional files name for SUMO to read, and those that these name in turn."""
+    found = list(files)
+    given = len(found)
+    for path in found:
+        reader = _FileNames(path.parent)
+        if path.is_file():
+            read_elements(path, reader, _MOST_BYTES)
+        found += [name for name in dict.fromkeys(reader.found) if name not in found]
+    return tuple(found[given:])
+
+
+class _FileNames:
+    is_done = False
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.found: list[Path] = []
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        name = attributes.get("href" if tag == "include" else "file" if tag in _READ_BY else "", "")
+        if name:
+            self.found.append(self._folder / expanded(name))
+
+    def end(self, tag: str) -> None:
+        pass
 
 
 def _root(config: Path) -> Element:

@@ -340,5 +340,15 @@ def test_an_ego_that_never_came_is_told_at_the_end(libsumo: Any) -> None:
     session.close()
 
 
+def test_an_ego_that_is_a_person_is_told(libsumo: Any) -> None:
+    libsumo.person.add("ped", "A0B0", 5.0)
+    libsumo.person.appendWaitingStage("ped", 100.0)
+    session = fogsim.attach(libsumo, ego="ped", visibility=120.0)
+    libsumo.simulationStep()
+    assert session.observe() is None
+    with pytest.warns(UserWarning, match=r"ego 'ped' did not appear .*: it is a person; name a vehicle"):
+        session.close()
+
+
 def test_a_session_that_never_looked_says_nothing(libsumo: Any) -> None:
     fogsim.attach(libsumo, ego="vehicle3", visibility=120.0).close()

@@ -91,6 +91,8 @@ def demand_mistakes(document: Document, scenario: ScenarioFile, made: TrafficFil
     demand = _demand(scenario, made, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
     asked = (*named.items(), *watched)
     mistakes = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
+    on_foot = "{} is a person, and only a vehicle can be named here"
+    mistakes |= {at: on_foot.format(shown(vehicle)) for at, vehicle in named.items() if vehicle in demand.persons}
     edges = _edges(scenario, made, demand)
     if edges is not None:
         places = {vehicle: at for at, vehicle in reversed(named.items())}
@@ -175,6 +177,8 @@ def _named_signals(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
 
 def _unknown_vehicle(vehicle: str, demand: Demand) -> str:
     files = ", ".join(file.name for file in demand.files[:_MOST_SHOWN])
+    if not files:
+        return f"there is no vehicle {shown(vehicle)}: no route file is named"
     return f"there is no vehicle {shown(vehicle)} in {files}; {_suggested(vehicle, demand.names)}"
 
 

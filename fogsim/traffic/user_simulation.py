@@ -105,6 +105,9 @@ class AttachedTraffic(SumoTraffic):
 
     def absence(self) -> str:
         """Say that the ego has not been on the road so far, and who has."""
+        with contextlib.suppress(SimulationError), self._attached.translated_errors():
+            if self.ego in self._api.person.getIDList():
+                return f"the ego {self.ego!r} did not appear while FogSim was attached: it is a person; name a vehicle"
         return f"the ego {self.ego!r} did not appear while FogSim was attached; {describe_seen(self.ego, self._seen)}"
 
     def release(self) -> None:

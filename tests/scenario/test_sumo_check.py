@@ -119,3 +119,21 @@ def test_an_advised_stretch_lies_on_the_egos_route() -> None:
         InputError, match=r"advised_stretch\.start_m: the stretch begins beyond .* 5501 m long; got 5600"
     ):
         load_scenario("motorway_fog_bank", ["drivers.advised=stretch", stretch])
+
+
+def test_a_person_is_no_ego(tmp_path: Path) -> None:
+    rows = '<person id="ego" depart="0"><walk from="A0B0" to="B0C0"/></person>'
+    shutil.copy(GRID.with_name("grid.net.xml"), tmp_path)
+    config = tmp_path / "foot.sumocfg"
+    files = '<net-file value="grid.net.xml"/><route-files value="a.rou.xml"/>'
+    config.write_text(f"<configuration>{files}</configuration>", encoding="utf-8")
+    (tmp_path / "a.rou.xml").write_text(f"<routes>{rows}</routes>", encoding="utf-8")
+    with pytest.raises(InputError, match=r"traffic\.ego: 'ego' is a person, and only a vehicle can be named here$"):
+        scenario_from_config(config, "ego", ["fog.visibility_m=120"])
+    # A vehicle may have the id of a person.
+    trip = '<trip id="ego" depart="1" from="A0B0" to="B0C0"/>'
+    (tmp_path / "a.rou.xml").write_text(f"<routes>{rows}{trip}</routes>", encoding="utf-8")
+    assert scenario_from_config(config, "ego", ["fog.visibility_m=120"]).traffic.ego == "ego"
+    config.write_text('<configuration><net-file value="grid.net.xml"/></configuration>', encoding="utf-8")
+    with pytest.raises(InputError, match=r"there is no vehicle 'ego': no route file is named$"):
+        scenario_from_config(config, "ego", ["fog.visibility_m=120"])

@@ -116,7 +116,7 @@ class Demand:
 
     `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `_MOST_NAMES` ids
     in file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
-    those that were not found.
+    those that were not found. `persons` are found ones that no vehicle shares its id with.
     """
 
     files: tuple[Path, ...]
@@ -124,6 +124,7 @@ class Demand:
     names: tuple[str, ...]
     routes: Mapping[str, VehicleRoute]
     is_open: bool
+    persons: frozenset[str] = frozenset()
 
     def lacks(self, vehicle: str) -> bool:
         """Whether a wanted vehicle can never come."""
@@ -170,6 +171,8 @@ class _DemandReader:
         self._wanted = wanted
         self._reroutes = reroutes
         self._found: set[str] = set()
+        self._persons: set[str] = set()
+        self._vehicles: set[str] = set()
         self._names: list[str] = []
         self._named_routes: dict[str, tuple[str, ...]] = {}
         self._routes: dict[str, VehicleRoute] = {}
@@ -177,21 +180,22 @@ class _DemandReader:
 
     @property
     def is_done(self) -> bool:
-        return self.is_open or (self._found == self._wanted and not self._inside[0])
+        # A vehicle may come under the id of a person.
+        is_found = self._found == self._wanted and self._persons <= self._vehicles
+        return self.is_open or (is_found and not self._inside[0])
 
     def demand(self, files: tuple[Path, ...]) -> Demand:
         routes = {} if self._reroutes or self.is_open else self._routes
-        return Demand(files, frozenset(self._found), tuple(self._names), routes, self.is_open)
+        persons = frozenset(self._persons - self._vehicles)
+        return Demand(files, frozenset(self._found), tuple(self._names), routes, self.is_open, persons)
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag in {"vehicle", "trip"}:
+        if tag in {"vehicle", "trip", "person"}:
             self._take(attributes, (attributes.get("id", ""),))
-        elif tag == "flow":
+            (self._persons if tag == "person" else self._vehicles).update(self._inside[0])
+        elif tag in {"flow", "personFlow"}:
             self._take_flow(attributes)
-        elif tag == "person":
-            self._take(attributes, (attributes.get("id", ""),))
-        elif tag == "personFlow":
-            self._take_flow(attributes)
+            (self._vehicles if tag == "flow" else self._persons).update(self._inside[0])
         elif tag == "route":
             self._take_route(attributes)
         elif tag == "routeDistribution":

@@ -84,8 +84,15 @@ class LibsumoLink:
 
     def step(self) -> None:
         """Move the simulation by one step; see `SumoLink.step`."""
-        if self._sumo is not None:
+        if self._sumo is None:
+            return
+        try:
             self._sumo.simulationStep()
+        except self._sumo.FatalTraCIError as error:
+            if not self._sumo.isLoaded():
+                raise
+            # SUMO reads vehicles while it runs, and finds mistakes in them only then.
+            raise SimulationError(f"SUMO cannot go on: {error}") from error
 
     def end(self) -> None:
         """End the simulation; see `SumoLink.end`."""

@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fogsim.conditions.route_places import Extent, Route, RoutePlace, extent_of
 from fogsim.values import Step, TrafficState, TrafficStep
@@ -58,14 +58,34 @@ EGO = "ego"
 """Name of the ego in conditions, whatever its id."""
 
 
+_FARTHEST_STEP = 50.0  # Farthest that vehicles come in a step [m]; positions along a closed route jump farther
+
+
+@dataclass(frozen=True, slots=True)
+class _Memory:
+    """What moments have of earlier ones."""
+
+    driven: dict[str, tuple[float, float, float]] = field(
+        default_factory=dict
+    )  # x, y [m] and way so far [m] by vehicle
+    # Time of the latest step [s], and distances in it and in the one before [m], by pair of points
+    signed: dict[tuple[str, ...], tuple[float, float, float]] = field(default_factory=dict)
+
+
 class Moment:
     """One step of a run, with the collided pairs and begun and ended entries so far; positions count along `route`."""
 
     def __init__(
-        self, step: TrafficStep, collisions: set[tuple[str, str]], begun: set[str], ended: set[str], route: Route | None
+        self,
+        step: TrafficStep,
+        collisions: set[tuple[str, str]],
+        begun: set[str],
+        ended: set[str],
+        route: Route | None,
+        memory: "_Memory",
     ) -> None:
         self.step, self.collisions, self.begun, self.ended = step, collisions, begun, ended
-        self._route = route
+        self._route, self._memory = route, memory
         self._places: dict[str, RoutePlace | None] = {}
         self._by_row: dict[int, RoutePlace | None] = {}
 
@@ -95,12 +115,31 @@ class Moment:
         step = self.ego_step
         if step is not None and self.row(vehicle) == step.ego:
             return step.route_position
-        place = self._place(vehicle)
+        place = self.place(vehicle)
         return None if place is None else place.front
+
+    def driven(self, vehicle: str) -> float | None:
+        """Distance that a vehicle has driven since the first moment that was asked [m]; None if it is not there."""
+        row = self.row(vehicle)
+        if row is None:
+            return None
+        x, y = map(float, self.traffic.position[row, :2])
+        last_x, last_y, so_far = self._memory.driven.get(vehicle, (x, y, 0.0))
+        so_far += math.dist((x, y), (last_x, last_y))
+        self._memory.driven[vehicle] = x, y, so_far
+        return so_far
+
+    def nearest(self, pair: tuple[str, ...], signed: float) -> float:
+        """Least distance [m] since the step before, from the present one, which has another sign on the other side."""
+        time, now, before = self._memory.signed.get(pair, (-math.inf, signed, signed))
+        before = before if time == self.step.time else now
+        self._memory.signed[pair] = self.step.time, signed, before
+        is_passed = before * signed < 0.0 and abs(before) + abs(signed) < _FARTHEST_STEP
+        return 0.0 if is_passed else abs(signed)
 
     def extent(self, vehicle: str) -> Extent | None:
         """The part of the route that a vehicle covers; None if it is not on it."""
-        row, place = self.row(vehicle), self._place(vehicle)
+        row, place = self.row(vehicle), self.place(vehicle)
         return None if row is None or place is None else extent_of(place, self.traffic, row)
 
     def curvature(self, vehicle: str) -> float | None:
@@ -109,7 +148,8 @@ class Moment:
         place = None if row is None or route is None else self._on_route(route, row)
         return None if route is None or place is None else route.curvature(place.front)
 
-    def _place(self, vehicle: str) -> RoutePlace | None:
+    def place(self, vehicle: str) -> RoutePlace | None:
+        """Place of a vehicle's front bumper along the route; None if it is not on it."""
         if vehicle not in self._places:
             self._places[vehicle] = self._located(vehicle)
         return self._places[vehicle]
@@ -142,6 +182,7 @@ class History:
         self._begun: set[str] = set()
         self._ended: set[str] = set()
         self._route: Route | None = None
+        self._memory = _Memory()
 
     def moment(self, step: TrafficStep) -> Moment:
         """Add the next step and return its moment."""
@@ -151,4 +192,4 @@ class History:
         points = step.truth.route
         if points is not None and len(points) > 1 and (self._route is None or self._route.points is not points):
             self._route = Route(points)
-        return Moment(step, self._collisions, self._begun, self._ended, self._route)
+        return Moment(step, self._collisions, self._begun, self._ended, self._route, self._memory)

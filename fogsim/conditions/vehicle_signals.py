@@ -121,6 +121,15 @@ def _straight_distance(
     return math.dist(first.behind(parse_quantity(behind, "m")), second.behind(parse_quantity(other_behind, "m")))
 
 
+def _distance_along(moment: Moment, one: str, other: str, behind: str, other_behind: str) -> float | None:
+    first, second = moment.place(one), moment.place(other)
+    if first is None or second is None:
+        return None
+    at = first.front - parse_quantity(behind, "m") * first.along
+    signed = second.front - parse_quantity(other_behind, "m") * second.along - at
+    return moment.nearest((one, other, behind, other_behind), signed)
+
+
 def _distance_to(moment: Moment, vehicle: str, behind: str, x: str, y: str) -> float | None:
     if (body := _body(moment, vehicle)) is None:
         return None
@@ -157,6 +166,11 @@ OF_VEHICLES = {
         places=_VEHICLE,
         needs=_ROUTE,
     ),
+    "X.driven": length_signal(
+        "distance that a vehicle has driven since the run began, or since it came onto the road",
+        lambda m, x: m.driven(x),
+        places=_VEHICLE,
+    ),
     "X.lane": Signal(
         "lane counted from the right, from 0; or `right` and `left`, the outermost ones",
         _lane,
@@ -184,6 +198,12 @@ OF_VEHICLES = {
         "straight distance between the points that are a length behind each one's front bumper",
         _straight_distance,
         places=(*_PAIR_AND_LENGTH, Place.LENGTH),
+    ),
+    "distance_along(X, Y, LENGTH, LENGTH)": length_signal(
+        "the same along the route, whatever the lane: 0 also when they have passed since the step before",
+        _distance_along,
+        places=(*_PAIR_AND_LENGTH, Place.LENGTH),
+        needs=_ROUTE,
     ),
     "distance_to(X, LENGTH, LENGTH, LENGTH)": length_signal(
         "straight distance between the point that is a length behind X's front bumper and the place x, y of the map",

@@ -5,6 +5,7 @@ from typing import Any
 
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
+from fogsim.openscenario.positions import vertices_of
 from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
@@ -51,7 +52,8 @@ class Actions(LateralActions):
         for actor in actors:
             across = actor in self.positions.against and action.tag in _ACROSS
             with action.refusing():
-                if actor in self.positions.off_lanes and not across and action.tag not in _ANYWHERE:
+                is_led = across or (actor in self.positions.paths and action.tag == "SynchronizeAction")
+                if actor in self.positions.off_lanes and not is_led and action.tag not in _ANYWHERE:
                     raise ValueError(f"{actor} is on no lane, or turned on one: {', '.join(_ANYWHERE)} move it")
                 if effect.do.get(actor, {}).keys() & orders:
                     raise ValueError(f"another action of this event orders the motion of {actor} as well")
@@ -182,7 +184,7 @@ class Actions(LateralActions):
         effect.add(actor, follow={"vehicle": other.named, "headway_s": headway, "gap_m": distance - further})
 
     def synchronize_action(self, action: Node, actor: str, effect: Effect) -> None:
-        """`arrive`: at its target when another vehicle is at its own, each on the way that it has from `Init` on."""
+        """`arrive`: at its target when another vehicle is at its own, each on its way or trajectory from `Init` on."""
         master, final = self.vehicles.of(action, "masterEntityRef"), action.one("FinalSpeed")
         place, begins = self._on_the_way(action.need("TargetPosition"), actor)
         its_place, its_begins = self._on_the_way(action.need("TargetPositionMaster"), master.name)
@@ -193,13 +195,18 @@ class Actions(LateralActions):
             is_factor = is_relative and speed.word("speedTargetValueType", ("delta", "factor")) == "factor"
             arrive["to_kmh"] = 0.0 if is_factor else value * KMH_PER_MPS
             arrive["factor"] = value if is_factor else float(is_relative)
+            for steady, key in (("Distance", "steady_m"), ("Time", "steady_s")):
+                if (node := speed.one(f"Target{steady}SteadyState")) is not None:
+                    arrive[key] = node.number(steady.lower())
         near = action.number("targetToleranceMaster", 0.0)
         effect.has_unknown_end |= master.named != "ego"
         effect.ends.append(f"ego.position >= {its_place - near + master.front:.3f} m")
         effect.add(actor, arrive=arrive)
 
     def _on_the_way(self, position: Node, vehicle: str) -> tuple[float, float]:
-        """Where on a vehicle's way a position is, and where it begins [m]; ValueError unless that is behind."""
+        """Where on a vehicle's way or path a position is, and where it begins [m]; ValueError unless that is behind."""
+        if vehicle in self.positions.paths:
+            return self.positions.along_path(position, vehicle), 0.0
         begins, way = self.spots.get(vehicle), self.positions.ways.get(vehicle, ())
         if begins is None or not way:
             raise ValueError(f"{vehicle} has no way along lanes")
@@ -220,7 +227,7 @@ class Actions(LateralActions):
     def follow_trajectory_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`path`: a polyline, by its times or at the vehicle's speed, on the lanes or off them."""
         trajectory = self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory")
-        vertices = trajectory.need("Shape").need("Polyline").some("Vertex")
+        vertices = vertices_of(trajectory)
         places = [one.need("Position") for one in vertices]
         mode = action.one("TrajectoryFollowingMode") or action
         mode.word("followingMode", ("position", "follow"), "follow")
@@ -247,8 +254,8 @@ class Actions(LateralActions):
             effect.has_unknown_end |= origin != "map" or math.dist(points[0][:2], (x, y)) < 2.0 * _AT_THE_END
             end = f"distance_to({self.vehicles[actor].called}, {vehicle.front:g} m, {x:.3f} m, {y:.3f} m)"
             effect.ends.append(f"{end} < {_AT_THE_END} m")
-        if trajectory.flag("closed"):
-            raise ValueError("closed: write the first vertex again as the last one, and false")
+            if effect.is_at_start:
+                self.positions.paths[actor] = [(x, y) for x, y, *_ in points]
         effect.add(actor, path=path)
 
     def _own_points(self, places: list[Node], actor: str, effect: Effect) -> tuple[str, list[list[float]]] | None:

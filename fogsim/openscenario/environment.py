@@ -142,6 +142,7 @@ _BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear
     (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
 )
 _BRIGHTEST = 200_000.0
+_MOONLIGHT = 0.3  # The most that the full moon gives [lx] (Kyba et al., Astronomy & Geophysics 58, 2017)
 _DARKEST = 0.001  # Of a clear day, under any clouds
 _STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
@@ -195,6 +196,9 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> flo
         if given == "intensity" and lux <= 1.0:
             sun.remark(f"{message}; read as the share of the sky without clouds")
             return through_clouds(clear, 8.0 * (1.0 - lux))
+        if given == "illuminance" and lux <= _MOONLIGHT:
+            sun.remark(f"{message}; read as a moon there")
+            return lux
         sun.refuse(f"{message}; expected some {clear:.0f} lx")
     return min(max(lux, 0.0), _BRIGHTEST)
 

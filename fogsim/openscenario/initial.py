@@ -25,6 +25,7 @@ class Beginning:
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
+    aims: dict[str, float] = field(default_factory=dict)  # Speeds that the ego comes to in the beginning [m/s]
     _distances: list[tuple[str, Node]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -166,8 +167,9 @@ class Beginning:
         self.effect.routes.update(effect.routes)
         done = effect.do.get(name, {})
         speed, leader = done.pop("speed", None), self._of_name(done.get("follow", {}).get("vehicle", ""))
-        if speed is not None:
-            # At the start there is no earlier speed to change from.
+        if speed is not None and speed.keys() & {"over_s", "rate_mps2", "profile"}:
+            self._come_to(name, speed, effect.lasts)
+        elif speed is not None:
             self.orders[name] = speed
             if speed.get("continuous"):
                 self.effect.add(name, speed={**speed, "shape": "step"})
@@ -175,6 +177,18 @@ class Beginning:
             action.refuse(f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
         if done:
             self.effect.add(name, **done)
+
+    def _come_to(self, name: str, speed: dict[str, Any], lasts: float) -> None:
+        """Let a vehicle come to a speed from standstill, or an earlier order; the ego's driver drives on from there."""
+        first = speed.get("profile", [(1.0, 0.0)])[0]
+        if first[0] == 0.0:
+            self.orders[name] = {"to_kmh": first[1]}
+        final = speed["profile"][-1][1] if "profile" in speed else speed.get("to_kmh")
+        if name == self.vehicles.ego and final is not None:
+            self.aims[name] = final / KMH_PER_MPS
+            lasts = lasts or abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
+            speed = {**speed, "for_s": max(lasts, 0.1)}
+        self.effect.add(name, speed=speed)
 
     def _at_distance(self, action: Node, name: str) -> Spot:
         """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fogsim.openscenario.positions import Positions, road_of, sense
@@ -38,6 +38,17 @@ class Effect:
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
+
+    def part(self) -> "Effect":
+        """Effect of one of several actions: it does all of it, and its end is its own; `join` adds the end."""
+        return replace(self, lasts=0.0, ends=[], ends_itself=False, is_endless=False, has_unknown_end=False)
+
+    def join(self, part: "Effect") -> None:
+        """Last as long as a part, too."""
+        self.lasts, self.ends = max(self.lasts, part.lasts), [*self.ends, *part.ends]
+        self.ends_itself |= part.ends_itself
+        self.is_endless |= part.is_endless
+        self.has_unknown_end |= part.has_unknown_end
 
     @property
     def moves(self) -> bool:

@@ -25,7 +25,8 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.Mod: operator.mod,
 }
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
-    **{one.__name__: one for one in (round, math.floor, math.ceil, math.sqrt, abs, math.pow, min, max)},
+    **{one.__name__: one for one in (math.floor, math.ceil, math.sqrt, abs, math.pow, min, max)},
+    "round": lambda x: math.copysign(math.floor(abs(x) + 0.5), x),  # Halves away from 0
     "sign": lambda x: float((x > 0) - (x < 0)),
 }
 _CONSTANTS = {"pi": math.pi, "true": True, "false": False}
@@ -155,7 +156,8 @@ class Catalogs:
     def __post_init__(self) -> None:
         locations = self.root.one("CatalogLocations")
         for kind in locations.all(*(f"{kind}Catalog" for kind in _LOCATED)) if locations else ():
-            self._places += [self.root.file.parent / place.get("path") for place in kind.all("Directory")]
+            paths = (place.get("path").replace("\\", "/") for place in kind.all("Directory"))
+            self._places += [self.root.file.parent / path for path in paths]
 
     def entry(self, reference: Node) -> Node:
         """The element of a ``CatalogReference``, with its parameters, below it from then on; NodeError if missing."""

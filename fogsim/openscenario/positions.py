@@ -11,6 +11,7 @@ from fogsim.openscenario.xml_tree import REFUSED, Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any
+_ON_PATH = 0.5  # Distance up to which a position is on a path [m]
 ALONG = math.cos(0.3)  # Of the angle to a lane at which a vehicle still stands along it
 
 
@@ -28,6 +29,7 @@ class Positions:
     against: dict[str, Spot] = field(default_factory=dict)  # Of those off the lanes that drive against one
     moving: set[str] = field(default_factory=set)  # Vehicles that are elsewhere later
     rerouted: set[str] = field(default_factory=set)  # Vehicles that get another way
+    paths: dict[str, list[tuple[float, float]]] = field(default_factory=dict)  # That vehicles follow from the start [m]
 
     def refers_to(self, position: Node) -> str | None:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
@@ -53,7 +55,8 @@ class Positions:
 
     def along_way(self, position: Node, way: tuple[str, ...]) -> float:
         """How far along a way a ``Position`` is, also inside a junction if it is on a route [m]; ValueError if not."""
-        inner = position.within("RoutePosition", "InRoutePosition", "FromLaneCoordinates")
+        inside = position.within("RoutePosition", "InRoutePosition")
+        inner = inside.one("FromLaneCoordinates", "FromRoadCoordinates") if inside else None
         reference, edges = position.within("RoutePosition", "RouteRef"), tuple[str, ...]()
         if inner and reference:
             (spot, edges), further = self.route(reference), inner.number("pathS")
@@ -63,6 +66,23 @@ class Positions:
         if not {spot.lane.edge, *edges} <= {*way}:
             raise ValueError(f"{position.tag}: it is not on the way of its vehicle")
         return self.lanes.starts(way)[way.index(spot.lane.edge)] + spot.position + further
+
+    def along_path(self, position: Node, vehicle: str) -> float:
+        """How far along a vehicle's path a ``Position`` is [m]; ValueError if it is off the path."""
+        x, y, *_ = self.point(position)
+        feet, so_far = [], 0.0
+        for (from_x, from_y), (to_x, to_y) in itertools.pairwise(self.paths[vehicle]):
+            dx, dy = to_x - from_x, to_y - from_y
+            length = math.hypot(dx, dy) or 1.0
+            along = min(max(((x - from_x) * dx + (y - from_y) * dy) / length, 0.0), length)
+            feet.append(
+                (math.dist((x, y), (from_x + along * dx / length, from_y + along * dy / length)), so_far + along)
+            )
+            so_far += math.hypot(dx, dy)
+        away, place = min(feet)
+        if away > _ON_PATH:
+            raise ValueError(f"{position.tag}: it is {away:.1f} m from the trajectory of {vehicle}")
+        return place
 
     def along_ego(self, what: Vehicle | Node) -> float | None:
         """Position along the ego's route of a vehicle's front bumper at first, or a ``Position``; None off it [m]."""
@@ -153,18 +173,41 @@ class Positions:
         road, (x, y, _), ds, dt = road_of(spot), spot.world, node.number("ds"), node.number("dt")
         if road not in self.lanes.roads:
             raise ValueError(f"{node.get('entityRef')} is on no road of an OpenDRIVE file")
-        s = self.lanes.roads[road].nearest(x, y)
-        middle_x, middle_y, along = self.lanes.roads[road].at(s)
+        middle_x, middle_y, along = self.lanes.roads[road].at(self.lanes.roads[road].nearest(x, y))
         t = (y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along)
-        return self.lanes.across(road, s + ds, t + dt)
+        return self._across(spot, ds, t + dt)
+
+    def trajectory_position(self, node: Node) -> Point:
+        """So far (`s`) along a polyline, and `t` to its left."""
+        vertices = vertices_of(self.catalogs.need(node.need("TrajectoryRef"), "Trajectory"))
+        for one in vertices:
+            one.get("time")
+        points = [self.point(one.need("Position"))[:2] for one in vertices]
+        left, t = node.number("s"), node.number("t", 0.0)
+        for (x, y), (to_x, to_y) in itertools.pairwise(points):
+            length, heading = math.dist((x, y), (to_x, to_y)), math.atan2(to_y - y, to_x - x)
+            if left <= length:
+                cosine, sine = math.cos(heading), math.sin(heading)
+                return x + left * cosine - t * sine, y + left * sine + t * cosine, heading
+            left -= length
+        raise ValueError(f"s: it lies {left:.1f} m beyond the end of the trajectory")
+
+    def _across(self, spot: Spot, ds: float, t: float) -> Point:
+        """The point `ds` farther along a place's road, and `t` across it [m]; ValueError without such a road."""
+        road, (x, y, _) = road_of(spot), spot.world
+        if road not in self.lanes.roads:
+            raise ValueError("there is no road of an OpenDRIVE file there")
+        return self.lanes.across(road, self.lanes.roads[road].nearest(x, y) + ds, t)
 
     def route_position(self, node: Node) -> Spot | Point:
-        """So far along a route from its first waypoint, on the lane of `laneId`; or where an entity is."""
-        inner = node.need("InRoutePosition").need("FromLaneCoordinates", "FromCurrentEntity")
+        """So far along a route from its first waypoint, on the lane of `laneId`, or at `t`; or where an entity is."""
+        inner = node.need("InRoutePosition").need("FromLaneCoordinates", "FromRoadCoordinates", "FromCurrentEntity")
         first, edges = self.route(node.need("RouteRef"))
         if inner.tag == "FromCurrentEntity":
             return self._place_of(inner)
         spot, lane = self.lanes.along(first, inner.number("pathS"), edges), inner.get("laneId")
+        if inner.tag == "FromRoadCoordinates":
+            return self._across(spot, 0.0, inner.number("t"))
         for one in self.lanes.lanes:
             if one.edge == spot.lane.edge and any(origin.endswith(f"_{lane}") for origin in one.origins):
                 return self._shifted(Spot(one, spot.position * one.length / spot.lane.length), inner, "laneOffset")
@@ -195,6 +238,13 @@ class Positions:
             return spot.shifted(offset)
         except ValueError:
             return replace(spot, offset=offset).world
+
+
+def vertices_of(trajectory: Node) -> list[Node]:
+    """Vertices of a ``Trajectory``; ValueError if it is closed or no polyline."""
+    if trajectory.flag("closed"):
+        raise ValueError("closed: write the first vertex again as the last one, and false")
+    return trajectory.need("Shape").need("Polyline").some("Vertex")
 
 
 def sense(spot: Spot) -> float:

@@ -208,7 +208,7 @@ def _vehicles_text(begin: Beginning) -> str:
                 # Exactly where the file has it, however near to the next vehicle.
                 "insertionChecks": "none",
             }
-        own = _type(vehicle, speed, front.lane.limit if front else math.inf)
+        own = _type(vehicle, begin.aims.get(name, speed), front.lane.limit if front else math.inf)
         own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [

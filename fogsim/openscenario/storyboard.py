@@ -36,6 +36,7 @@ class Entry:
     actors: list[str]
     names: list[str] = field(default_factory=list)
     effect: Effect = field(default_factory=Effect)
+    parts: dict[int, Effect] = field(default_factory=dict)  # Of several actions, by the identity of their elements
     trigger: Trigger = NEVER
 
 
@@ -50,7 +51,7 @@ class Storyboard:
     initial: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables that Init sets
     _begins: dict[int, Trigger] = field(default_factory=dict)
     _stops: dict[int, str] = field(default_factory=dict)  # Names of entries that stop acts
-    _over_marks: dict[str, list[str]] = field(default_factory=dict)  # Conditions that entries have been over
+    _over_marks: dict[tuple[str, int], list[str]] = field(default_factory=dict)  # Conditions that these have been over
     _stories: list[Node] = field(default_factory=list)
     _acts: list[Node] = field(default_factory=list)
     _never: list[Node] = field(default_factory=list)  # Acts and events that never begin
@@ -102,8 +103,12 @@ class Storyboard:
             taken = {name for one in self.entries.values() for name in one.names}
             entry.names.append(_free_name(entry.node.get("name"), {*taken, *entry.names}))
         self.entries[id(entry.node)] = entry
-        for action in entry.node.all("Action"):
-            self.actions.take(action, entry.actors, entry.effect)
+        actions = entry.node.all("Action")
+        for action in actions:
+            self.actions.take(action, entry.actors, part := entry.effect.part())
+            entry.effect.join(part)
+            if len(actions) > 1:
+                entry.parts[id(action)] = part
 
     def timeline(self) -> list[TimelineEntry]:
         """Entries of the timeline, each with its element."""
@@ -257,14 +262,13 @@ class Storyboard:
         return self._begins[id(act)]
 
     def _over(self, part: Node) -> Trigger:
-        if part.tag == "Action" and len(part.above.all("Action") if part.above else ()) > 1:
-            raise NodeError(part, "when one of several actions of an event is over is not known; name the event")
         inside = {id(one) for one in part.walk()}
         inside |= {id(self._entry(part).node)} if part.tag == "Action" else set()
         phrases = []
         for act in self._acts:
             entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
-            joined = _joined((self._played(one, one.names[-1]) for one in entries), " and ")
+            ends = ((one, one.names[-1], one.parts.get(id(part), one.effect)) for one in entries)
+            joined = _joined((self._played(*end) for end in ends), " and ")
             if len(joined) > 1:
                 joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
             phrase = " and ".join(joined)
@@ -272,8 +276,8 @@ class Storyboard:
             phrases += [f"(({phrase}) or happened({stop}))" if stop else phrase] * bool(entries)
         return Trigger(" and ".join(phrases)) if phrases else AT_ONCE
 
-    def _played(self, entry: Entry, name: str) -> str:
-        effect, phrase = entry.effect, f"happened({name})"
+    def _played(self, entry: Entry, name: str, effect: Effect | None = None) -> str:
+        effect, phrase = effect or entry.effect, f"happened({name})"
         if effect.has_unknown_end:
             message = "when a trajectory without times or places is over is not known"
             entry.node.refuse(f"{message}; nor is the end of a relative speed by rate")
@@ -284,13 +288,14 @@ class Storyboard:
         elif effect.lasts > 0.0:
             phrase = f"{phrase} for {effect.lasts:g} s"
         own = [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
-        if name not in self._over_marks:
+        key = name, id(effect)
+        if key not in self._over_marks:
             overridden = self._overridden(entry)
             # What is over stays over.
             parts = [*own, *overridden] if effect.ends or overridden else []
             marks = [self._mark(entry.node, f"{name}_over", Trigger(one)) for one in _joined(parts, " or ")]
-            self._over_marks[name] = marks
-        parts = [*own, *self._over_marks[name]] or ["time < 0 s"]
+            self._over_marks[key] = marks
+        parts = [*own, *self._over_marks[key]] or ["time < 0 s"]
         return parts[0] if len(parts) == 1 else f"({' or '.join(parts)})"
 
     def _entry(self, part: Node) -> Entry:

@@ -13,6 +13,7 @@ from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
+_TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
 NEAR = 0.05  # Difference up to which speeds are equal [m/s]
 STEP = "0.001 s"  # Less than a camera period: what is delayed by it was so one step before
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
@@ -149,8 +150,11 @@ class Triggers:
         return self._compared(node, f"{one.called}.speed", "m/s")
 
     def acceleration_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`X.acceleration`."""
-        return self._compared(node, f"{one.called}.acceleration", "m/s²")
+        """`X.acceleration` along the heading; without `direction` either way, unless the value is below 0."""
+        signal, rule, value = self._compared(node, f"{one.called}.acceleration", "m/s²")
+        if node.get("direction") or value.startswith("-"):
+            return signal, rule, value
+        return (f"{signal} {rule} {value} {'or' if rule[0] == '>' else 'and'} {signal} {_TURNED[rule]} -{value}",)
 
     def relative_speed_condition(self, node: Node, one: Vehicle) -> _Test:
         """`speed_difference(X, Y)`."""
@@ -163,11 +167,8 @@ class Triggers:
         return (f"{one.called}.speed < {_STILL} m/s" + (f" for {duration:g} s" if duration > 0.0 else ""),)
 
     def traveled_distance_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`X.position`, from where the vehicle begins; it must begin on the ego's route."""
-        begin = self.positions.along_ego(one)
-        if begin is None:
-            raise ValueError(f"{one.name} does not begin on the ego's route, along which FogSim measures")
-        return f"{one.called}.position", ">=", f"{begin + node.number('value'):.3f} m"
+        """`X.driven`."""
+        return f"{one.called}.driven", ">=", f"{node.number('value'):.9g} m"
 
     def end_of_road_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.position` at the end of the ego's road, or of its route."""
@@ -176,21 +177,18 @@ class Triggers:
         return (f"{one.called}.position >= {self.end:.3f} m",)
 
     def relative_distance_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`gap(X, Y)`, ahead or behind; straight `clearance(X, Y)`; without `freespace` between rear axles."""
+        """`gap(X, Y)` either way; straight `clearance(X, Y)`; without `freespace` `distance_along` or `distance`."""
         other, is_along, is_free = self.positions.vehicles.of(node), self._is_along(node), node.flag("freespace")
         pair = f"{one.called}, {other.called}"
+        if not is_free:
+            distance = "distance_along" if is_along else "distance"
+            return self._compared(node, f"{distance}({pair}, {one.front:g} m, {other.front:g} m)", "m")
         if not is_along:
-            straight = f"clearance({pair})" if is_free else f"distance({pair}, {one.front:g} m, {other.front:g} m)"
-            return self._compared(node, straight, "m")
-        ahead, behind = (0.0, 0.0) if is_free else (one.front + other.rear, one.rear + other.front)
+            return self._compared(node, f"clearance({pair})", "m")
         gap, value = f"gap({pair})", node.number("value")
-        if not is_free and value <= max(ahead, behind):
-            message = "it is shorter than from reference points to bumpers; write freespace=true, and less"
-            raise ValueError(f"value: {message}")
-        near, far = f"{value - ahead:.9g} m", f"{behind - value:.9g} m"
         if node.word("rule", _INEQUALITIES)[0] == "l":
-            return (f"{gap} < {near} and {gap} > {far}",)
-        return (f"{gap} > {near} or {gap} < {far}",)
+            return (f"{gap} < {value:.9g} m and {gap} > {-value:.9g} m",)
+        return (f"{gap} > {value:.9g} m or {gap} < {-value:.9g} m",)
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
         """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""

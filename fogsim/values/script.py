@@ -90,6 +90,9 @@ class Arrive:
     # Speed that the vehicle has there, added to `factor` times the other's [m/s]; None for any
     speed: float | None = None
     factor: float = 0.0  # Share of the other's speed in that
+    # steady, steady_time: way [m] and time [s] before the place for which it has that speed already
+    steady: float = 0.0
+    steady_time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

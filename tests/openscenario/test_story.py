@@ -213,9 +213,13 @@ def test_ends_that_are_not_known_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match="nor is the end of a relative speed by rate"):
         read_openscenario(_two_cars(tmp_path, event("like", by_rate, after(1.0)), over("like")))
+
+
+def test_one_of_several_actions_of_an_event_has_an_end_of_its_own(tmp_path: Path) -> None:
     two = event("two", f'{speed(5)}</Action><Action name="lane">{changes_lane(1, "time", 3.0)}', after(1.0))
-    with pytest.raises(InputError, match="one of several actions of an event is over is not known; name the event"):
-        read_openscenario(_two_cars(tmp_path, two, group(state("action", "lane", "completeState"))))
+    for name, lasts in (("two action", 0.0), ("lane", 3.0)):
+        steps = run(_two_cars(tmp_path, two, group(state("action", name, "completeState"))))
+        assert steps[-1].time - begun(steps)["two"] == pytest.approx(lasts, abs=0.11)
 
 
 def test_conditions_that_are_true_for_a_while_are_true_no_longer(tmp_path: Path) -> None:

@@ -24,9 +24,11 @@ def find_map(written: str, folder: Path) -> Path:
 
     It is `written` relative to a folder, or its name with one of the endings in the user's folder of maps.
     """
-    if _is_map(folder / written):
-        return folder / written
-    name = Path(written.replace("\\", "/")).name
+    posix = written.replace("\\", "/")
+    for path in (folder / written, folder / posix):
+        if _is_map(path):
+            return path
+    name = Path(posix).name
     for ending in (_OPENDRIVE, SUMO):
         name = name.removesuffix(ending)
     maps = os.environ.get(MAPS, "")

@@ -220,7 +220,8 @@ def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
 def _arrival(vehicle: str, action: ArriveAction, now: Situation) -> Arrive:
     other = now.vehicle_id(action.vehicle)
     speed = None if action.to_kmh is None else action.to_kmh / KMH_PER_MPS
-    return Arrive(vehicle, other, action.distance_m, action.its_distance_m, speed, action.factor)
+    steady = action.steady_m, action.steady_s
+    return Arrive(vehicle, other, action.distance_m, action.its_distance_m, speed, action.factor, *steady)
 
 
 def _path(vehicle: str, action: PathAction) -> FollowPath:

@@ -137,6 +137,12 @@ class ArriveAction(Section):
     factor: Annotated[Number, Field(ge=0, le=100)] = 0.0
     """Factor on the other one's speed, to which `to_kmh` is added."""
 
+    steady_m: Distance = 0.0
+    """Way before the place from which on it has that speed."""
+
+    steady_s: Time = 0.0
+    """Or the time."""
+
 
 class StopAction(Section):
     """A vehicle stops at a place, stands there, and drives on."""

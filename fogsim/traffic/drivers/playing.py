@@ -103,6 +103,9 @@ class _ArriveCourse:
         left = action.distance - motion.driven(action.vehicle)
         time = (action.other_distance - motion.driven(action.other)) / max(other, 0.01)
         final = None if action.speed is None else max(action.speed + action.factor * other, 0.0)
+        if final:
+            left -= action.steady + action.steady_time * final
+            time -= action.steady / final + action.steady_time
         if time <= motion.step or left <= 0.0:
             self.last = own if final is None else final
             return self.last

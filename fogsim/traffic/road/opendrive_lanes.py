@@ -155,13 +155,12 @@ class OpenDriveLanes:
         if spot is None or distance > 0.5 * spot.lane.width + _ROUNDING:
             away = "" if spot is None else f"; the nearest is {distance:.1f} m away"
             raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
-        middle_x, middle_y, along = spot.world
-        return replace(spot, offset=(y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along))
+        return _aside(spot, x, y)
 
     def nearest(self, x: float, y: float) -> Spot | None:
         """Place on the nearest lane, whatever its direction; None off the lanes."""
         distance, spot = min((_foot(one, x, y) for one in self.lanes), key=lambda one: one[0])
-        return spot if distance <= 0.5 * spot.lane.width + _ROUNDING else None
+        return _aside(spot, x, y) if distance <= 0.5 * spot.lane.width + _ROUNDING else None
 
     def foot(self, lane: _RoadLane, x: float, y: float) -> Spot:
         """Place in the middle of a lane that is nearest to a point [m]."""
@@ -296,6 +295,12 @@ def _foot(lane: _RoadLane, x: float, y: float) -> tuple[float, Spot]:
     piece = int(np.argmin(away))
     along = float(lengths[:piece].sum() + share[piece] * lengths[piece])
     return float(away[piece]), Spot(lane, along * lane.length / float(lengths.sum()))
+
+
+def _aside(spot: Spot, x: float, y: float) -> Spot:
+    """A place in the middle of a lane with its offset to a point next to it [m]."""
+    middle_x, middle_y, along = spot.world
+    return replace(spot, offset=(y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along))
 
 
 def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:

@@ -82,6 +82,8 @@ class _Path:
         else:
             self.speed = self.speed if math.isinf(wanted) else wanted
             self.driven = min(before + self.speed * step, self.length)
+            if before >= self.length > 0.0:
+                self.speed = 0.0
 
     def is_over(self, time: float, step: float) -> bool:
         """Whether its end is reached within a step after a time [s]."""
@@ -105,7 +107,7 @@ class _Path:
 
 
 class Paths:
-    """Moves those on paths; who reaches the end on a lane drives on, and all others stay there."""
+    """Moves those on paths; who reaches the end along a lane drives on, and all others stay there."""
 
     def __init__(self, api: Api) -> None:
         self._api = api
@@ -116,6 +118,11 @@ class Paths:
     def vehicles(self) -> Collection[str]:
         """Who is on a path."""
         return self._paths.keys()
+
+    def driven(self, vehicle: str) -> float | None:
+        """How far one has come along its path [m], which SUMO does not count; None if it is on none."""
+        path = self._paths.get(vehicle)
+        return None if path is None else path.driven
 
     def begin(self, action: FollowPath, time: float, present: Collection[str]) -> None:
         """Begin a path; who is not on the road yet appears at its first point."""
@@ -149,8 +156,10 @@ class Paths:
             waits = vehicle not in present or (path.speed == 0.0 and math.isinf(wanted))
             stays = waits or path.action.stays or is_off_lanes(self._api, vehicle)
             if path.is_over(time, step) and not stays:
-                self._drive_on(vehicle, path, path.place(time, step)[2])
-                continue
+                turn = self._turn(vehicle, path.place(time, step)[2])
+                if math.cos(turn) > 0.0:
+                    self._drive_on(vehicle, path, turn)
+                    continue
             path.move(time + step, step, wanted)
             x, y, heading = path.place(time + step, step)
             aside = (
@@ -195,12 +204,16 @@ class Paths:
         self._paths.pop(vehicle, None)
         self._modes.pop(vehicle, None)
 
-    def _drive_on(self, vehicle: str, path: _Path, heading: float) -> None:
+    def _turn(self, vehicle: str, heading: float) -> float:
+        """Angle from its lane to a heading [rad], to the left."""
+        get = self._api.vehicle
+        lane = self._api.lane.getAngle(get.getLaneID(vehicle), get.getLanePosition(vehicle))
+        return heading - math.radians(90.0 - float(lane))
+
+    def _drive_on(self, vehicle: str, path: _Path, turn: float) -> None:
         """Turn a vehicle into its lane, about the point that followed the path."""
         get = self._api.vehicle
         get.setPreviousSpeed(vehicle, path.speed)
-        lane = self._api.lane.getAngle(get.getLaneID(vehicle), get.getLanePosition(vehicle))
-        turn = heading - math.radians(90.0 - lane)
         get.setLateralLanePosition(vehicle, get.getLateralLanePosition(vehicle) - path.action.ahead * math.sin(turn))
         self._end(vehicle)
 

@@ -229,7 +229,11 @@ class ScriptedActions:
             signed = GapToEgo(self._api, leader).measure(follower)
             return None if signed is None or signed > 0.0 else -signed
 
-        return Motion(time, self._step, present, self._directions.driven, vehicle.getSpeed, gap)
+        def driven(one: str) -> float:
+            along = self._paths.driven(one)
+            return self._directions.driven(one) if along is None else along
+
+        return Motion(time, self._step, present, driven, vehicle.getSpeed, gap)
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Go on with what has begun, for the next step (`time` [s])."""

@@ -1,0 +1,123 @@
+"""What vehicles do from Init on: speeds that change, trajectories on which they meet the ego, and offsets."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from fogsim.openscenario import read_openscenario
+from tests.openscenario.writing import CAR, after, begun, box, event, group, lane, motion_at, run, speed, write
+
+PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
+EGO = f"{lane(30)}\n{speed(10)}"
+
+
+def _accelerates(value: float, time: float) -> str:
+    return speed(value).replace('Shape="step" value="0"', f'Shape="linear" value="{time}"')
+
+
+def _profile(*entries: tuple[float, float]) -> str:
+    inner = "".join(f'<SpeedProfileEntry time="{time}" speed="{value}"/>' for time, value in entries)
+    return (
+        '<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="position">'
+        f"{inner}</SpeedProfileAction></LongitudinalAction></PrivateAction>"
+    )
+
+
+def _condition(test: str, who: str = "Ego") -> str:
+    """Group of one condition on a vehicle."""
+    return group(
+        '<Condition name="c" delay="0" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
+        f'triggeringEntitiesRule="any"><EntityRef entityRef="{who}"/></TriggeringEntities><EntityCondition>{test}'
+        "</EntityCondition></ByEntityCondition></Condition>"
+    )
+
+
+def test_a_speed_that_is_ordered_in_init_over_a_time_is_reached_then(tmp_path: Path) -> None:
+    begin = {"Ego": f"{lane(30)}\n{_profile((0, 5), (4, 15))}", "Lead": f"{lane(300)}\n{_accelerates(8, 4)}"}
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, stop=after(6.0)))
+    for name, speeds in (("Ego", (5.0, 10.0, 15.0)), ("Lead", (0.0, 4.0, 8.0))):
+        found = [motion_at(steps, time, name)[2] for time in (0.0, 2.0, 5.0)]
+        assert found == pytest.approx(speeds, abs=0.4)
+
+
+def test_a_distance_driven_counts_on_any_road(tmp_path: Path) -> None:
+    begin = {"Ego": EGO, "Other": f"{lane(420, 1)}\n{speed(10)}"}
+    stop = _condition('<TraveledDistanceCondition value="30"/>', "Other")
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=stop))
+    assert steps[-1].time == pytest.approx(3.0, abs=0.11)
+
+
+def test_reference_points_pass_each_other_between_two_steps(tmp_path: Path) -> None:
+    begin = {"Ego": EGO, "Other": f"{lane(70, 1)}\n{speed(10)}"}
+    close = (
+        '<RelativeDistanceCondition entityRef="Other" relativeDistanceType="longitudinal" value="0.1" '
+        'freespace="false" rule="lessThan"/>'
+    )
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=_condition(close)))
+    # They approach by 2 m a period, from 40 m.
+    assert steps[-1].time == pytest.approx(2.0, abs=0.11)
+
+
+def test_the_offset_of_one_that_drives_against_a_lane_is_kept(tmp_path: Path) -> None:
+    place = '<Position><RelativeRoadPosition entityRef="Ego" ds="300" dt="0.5"><Orientation h="3.14159"/>'
+    begin = {"Ego": EGO, "Other": f"{place}</RelativeRoadPosition></Position>\n{speed(10)}"}
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=after(2.0)))
+    assert motion_at(steps, 1.5, "Other")[1] == pytest.approx(-1.75 + 0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "target", ['<TrajectoryPosition s="5">{}</TrajectoryPosition>', '<WorldPosition x="110" y="-1"/>']
+)
+def test_a_person_on_a_trajectory_meets_the_ego_at_a_steady_speed(tmp_path: Path, target: str) -> None:
+    line = "".join(f'<Vertex><Position><WorldPosition x="110" y="{y}"/></Position></Vertex>' for y in (-6, 6))
+    trajectory = (
+        '<TrajectoryRef><Trajectory name="t" closed="false"><Shape><Polyline>'
+        f"{line}</Polyline></Shape></Trajectory></TrajectoryRef>"
+    )
+    follows = (
+        f"<PrivateAction><RoutingAction><FollowTrajectoryAction>{trajectory}<TimeReference><None/></TimeReference>"
+        '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
+    )
+    meets = (
+        '<PrivateAction><SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="7" '
+        f'laneId="-1" s="100"/></TargetPositionMaster><TargetPosition>{target.format(trajectory)}</TargetPosition>'
+        '<FinalSpeed><AbsoluteSpeed value="1.5"><TargetDistanceSteadyState distance="3"/></AbsoluteSpeed></FinalSpeed>'
+        "</SynchronizeAction></PrivateAction>"
+    )
+    begin = {"Ego": EGO, "Ann": follows}
+    file = write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("meet", meets, after(0))}, stop=after(8.0))
+    steps = run(file)
+    # The ego needs 7 s for its 70 m; 2 s before, the person has walked 2 m of 5 m and is as fast as it is there.
+    (_, early, slow), (_, y, fast) = (motion_at(steps, time, "Ann") for time in (1.0, 5.1))
+    assert (early, slow) == pytest.approx((-5.75, 0.0), abs=0.05)
+    assert (y, fast) == pytest.approx((-5.75 + 2.0 + 0.15, 1.5), abs=0.1)
+    assert "meet" in begun(steps)
+
+
+def test_the_moon_is_no_share_of_the_sky(tmp_path: Path) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO})
+    file.write_text(file.read_text(encoding="utf-8").replace('illuminance="20000"', 'illuminance="0.1"'))
+    with pytest.warns(match="0.1 lx would be night at a sun of 52°; read as a moon there"):
+        assert read_openscenario(file).data["light"] == {"illuminance_lx": 0.1}
+
+
+def test_files_written_on_windows_name_folders_with_backslashes(tmp_path: Path) -> None:
+    (tmp_path / "maps").mkdir()
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO})
+    text = file.read_text(encoding="utf-8")
+    road = text.split('LogicFile filepath="')[1].split('"')[0]
+    (tmp_path / "maps" / "road.xodr").write_bytes(Path(road).read_bytes())
+    entry = CAR.replace('name="car"', 'name="entry"')
+    (tmp_path / "maps" / "cars.xosc").write_text(
+        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>'
+        f'<Catalog name="cars">{entry}</Catalog></OpenSCENARIO>'
+    )
+    text = text.replace(road, ".\\maps\\road.xodr").replace(
+        CAR, '<CatalogReference catalogName="cars" entryName="entry"/>'
+    )
+    text = text.replace(
+        "<RouteCatalog>", '<VehicleCatalog><Directory path="..\\FOLDER\\maps"/></VehicleCatalog><RouteCatalog>'
+    )
+    file.write_text(text.replace("FOLDER", tmp_path.name))
+    assert math.isclose(read_openscenario(file).data["fog"]["visibility_m"], 200.0)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from enum import StrEnum
 from inspect import signature
 from pathlib import Path
 from typing import Any, NoReturn, get_args
@@ -52,6 +53,9 @@ def _flat(annotation: Any) -> set[Any]:
 
 def _parser(name: str, types: set[Any], info: OptionInfo | ArgumentInfo) -> Callable[[Any], Any] | None:
     """Reader of a value; None for typer's own."""
+    for kind in types:
+        if isinstance(kind, type) and issubclass(kind, StrEnum):
+            return _choice_parser(kind, name)
     if Path in types:
         return _text_parser(Path, name, "a path")
     if str in types and isinstance(info, ArgumentInfo):
@@ -68,6 +72,17 @@ def _text_parser(kind: type[Path] | type[str], name: str, expected: str) -> Call
         return kind(given)
 
     parse.__name__ = kind.__name__
+    return parse
+
+
+def _choice_parser(kind: type[StrEnum], name: str) -> Callable[[Any], Any]:
+    def parse(given: Any) -> Any:
+        try:
+            return kind(given)
+        except ValueError:
+            _refuse(name, " or ".join(kind), given)
+
+    parse.__name__ = "|".join(kind)
     return parse
 
 

@@ -41,6 +41,8 @@ CaseValues = Annotated[
 def _use_maps(folder: Path | None) -> Path | None:
     """Let readers, also those of other processes, find maps in a folder."""
     if folder is not None:
+        if not folder.is_dir():
+            raise InputError(f"--maps {folder} is not a folder; give the name of a folder")
         os.environ[MAPS] = str(folder.resolve())
     return folder
 
@@ -51,8 +53,6 @@ Maps = Annotated[
         "--maps",
         envvar=MAPS,
         callback=_use_maps,
-        exists=True,
-        file_okay=False,
         help="Folder with the maps that OpenSCENARIO files name: Town01.xodr or Town01.net.xml for Town01.",
     ),
 ]

@@ -106,7 +106,7 @@ def _asked_for(
     # As in pytest: if nothing has failed, all tests run.
     tests = only_cases(tests, noted) or tests
     if not tests:
-        stdout.print(f"No tests: none of {len(found)} files expects anything that was asked for.")
+        stdout.print(f"No tests: no selected expectation in {len(found)} file{'s' * (len(found) != 1)}.")
         raise typer.Exit(_NOTHING_COLLECTED)
     return tests
 

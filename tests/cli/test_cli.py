@@ -123,6 +123,8 @@ def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, comman
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a"], "there is no file 'no.sumocfg'"),
+        (["validate", "motorway_fog_bank", "--maps", "nowhere"], "--maps nowhere is not a folder"),
+        (["schema", "scenery"], "KIND: expected scenario or study, got 'scenery'"),
     ]:
         done = command(*arguments, cwd=tmp_path)
         assert done.returncode == 2

@@ -63,9 +63,9 @@ def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -
     for arguments, code, told in (
         ([str(file), "--case", "visiblity=60 m"], 2, "varies no visiblity; did you mean 'visibility'?"),
         ([str(file), "-k", "safe and"], 2, "expected a word, got the end"),
-        ([str(file), "-k", "night"], 5, "No tests: none of 1 files expects anything that was asked for."),
+        ([str(file), "-k", "night"], 5, "No tests: no selected expectation in 1 file."),
         ([str(folder / "none.fog.yaml")], 2, "there is no such scenario file"),
-        ([str(folder / "empty")], 5, "No tests: none of 0 files"),
+        ([str(folder / "empty")], 5, "No tests: no selected expectation in 0 files."),
     ):
         (folder / "empty").mkdir(exist_ok=True)
         done = command("test", *arguments, cwd=folder)

@@ -17,7 +17,8 @@ SLOW = 60_000.0
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     command = [sys.executable, "-m", "fogsim", "explore", "motorway_fog_bank", "--at", "1", "--no-browser"]
-    command += [f"--set={one}" for one in (EARLY, "renderer=cpu", "camera.width=160", "camera.height=120")]
+    settings = (EARLY, "duration_s=6", "renderer=cpu", "camera.width=160", "camera.height=120")
+    command += [f"--set={one}" for one in settings]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         yield process.stdout.readline().split()[1]
@@ -49,7 +50,7 @@ def slide(page: Page, name: str, place: str) -> None:
 
 def test_sliders_change_the_frame_the_estimates_and_the_advice(page: Page) -> None:
     expect(page.locator("h1")).to_have_text("motorway_fog_bank")
-    expect(page.locator("#time-text")).to_have_text("1.0 of 200 s")
+    expect(page.locator("#time-text")).to_have_text("1.0 of 6 s")
     clear = page.locator("#frame").get_attribute("src")
     slide(page, "visibility", "0.26")
     expect(page.locator("#visibility-text")).to_have_text("79.3 m", timeout=SLOW)
@@ -66,10 +67,12 @@ def test_sliders_change_the_frame_the_estimates_and_the_advice(page: Page) -> No
     expect(page.locator("#day-note")).to_have_text("not drawn by day", timeout=SLOW)
 
 
-def test_it_plays(page: Page) -> None:
+def test_it_plays_to_the_end(page: Page) -> None:
     page.click("#play")
+    expect(page.locator("#play")).to_have_text("❚❚")
     expect(page.locator("#time-text")).to_have_text(re.compile(r"^[2-9]"), timeout=SLOW)
-    page.click("#play")
+    expect(page.locator("#play")).to_have_text("▶", timeout=SLOW)
+    expect(page.locator("#frames")).to_have_text(re.compile(r"From the last \d+ frames"), timeout=SLOW)
 
 
 def test_it_fits_on_a_phone(page: Page) -> None:

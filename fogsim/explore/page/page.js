@@ -129,10 +129,14 @@ at("copy").addEventListener("click", async () => {
   await navigator.clipboard.writeText(at("command").textContent);
   at("copy").textContent = "Copied"; setTimeout(() => { at("copy").textContent = "Copy the command"; }, 1500);
 });
-at("play").addEventListener("click", async () => {
-  playing = !playing;
+function play(on) {
+  playing = on;
   at("play").textContent = playing ? "❚❚" : "▶";
   at("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+}
+
+at("play").addEventListener("click", async () => {
+  play(!playing);
   while (playing && Number(at("time").value) < Number(at("time").max)) {
     const begun = performance.now();
     await ask(1);
@@ -141,10 +145,11 @@ at("play").addEventListener("click", async () => {
     at("time").value = Number(at("time").value) + passed / 10;
     await new Promise(done => setTimeout(done, Math.max(100 * passed - (performance.now() - begun), 0)));
   }
-  if (!playing) changed();
+  play(false);
+  changed();
 });
 
-for (const visibility of [20, 50, 100, 200, 500, 1000, 4000]) {
+for (const visibility of [20, 50, 100, 200, 400, 1000, 4000]) {
   const mark = element("i", "", visibility < 1000 ? String(visibility) : `${visibility / 1000} km`);
   mark.style.left = percent(visibility); at("axis").append(mark);
 }

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from fogsim.core.files.atomic import write_json
 from fogsim.core.files.standard_streams import open_standard_streams
+from fogsim.core.interruption import Interruption
 from fogsim.scenario import Scenario
 from fogsim.study.execution import PROCESS_DIED, RunWatch, failure, result_file, run_to_file
 from fogsim.study.plan import StudyRun
@@ -67,10 +68,13 @@ def _run_until_broken(
 
 def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Path) -> Future[str | None]:
     """Submit a run; BrokenProcessPool also if the fork server died, which the next pool starts again."""
-    try:
-        return pool.submit(work, run.scenario, run.seed, result)
-    except (EOFError, ConnectionError) as error:
-        raise BrokenProcessPool(str(error)) from error
+    # A signal while a process starts would leave it to itself, and it would complain.
+    with Interruption():
+        try:
+            return pool.submit(work, run.scenario, run.seed, result)
+        except (EOFError, ConnectionError, BrokenProcessPool) as error:
+            broken = BrokenProcessPool(str(error))
+    raise broken
 
 
 @contextlib.contextmanager

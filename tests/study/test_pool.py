@@ -1,5 +1,6 @@
 import json
 import multiprocessing
+import signal
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -58,7 +59,7 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
     def interrupt(run: StudyRun, _: str | None) -> None:
         raise KeyboardInterrupt
 
-    stranger = multiprocessing.get_context("forkserver").Process(target=time.sleep, args=(600,))
+    stranger = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600,))
     stranger.start()
     with pytest.raises(KeyboardInterrupt):
         ProcessPool(2, __import__("slow_work").work).run(runs, tmp_path, interrupt)
@@ -67,6 +68,20 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
     stranger.join()
     assert result_file(tmp_path, runs[0]).exists()
     assert not result_file(tmp_path, runs[1]).exists()
+
+
+def test_a_signal_waits_until_a_process_has_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    submitted: list[int] = []
+
+    def submit(_: ProcessPoolExecutor, __: Any, ___: Any, seed: int, ____: Path) -> None:
+        signal.raise_signal(signal.SIGINT)
+        submitted.append(seed)
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    runs = [StudyRun(seed, {}, seed, SCENARIO, f"k{seed}") for seed in range(2)]
+    with pytest.raises(KeyboardInterrupt):
+        ProcessPool(2).run(runs, tmp_path, lambda *_: None)
+    assert submitted == [0]
 
 
 def test_a_thread_that_a_method_leaves_keeps_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

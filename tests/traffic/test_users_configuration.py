@@ -59,6 +59,15 @@ def test_a_mistake_that_sumo_finds_on_the_way_is_told_as_it_is(tmp_path: Path) -
         list(fogsim.run(loaded(config)))
 
 
+def test_an_error_that_sumo_does_not_print_is_told_before_its_warnings(tmp_path: Path) -> None:
+    options = '<threads value="2"/><summary-output value="none/sum.xml"/>'
+    config = configuration(tmp_path, vehicle("ego", 0.0, "we1 we2"), options=options)
+    with pytest.raises(
+        SimulationError, match=r"cannot load the scenario: Could not build output .* Warning: .*threads"
+    ):
+        next(fogsim.run(loaded(config), sumo_outputs=tmp_path / "outputs"))
+
+
 def test_a_log_of_the_users_own_is_kept(tmp_path: Path) -> None:
     config = configuration(tmp_path, UNSORTED, options='<report><error-log value="mine.log"/></report>')
     with pytest.raises(SimulationError) as error:

@@ -65,7 +65,11 @@ class LibsumoLink:
             self._check_outputs()
             return sumo
         self.end()
-        message = " ".join(line.strip() for line in words if line.strip()) or str(failure)
+        lines = [line.strip() for line in words if line.strip()]
+        # What ends SUMO is either there, or in libsumo's error alone.
+        if all(line.startswith("Warning") for line in lines):
+            lines.insert(0, str(failure))
+        message = " ".join(lines)
         if self._outputs is not None:
             message = self._outputs.shorten(message)
         raise SimulationError(f"SUMO cannot load the scenario: {message}")

@@ -300,7 +300,9 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > _MOSTLY else own
-    return _weighed(own, verdict) if verdict.is_sure else own
+    if verdict.is_sure:
+        return _weighed(own, verdict)
+    return own if agree(own.visibility_interval, verdict.interval) else refused(own, DISAGREE)
 
 
 def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
@@ -337,7 +339,7 @@ def _ends(own: Estimate) -> tuple[float, float]:
 
 def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
-    if verdict.reason or not verdict.is_sure:
+    if verdict.reason or not (verdict.is_sure and verdict.is_even):
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
         return refused(own, reason)
     return Estimate(

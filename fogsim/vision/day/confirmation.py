@@ -155,4 +155,5 @@ def _contradiction(own: Estimate, day: DayVerdict) -> str:
     half = NORMAL_90_PERCENT * own.standard_deviation
     thin, dense = min(own.extinction - half, day.least), max(own.extinction + half, day.most)
     spans = not day.reason and dense <= WIDEST * thin
-    return "" if spans or agree(own.visibility_interval, day.interval) else DISAGREE
+    is_fog = own.extinction > 0.0
+    return "" if is_fog and (spans or agree(own.visibility_interval, day.interval)) else DISAGREE

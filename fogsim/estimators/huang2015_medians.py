@@ -235,4 +235,4 @@ def optimised_extinctions(
 
 def _top(curve: RoadCurve) -> int:
     """Topmost row of the region, be it saturated."""
-    return int(np.flatnonzero(curve.luminance > 0.0)[0])
+    return int(np.flatnonzero((curve.weight > 0.0) | (curve.luminance > 0.0))[0])

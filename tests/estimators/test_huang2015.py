@@ -5,8 +5,10 @@ import pytest
 
 from fogsim.estimators import make
 from fogsim.estimators.huang2015 import Measurement, decay, mixture
+from fogsim.estimators.huang2015_medians import Huang2015Repair, optimised_extinctions
 from fogsim.values import Frame, Observation
 from fogsim.vision.day.confirmation import Confirmation
+from fogsim.vision.region.profile import RoadCurve
 
 METHODS = ("huang2015", "huang2015_rough")
 
@@ -28,6 +30,13 @@ def test_as_published_sees_dense_fog_only(render, road):
     assert found.visibility == pytest.approx(50.0, rel=0.4)
     thin = estimate("huang2015_rough", render(road.but(visibility=400.0)), road.camera, as_published=True)
     assert not thin.valid
+
+
+def test_of_a_black_region_the_law_makes_no_airlight():
+    below = np.arange(1.0, 41.0)
+    curve = RoadCurve(below, np.zeros(40), 400.0 / below, np.ones(40), 400.0)
+    found = optimised_extinctions(curve, np.zeros((40, 1)), np.array([0.03]), frozenset(Huang2015Repair))
+    assert np.isfinite(found).all()
 
 
 def test_decay_is_that_of_section_5_2():

@@ -191,14 +191,13 @@ def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float
     chance = np.logaddexp.reduce(each, axis=2)
     fine, posterior, evidence = _interpolated(grid.logs, still, chance)
     weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
-    of_surface = weight[:, : len(tried)].sum(axis=0)
     sky = rows.noise[0, : rows.cuts[0]]
     return DayFit(
         log_visibility=fine,
         chance=posterior,
         fog_over_none=evidence - none,
         responses=_sums(response, weight.sum(axis=0), grid.responses.size),
-        surfaces=_sums(tried[:, 1], of_surface / of_surface.sum(), grid.surfaces.size),
+        surfaces=_sums(tried[:, 1], np.exp(by_surface - np.logaddexp.reduce(by_surface)), grid.surfaces.size),
         lights=_sums(kept, _shares(each), _ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),

@@ -260,6 +260,9 @@ _CLIPPED = 0.988
 _BRIGHTEST = 0.92
 """Share of bins that are no brighter than the light that priors are relative to [-]."""
 
+_LEAST_LEVEL = 1e-4
+"""Least of that light, over full scale: less than any pixel value above black stands for [-]."""
+
 _BONNETS = (0.45, 0.3, 0.15, 0.05)
 """Shares of the rows below the horizon that a bonnet or a dashboard may cover [-]."""
 
@@ -284,7 +287,7 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
     light, slope = (table[:, low] * (1.0 - share) + table[:, low + 1] * share for table in (curves.light, curves.slope))
     noise = np.sqrt(_NOISE**2 + (_OF_SCATTER * scatter) ** 2 + (_OF_SLOPE * by_row) ** 2)
     clipped = signal > _CLIPPED
-    level = np.quantile(light, _BRIGHTEST, axis=1)
+    level = np.maximum(np.quantile(light, _BRIGHTEST, axis=1), _LEAST_LEVEL)
     contrast = np.stack([across, _CONTRAST_NOISE * np.hypot(1.5 * noise, 1.5 / 255.0)]) * slope[0] / level[0]
     cuts = _cuts(bins, camera, horizon)
     free = _free(signal, noise, clipped)

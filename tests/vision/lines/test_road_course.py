@@ -93,3 +93,13 @@ def test_behind_a_crest_no_row_shows_road():
     unit = 800.0 * 1.4
     assert row_on_plane(800.0 * 1.3 * limit, crest, unit, 1.4, 800.0 * 1.3 * limit)[0] > 0.0
     assert row_on_plane(800.0 * 0.95 * limit, crest, unit, 1.4, 800.0 * limit)[0] == 0.0
+
+
+def test_edges_on_the_very_row_of_the_horizon_are_no_points_of_the_road():
+    # An image of noise, whose edges lie on all rows, the horizon's among them.
+    image = (255 * (np.random.default_rng(6).random((120, 160)) > 0.9)).astype(np.uint8)
+    camera = Camera(160, 120, 100.0, (80.0, 58.0), 1.4)
+    pixels, horizon = linear_pixels(image, camera), calibrated_horizon(camera)
+    seen = seen_lines(pixels, camera, horizon)
+    assert seen is not None
+    assert road_course(seen, pixels, camera, horizon) is None

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
-from fogsim.fusion.grid_filter import GridFilter
+from fogsim.fusion.grid_filter import LEAST_UNBOUND, GridFilter
 from fogsim.fusion.route_field import AHEAD, CELL, RouteField
 from fogsim.fusion.route_field_kernels import shares_in_cells
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
-from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate, OpticalDepths
+from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate, ExtinctionBounds, OpticalDepths
 from fogsim.values.observation import FogReport
 
 Floats = NDArray[np.float64]
@@ -176,7 +176,7 @@ class FieldFilter:
             self._take_in(estimate)
         for report in reports:
             self._hear(report, time, place)
-        seen = [estimate.reach for estimate in estimates if estimate.valid]
+        seen = [estimate.reach for estimate in estimates if estimate.valid or estimate.bounds is not None]
         if seen:
             self._mind_leaps(now, max(seen))
         if now.denser is not None:
@@ -186,9 +186,8 @@ class FieldFilter:
     def _take_in(self, estimate: Estimate) -> None:
         """Learn an estimate over the stretch that it has seen."""
         if not estimate.valid:
-            if estimate.bounds is not None and estimate.bounds.most < math.inf:
-                most = max(estimate.bounds.most, _CLEAR)
-                self._field.learn_at_most(self._sight(most), math.log(most), max(estimate.bounds.softness, 0.05))
+            if estimate.bounds is not None:
+                self._take_in_bounds(estimate.bounds)
             return
         k = estimate.extinction
         if not (math.isfinite(k) and math.isfinite(estimate.standard_deviation)):
@@ -205,6 +204,14 @@ class FieldFilter:
             return
         for start, end, value, deviation in _curve_stretches(estimate.optical_depths, FARTHEST).tolist():
             self._learn(start, end, value, max(deviation, 0.5 * relative), estimate.common_deviation)
+
+    def _take_in_bounds(self, bounds: ExtinctionBounds) -> None:
+        how = max(bounds.softness, 0.05), max(self._outlier_share, LEAST_UNBOUND), self._share
+        if bounds.most < math.inf:
+            most = max(bounds.most, _CLEAR)
+            self._field.learn_at_most(self._sight(most), math.log(most), *how)
+        if bounds.least > _CLEAR:
+            self._field.learn_at_most(self._sight(bounds.least), math.log(bounds.least), *how, side=-1.0)
 
     def _learn(self, start: float, end: float, value: float, deviation: float, common: float) -> None:
         # The errors of pictures that follow one another are alike: each counts for the share of time that is new.

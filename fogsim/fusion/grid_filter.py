@@ -105,7 +105,7 @@ worse estimates comes to count [s]."""
 _SLOW, _STILL = 15.0, 0.1
 """Speed below which fog changes in proportion to the way [m/s]; and the least share, since wind moves fog, too [-]."""
 
-_LEAST_UNBOUND = 0.2
+LEAST_UNBOUND = 0.2
 """Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
 
 
@@ -231,7 +231,7 @@ class GridFilter:
         farthest = 0.0 if denser is None else denser.distance
         log_likelihood = np.zeros(CELLS)
         reaching = [estimate for estimate in estimates if estimate.reach >= farthest]
-        self._update_common(min((one.common_deviation for one in reaching if _is_measured(one)), default=self._common))
+        self._update_common([one for one in reaching if _is_measured(one)])
         for estimate in reaching:
             if _is_measured(estimate):
                 log_likelihood += self._weight * self._log_likelihood(estimate)
@@ -242,8 +242,13 @@ class GridFilter:
         self._probability = posterior / posterior.sum()
         return Belief(self._log_extinction, self._with_common_errors(), denser)
 
-    def _update_common(self, common: float) -> None:
-        """Follow the common deviation of the best estimate; better images stay known for some seconds."""
+    def _update_common(self, measured: Sequence[Estimate]) -> None:
+        """Follow the common deviation of estimates, by their precisions; better images stay known for some seconds."""
+        if not measured:
+            return
+        deviations = [one.standard_deviation / max(one.extinction, float(self._extinction[0])) for one in measured]
+        precisions = [min(max(one, self._relative_floor), 1e6) ** -2 for one in deviations]
+        common = sum(p * one.common_deviation for p, one in zip(precisions, measured, strict=True)) / sum(precisions)
         worse = min(max(common - self._common, 0.0), _MOST_COMMON)
         self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
 
@@ -318,7 +323,7 @@ class GridFilter:
         if bounds.least > 0.0:
             inside *= _normal_share((self._log_extinction - math.log(bounds.least)) / softness)
         # Wrong signs are more frequent than other outliers, and the belief must survive two of them.
-        share = max(self._outlier_share, _LEAST_UNBOUND)
+        share = max(self._outlier_share, LEAST_UNBOUND)
         return np.asarray(np.log(share + (1.0 - share) * inside))
 
 

@@ -128,13 +128,15 @@ class DatedFusion:
         InputError
             If what the fusion returns is no belief.
         """
-        if reports or any(one.valid or one.bounds is not None for one in estimates):
-            self._last = time
         if _knows_places(type(self._fusion)):
             belief = cast("LocatedFusion", self._fusion).update_at(estimates, time, place, reports)
         else:
             belief = cast("Fusion", self._fusion).update(estimates, time)
-        return replace(checked_belief(self._name, belief), age=time - self._last)
+        belief = checked_belief(self._name, belief)
+        # Reports say something to who knows of places alone.
+        if (reports and belief.profile is not None) or any(one.valid or one.bounds is not None for one in estimates):
+            self._last = time
+        return replace(belief, age=time - self._last)
 
 
 @functools.cache

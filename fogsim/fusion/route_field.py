@@ -45,9 +45,8 @@ class RouteField:
         places = CELL * np.arange(COUNT + 1)
         apart = np.abs(places[:, None] - places)
         smooth = (1.0 + math.sqrt(3.0) * apart / length) * np.exp(-math.sqrt(3.0) * apart / length)
-        varying = deviation**2 * smooth + GRAIN**2 * np.exp(-apart / GRAIN_LENGTH)
-        beforehand = varying + LEVEL_DEVIATION**2
-        self._varying, self._beforehand = varying[:-1, :-1], beforehand[:-1, :-1]
+        beforehand = LEVEL_DEVIATION**2 + deviation**2 * smooth + GRAIN**2 * np.exp(-apart / GRAIN_LENGTH)
+        self._beforehand = beforehand[:-1, :-1]
         self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
         self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
         # The same in every run: samples of a distribution must not depend on chance.
@@ -70,8 +69,9 @@ class RouteField:
         self._cell, self._place = cell, place
 
     def elapse(self, time: float) -> None:
-        """Let a time pass [s]."""
-        self._covariance += -math.expm1(-2.0 * time / self._steadiness) * self._varying
+        """Let a time pass [s], which widens what is believed to no more than what was believed beforehand."""
+        forgotten = -math.expm1(-2.0 * time / self._steadiness)
+        self._covariance += forgotten * (self._beforehand - self._covariance)
 
     def variance_of_age(self, age: float) -> float:
         """By how much a measurement's variance of ln k grows with its age [-] (`age` [s])."""
@@ -106,18 +106,21 @@ class RouteField:
         weights = self._weights(start, end)
         return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor)
 
-    def learn_at_most(self, end: float, value: float, softness: float) -> None:
-        """Take in that the mean extinction from the vehicle on is likely no more than a value.
+    def learn_at_most(
+        self, end: float, value: float, softness: float, wrong: float = 0.0, share: float = 1.0, side: float = 1.0
+    ) -> None:
+        """Take in that the mean extinction from the vehicle on is likely no more than a value, for `side` -1 no less.
 
         Nothing changes where that is believed already: the errors of bounds that are repeated are alike.
 
         Takes `end` [m].
         """
         before, shared, variance = self._linearised(0.0, end)
-        if variance <= 0.0 or before + _BELIEVED * math.sqrt(variance) < value:
+        if variance <= 0.0 or side * before + _BELIEVED * math.sqrt(variance) < side * value:
             return
-        moved, left = route_field_kernels.moments_at_most(before, variance, value, softness)
-        self._condition(shared, variance, moved, variance - left)
+        bound = side * before, variance, side * value, softness, wrong, share
+        moved, left = route_field_kernels.moments_at_most(*bound)
+        self._condition(shared, variance, side * moved, variance - left)
 
     def _condition(self, shared: Floats, variance: float, moved: float, narrowed: float) -> None:
         route_field_kernels.condition(self._mean, self._covariance, shared / variance, moved, narrowed)

@@ -230,13 +230,18 @@ def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends:
 
 
 @kernel
-def moments_at_most(before: float, variance: float, value: float, softness: float) -> tuple[float, float]:
-    """Shift of the mean of a normal distribution that is likely below a value, and the variance that it keeps."""
+def moments_at_most(
+    before: float, variance: float, value: float, softness: float, wrong: float, share: float
+) -> tuple[float, float]:
+    """Shift of the mean of a normal distribution that is likely below a value, and the variance that it keeps.
+
+    With the probability `wrong` the value says nothing; it counts for a `share` of one that is new [-].
+    """
     total = first = second = 0.0
     for i in range(_WEIGHED):
         apart = math.sqrt(variance) * (8.0 * i / (_WEIGHED - 1) - 4.0)
         below = 0.5 * math.erfc((before + apart - value) / (math.sqrt(2.0) * softness))
-        weight = math.exp(-0.5 * apart**2 / variance) * (below + 1e-12)
+        weight = math.exp(-0.5 * apart**2 / variance) * (wrong + (1.0 - wrong) * below + 1e-12) ** share
         total += weight
         first += weight * apart
         second += weight * apart**2

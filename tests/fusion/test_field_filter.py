@@ -227,3 +227,30 @@ def test_who_drives_on_blindly_knows_less_and_less_of_the_road_ahead():
     assert deviations == sorted(deviations)
     assert deviations[-1] > 1.0
     assert known[-1].log_standard_deviation > 2.0 * known[0].log_standard_deviation
+
+
+def test_bounds_are_learnt_on_both_sides_and_a_wrong_one_does_not_outweigh_good_estimates():
+    dense, thin = (
+        Estimate("test", 0.0, math.inf, valid=False, bounds=bounds)
+        for bounds in (ExtinctionBounds(least=0.1), ExtinctionBounds(most=0.015))
+    )
+    fusion = make("field_filter")
+    driven(fusion, [seen(300.0)], 5.0)
+    assert driven(fusion, [dense], 10.0, start=5.0, place=125.0).visibility < 40.0
+    low, high = driven(make("field_filter"), [seen(60.0, 0.1), thin]).visibility_quantiles((0.05, 0.95))
+    assert 40.0 < low < 60.0 < high < 110.0
+
+
+def test_who_stands_for_an_hour_and_sees_the_fog_knows_it_here():
+    fusion = make("field_filter")
+    for second in range(0, 3600, 2):
+        belief = fusion.update_at([seen(250.0, 0.15)], float(second), 500.0)
+    assert belief.profile.known_visibility(0.0, 0.5) == pytest.approx(250.0, rel=0.2)
+
+
+def test_reports_do_not_date_a_belief_that_knows_no_places():
+    heard = {name: DatedFusion(make(name)) for name in ("grid_filter", "field_filter")}
+    for fusion in heard.values():
+        fusion.update_at([seen(100.0)], 0.0, 0.0)
+    ages = [fusion.update_at([], 70.0, 0.0, [report(100.0, 50.0, 70.0)]).age for fusion in heard.values()]
+    assert ages == [70.0, 0.0]

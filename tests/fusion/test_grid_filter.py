@@ -253,3 +253,12 @@ def test_the_belief_hardly_widens_while_the_vehicle_stands() -> None:
     standing, slow, driving, faster = (spread_after_silence(speed) for speed in (0.0, 6.0, 15.0, 30.0))
     assert standing < 2.0 < slow < driving
     assert driving == pytest.approx(faster)
+
+
+def test_a_vague_method_does_not_make_surer_of_what_another_has_wrong_in_common():
+    common = dataclasses.replace(measured(100.0, 0.35), common_deviation=0.3)
+    belief = feed(make("grid_filter"), [common] * 10)
+    fusion = make("grid_filter")
+    for number in range(100):
+        both = fusion.update([common, measured(100.0, 0.7)], 0.1 * number)
+    assert both.log_standard_deviation > 0.7 * belief.log_standard_deviation

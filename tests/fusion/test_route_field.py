@@ -107,8 +107,10 @@ def test_time_alone_widens_and_an_old_measurement_says_less():
     made.elapse(60.0)
     after = made.mean_extinction(0.0, CELL)[1]
     assert after - before == pytest.approx(
-        (DEVIATION**2 + GRAIN**2) * (1.0 - math.exp(-2.0 * 60.0 / STEADINESS)), rel=1e-6
+        (LEVEL_DEVIATION**2 + DEVIATION**2 + GRAIN**2 - before) * (1.0 - math.exp(-2.0 * 60.0 / STEADINESS)), rel=1e-6
     )
+    made.elapse(1e6)
+    assert made.profile().standard_deviation == pytest.approx(field().profile().standard_deviation)
     assert made.variance_of_age(0.0) == 0.0
     assert made.variance_of_age(30.0) < made.variance_of_age(300.0) < 2.0 * DEVIATION**2
 

@@ -31,6 +31,7 @@ def test_it_speaks_of_the_fog_here_with_the_sensor_s_deviation() -> None:
     assert found.extinction == 0.03
     assert found.reach == 10.0
     assert found.standard_deviation == pytest.approx(0.03 * math.hypot(0.05, 0.1), rel=0.01)
+    assert found.common_deviation == 0.1
 
 
 def test_a_value_that_changes_lags_and_is_unsure() -> None:

@@ -51,6 +51,7 @@ class Scatterometer:
     ) -> None:
         self._check = ObservationCheck(camera)
         self._deviation = math.hypot(relative_deviation, calibration_deviation)
+        self._common = calibration_deviation
         self._averaging_time = averaging_time
         self.reset()
 
@@ -89,7 +90,10 @@ class Scatterometer:
             )
         change = self._change(observation.time, scattering)
         deviation = math.hypot(self._deviation * scattering, change, _LEAST_DEVIATION)
-        return Estimate(self.method, scattering, deviation, diagnostics={"change": change}, reach=REACH)
+        found = {"change": change}
+        return Estimate(
+            self.method, scattering, deviation, diagnostics=found, reach=REACH, common_deviation=self._common
+        )
 
     def _change(self, time: float, scattering: float) -> float:
         """By how much the value has changed since one averaging time ago, at the least since the first [1/m]."""

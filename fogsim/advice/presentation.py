@@ -106,6 +106,8 @@ class PresentedAdviser(ABC):
         belief, speed_limit, time, previous
             See `Adviser.advise`.
         """
+        if speed_limit <= previous.speed < math.inf:  # that of another road
+            previous = replace(previous, speed=math.inf)
         here = self._here(belief)
         if here is None:
             return SpeedAdvice(previous.speed if self.fallback is None else self._presented(self.fallback, speed_limit))

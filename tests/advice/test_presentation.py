@@ -52,6 +52,14 @@ def test_no_advice_is_above_the_limit() -> None:
         assert advice.speed == math.inf
 
 
+def test_advice_of_a_faster_road_does_not_outlast_it() -> None:
+    """Neither while a rise is held nor while the belief says too little."""
+    adviser, kept = ADVISERS["netherlands_a16"](), SpeedAdvice(80 / 3.6)
+    unknown = Belief(np.linspace(-8.0, -1.0, 50), np.full(50, 0.02))
+    for belief in (certain_belief(OPTICAL_DEPTH_AT_VISIBILITY / 100.0), unknown):
+        assert adviser.advise(belief, 70 / 3.6, 1.0, kept).speed == math.inf
+
+
 def test_unrounded_speeds_come_as_they_are() -> None:
     safe = safe_speed(100.0, 2.5, 3.4) * 3.6
     assert speeds("stopping_sight_distance", [100.0], rounding=0.01) == [pytest.approx(safe, abs=0.04)]

@@ -70,6 +70,9 @@ def test_stages_of_the_emergency_brake() -> None:
     braking.control(seen(33.0, 20.0))
     assert braking.control(seen(60.0, 5.0)).acceleration == -9.0, "no stage is left before the approach ends"
     assert braking.control(seen(60.0, 0.0)).acceleration is None
+    braking.control(seen(33.0, 20.0))
+    assert braking.control(seen(4.0, 0.0, speed=0.0)).acceleration == -9.0, "it holds behind what stands"
+    assert braking.control(seen(6.0, -2.0, speed=0.0)).acceleration is None, "and lets go when that drives off"
 
 
 def test_cruise_control_keeps_its_gap_and_slows_down_where_it_knows_nothing() -> None:

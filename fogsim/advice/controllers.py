@@ -81,8 +81,10 @@ class EmergencyBrake:
         lead = observation.lead
         closing = 0.0 if lead is None else -lead.relative_speed
         if lead is None or closing <= 0.3:
-            # At a standstill the brakes stay on.
-            self._stage = self._stage if observation.speed < 0.5 else 0
+            # The brakes stay on up to a standstill, and there until the vehicle ahead drives off or is gone.
+            is_blocked = lead is not None and closing > -0.3
+            is_held = observation.speed < 0.5 and (is_blocked or observation.speed > 0.0)
+            self._stage = self._stage if is_held else 0
             spare = math.inf
         else:
             spare = (lead.distance - self.margin) / closing - self.response_time

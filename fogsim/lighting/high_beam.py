@@ -32,9 +32,11 @@ def settled(wanted: Lamp, time: float, previous: LampChoice, dwell: float) -> La
         return LampChoice(wanted)
     if Lamp.HIGH_BEAM in previous.lamps and Lamp.HIGH_BEAM not in wanted:
         return LampChoice(wanted)
-    same = previous.wish is not None and previous.wish.lamps == wanted
-    wish = previous.wish if same and previous.wish is not None else LampWish(wanted, time)
-    return LampChoice(wanted) if time - wish.since >= dwell else LampChoice(previous.lamps, wish)
+    wish, change = previous.wish or LampWish(wanted, time), wanted ^ previous.lamps
+    # A lamp that is wanted without a break need not wait for another that flickers.
+    lasting = change & (wish.lamps ^ previous.lamps)
+    wish = LampWish(previous.lamps ^ lasting, wish.since) if lasting else LampWish(wanted, time)
+    return LampChoice(wish.lamps) if time - wish.since >= dwell else LampChoice(previous.lamps, wish)
 
 
 @checked_parameters

@@ -71,6 +71,14 @@ def test_a_wish_must_last_and_high_beams_are_left_at_once() -> None:
     )
 
 
+def test_a_lamp_does_not_wait_for_another_that_flickers() -> None:
+    choice = LampChoice(LOW)
+    for second in range(4):
+        flickering = Lamp.REAR_FOG if second % 2 else Lamp.NONE
+        choice = settled(LOW | Lamp.FRONT_FOG | flickering, float(second), choice, 2.0)
+    assert choice.lamps == LOW | Lamp.FRONT_FOG
+
+
 def test_countries_allow_what_is_written() -> None:
     for country, rear_fog, front_fog, high_in_fog in [
         ("germany", {40.0}, {40.0, 90.0}, True),

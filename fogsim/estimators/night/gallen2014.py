@@ -17,7 +17,7 @@ from fogsim.estimators.night.halos import (
     HaloWatch,
     largest_sharpness,
 )
-from fogsim.estimators.night.own_light import HeadLamps
+from fogsim.estimators.night.own_light import FORGOTTEN, HeadLamps
 from fogsim.estimators.protocol import Calibrations
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
@@ -91,6 +91,7 @@ class Gallen2014:
         self._veil = Gallen2014Veil(camera, head_lamps=head_lamps, as_published=as_published)
         self._watch, self._is_calibrated = HaloWatch(PUBLISHED, window=self._window), False
         self._source: Calibrations | None = None
+        self._time = 0.0
         self._trouble = "halos are not calibrated for this camera: fogsim calibrate halos, parameter halos"
         if halos is not None:
             self.calibrated(HaloThreshold.read(Path(halos)))
@@ -126,6 +127,7 @@ class Gallen2014:
         self._check.reset()
         self._watch.reset()
         self._veil.reset()
+        self._time = 0.0
 
     def update(self, observation: Observation) -> Estimate:
         """Look for lamps, and where there are none for the veil.
@@ -157,6 +159,9 @@ class Gallen2014:
         if not self._as_published and observation.lead is not None and observation.lead.distance < NEAREST:
             return Estimate.invalid(self.method, "a vehicle close ahead: so near, lamps have no halo in any fog")
         self._calibrate()
+        if observation.time - self._time > FORGOTTEN:
+            self._watch.reset()
+        self._time = observation.time
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:
             return self._by_halos(reading)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.night_road import NightRoad
-from fogsim.estimators.night.own_light import HeadLamps, lit_head_lamps, setback_of, without_noise
+from fogsim.estimators.night.own_light import FORGOTTEN, HeadLamps, lit_head_lamps, setback_of, without_noise
 from fogsim.estimators.night.veil_correlation import (
     CellMeans,
     VeilScores,
@@ -114,6 +114,7 @@ class Gallen2014Veil:
         if self._model is not None:
             self._model.reset()
         self._earlier: deque[CellMeans] = deque(maxlen=self._frames)
+        self._time = 0.0
         self._templates: tuple[Lamp, VeilTemplates] | None = None
 
     def update(self, observation: Observation) -> Estimate:
@@ -150,6 +151,9 @@ class Gallen2014Veil:
             self._earlier.clear()
             made = self._source.veil_references(without_noise(self._camera), lit, setback_of(observation))
             self._templates = lit, VeilTemplates(replace(made, camera=self._camera), _PUBLISHED)
+        if observation.time - self._time > FORGOTTEN:
+            self._earlier.clear()
+        self._time = observation.time
         self._earlier.append(means)
         return self._estimate(self._templates[1].scores(self._composed()))
 

@@ -14,6 +14,7 @@ from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.light_fit import Fit, Measured, Templates, log_likelihoods, robust_weights
 from fogsim.estimators.night.own_light import (
+    FORGOTTEN,
     KNOWN_HEAD_LAMPS,
     SKY,
     VISIBILITIES,
@@ -174,6 +175,7 @@ class NightRoad:
         self._earlier: deque[tuple[Seen, NDArray[np.bool_], Floats, bool]] = deque(maxlen=self._frames)
         self._in_street = False
         self._lit: Lamp | None = None
+        self._time = 0.0
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image, the lamps that are lit, and the range of the lead vehicle if it is tracked.
@@ -199,9 +201,9 @@ class NightRoad:
         light = math.nan if observation.light is None else observation.light.illuminance
         if why := _why_not(observation, lit, light):
             return Estimate.invalid(self.method, why)
-        if lit != self._lit:
+        if lit != self._lit or observation.time - self._time > FORGOTTEN:
             self._earlier.clear()
-            self._lit = lit
+        self._lit, self._time = lit, observation.time
         seen, beside, others = self._look(image, observation)
         hidden = self._hidden(observation, self._below, self._aside, _LEAD_HALF_WIDTH)
         used = (seen.clipped < _MOST_CLIPPED) & ~hidden & ~beside

@@ -49,6 +49,9 @@ _PITCH_STEP, _HALF_FIELD_STEP = math.radians(0.25), math.radians(0.5)
 _LEAST_DARK, _MOST_DARK = 0.01, 0.95
 """Share of a cell's pixels that read no light from which on noise is cut off, and the largest that is used [-]."""
 
+FORGOTTEN = 5.0
+"""Time without a frame after which those before it show other fog [s]."""
+
 _LEAST_SEEN = 0.6
 """Share of a cell that must be inside the image [-]."""
 

@@ -9,7 +9,7 @@ from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo, fog_class
 from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.values import Camera, Lamp, LeadMeasurement, Observation, Response
+from fogsim.values import Camera, Frame, Lamp, LeadMeasurement, Observation, Response
 from tests.vision.sources.night_pictures import in_colour, picture
 
 CAMERA = Camera(320, 240, 300.0, (159.5, 119.5), 1.4, pitch=0.03, response=Response.SRGB)
@@ -37,6 +37,14 @@ def test_halos_tell_fog_but_not_how_much() -> None:
     assert clear.diagnostics["detected"] is False
     assert clear.visibility_interval[0] > 100.0
     assert clear.visibility_interval[1] == float("inf")
+
+
+def test_halos_before_a_long_gap_are_forgotten() -> None:
+    method = Gallen2014(CAMERA).calibrated(MEASURED)
+    for time, glow in ((0.0, 30.0), (60.0, 0.0)):
+        observed = seen(LAMPS, glow=glow)
+        found = method.update(dataclasses.replace(observed, frame=Frame(time, observed.image, CAMERA)))
+    assert found.diagnostics["smoothed"] == found.diagnostics["value"]
 
 
 def test_lamps_of_a_vehicle_close_ahead_say_nothing() -> None:

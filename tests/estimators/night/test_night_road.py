@@ -15,7 +15,7 @@ from fogsim.estimators import make, supply
 from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods
 from fogsim.estimators.night.night_road import DAYLIGHT, NightRoad
 from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of, without_cut_noise
-from fogsim.values import Camera, Estimate, Lamp, LeadMeasurement, Observation
+from fogsim.values import Camera, Estimate, Frame, Lamp, LeadMeasurement, Observation
 from fogsim.values.observation import LightMeasurement
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture
 
@@ -169,6 +169,14 @@ def test_a_change_of_lamps_begins_anew() -> None:
     seen = night_picture(60.0, lamps=high, saturation=12.0)
     lit = Observation(seen, lamps=high, camera_setback=SETBACK, light=DARK)
     assert estimator.update(lit).extinction == night_road().update(lit).extinction
+
+
+def test_frames_before_a_long_gap_are_forgotten() -> None:
+    estimator, told = night_road(), {"lamps": Lamp.LOW_BEAM, "camera_setback": SETBACK, "light": DARK}
+    for time in (0.0, 0.1):
+        estimator.update(Observation(Frame(time, night_picture(30.0), CAMERA), **told))
+    seen = Observation(Frame(60.0, night_picture(120.0), CAMERA), **told)
+    assert estimator.update(seen).extinction == night_road().update(seen).extinction
 
 
 def test_lamps_of_a_file_are_used(tmp_path: Path) -> None:

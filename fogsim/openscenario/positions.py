@@ -115,6 +115,13 @@ class Positions:
             raise ValueError(f"outside Init, where {entity} is by then is not known; give a place on the map")
         return self.spots[entity]
 
+    def _world_of(self, node: Node) -> tuple[float, float, float]:
+        """x, y [m] and heading [rad] of the entity to which an element refers, on the lanes or off them."""
+        entity = node.get("entityRef")
+        if entity in self.off_lanes and entity not in self.moving:
+            return self.off_lanes[entity]
+        return self._place_of(node).world
+
     def _heading(self, node: Node, lane: float) -> float | None:
         """Heading by an ``Orientation``, whose pitch and roll are the road's, or by `h` of the position [rad]."""
         orientation = node.one("Orientation")
@@ -128,7 +135,7 @@ class Positions:
             return turn
         if node.tag == "RoadPosition":
             return turn + self.lanes.across(node.get("roadId"), node.number("s"), 0.0)[2] if turn else lane
-        return turn + (self.spots[node.get("entityRef")].world[2] if node.tag.startswith("Relative") else lane)
+        return turn + (self._world_of(node)[2] if node.tag.startswith("Relative") else lane)
 
     def world_position(self, node: Node) -> Point:
         """The nearest lane that leads there (by `h`, where it stands), and where in it."""
@@ -158,12 +165,12 @@ class Positions:
 
     def relative_world_position(self, node: Node) -> Point:
         """The lane that is so far from an entity, along x and y."""
-        x, y, heading = self._place_of(node).world
+        x, y, heading = self._world_of(node)
         return x + node.number("dx"), y + node.number("dy"), heading
 
     def relative_object_position(self, node: Node) -> Point:
         """The lane that is so far from an entity, along its own axes."""
-        x, y, heading = self._place_of(node).world
+        x, y, heading = self._world_of(node)
         dx, dy, cosine, sine = node.number("dx"), node.number("dy"), math.cos(heading), math.sin(heading)
         return x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading
 
@@ -208,10 +215,20 @@ class Positions:
         spot, lane = self.lanes.along(first, inner.number("pathS"), edges), inner.get("laneId")
         if inner.tag == "FromRoadCoordinates":
             return self._across(spot, 0.0, inner.number("t"))
-        for one in self.lanes.lanes:
-            if one.edge == spot.lane.edge and any(origin.endswith(f"_{lane}") for origin in one.origins):
-                return self._shifted(Spot(one, spot.position * one.length / spot.lane.length), inner, "laneOffset")
-        raise ValueError(f"there is no lane {lane!r} to drive on there")
+        lanes = {
+            o.rpartition("_")[2]: one for one in self.lanes.lanes if one.edge == spot.lane.edge for o in one.origins
+        }
+        turned = lane.removeprefix("-") if lane.startswith("-") else f"-{lane}"
+        found = lanes.get(lane) or lanes.get(turned)
+        if found is None:
+            raise ValueError(
+                f"there is no lane {lane!r} to drive on there; lanes along the route are {', '.join(lanes)}"
+            )
+        there = Spot(found, spot.position * found.length / spot.lane.length)
+        if lane in lanes:
+            return self._shifted(there, inner, "laneOffset")
+        inner.remark(f"lane {lane} leads against the route; read as counted along it, which is lane {turned}")
+        return there.shifted(inner.number("laneOffset", 0.0))
 
     def route(self, holder: Node) -> tuple[Spot, tuple[str, ...]]:
         """First waypoint, and edges through all waypoints, of a ``Route`` or a reference to one; ValueError if none."""

@@ -95,6 +95,27 @@ def test_a_person_on_a_trajectory_meets_the_ego_at_a_steady_speed(tmp_path: Path
     assert "meet" in begun(steps)
 
 
+def test_a_lane_against_its_route_counts_along_the_route(tmp_path: Path) -> None:
+    points = "".join(f'<Waypoint routeStrategy="shortest">{lane(s, 1)}</Waypoint>' for s in (700, 100))
+    place = (
+        f'<Position><RoutePosition><RouteRef><Route name="r" closed="false">{points}</Route></RouteRef>'
+        "<InRoutePosition>"
+        '<FromLaneCoordinates pathS="100" laneId="-1" laneOffset="0.3"/></InRoutePosition></RoutePosition></Position>'
+    )
+    file = write(tmp_path, {"Ego": CAR, "Other": CAR}, {"Ego": EGO, "Other": place}, stop=after(1.0))
+    with pytest.warns(match="lane -1 leads against the route; read as counted along it, which is lane 1"):
+        steps = run(file)
+    assert motion_at(steps, 0.0, "Other")[:2] == pytest.approx((600.0 - 3.7, 1.75 - 0.3), abs=0.01)
+
+
+def test_places_may_be_relative_to_one_off_the_lanes(tmp_path: Path) -> None:
+    ann = '<Position><WorldPosition x="150" y="-9" h="1.5708"/></Position>'
+    ben = '<Position><RelativeObjectPosition entityRef="Ann" dx="2" dy="1"/></Position>'
+    begin = {"Ego": EGO, "Ben": ben, "Ann": ann}
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON, "Ben": PERSON}, begin, stop=after(1.0)))
+    assert motion_at(steps, 0.9, "Ben")[:2] == pytest.approx((149.0, -7.0 + 0.25), abs=0.01)
+
+
 def test_the_moon_is_no_share_of_the_sky(tmp_path: Path) -> None:
     file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO})
     file.write_text(file.read_text(encoding="utf-8").replace('illuminance="20000"', 'illuminance="0.1"'))

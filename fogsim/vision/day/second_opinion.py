@@ -339,7 +339,7 @@ def _ends(own: Estimate) -> tuple[float, float]:
 
 def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
-    if verdict.reason or not (verdict.is_sure and verdict.is_even):
+    if verdict.reason or not verdict.is_sure:
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
         return refused(own, reason)
     return Estimate(

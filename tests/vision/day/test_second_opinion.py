@@ -59,8 +59,9 @@ def test_the_day_model_answers_where_the_other_has_none_and_else_says_why_not(sa
     assert found.valid
     assert found.visibility_interval == pytest.approx((46.0, 54.0), rel=0.02)
     assert said(none, SILENT)[0].diagnostics["reason"] == "dark"
-    for unsure in (replace(DENSER, is_sure=False), replace(DENSER, is_even=False)):
-        assert said(none, unsure)[0].diagnostics["reason"] == "no sky is seen above the road"
+    unsure = said(none, replace(DENSER, is_sure=False))[0]
+    assert not unsure.valid
+    assert unsure.diagnostics["reason"] == "no sky is seen above the road"
 
 
 def test_two_answers_that_exclude_one_another_are_spanned_or_given_up(said):

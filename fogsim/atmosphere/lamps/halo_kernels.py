@@ -17,6 +17,7 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     PIXELS,
     PLACE_U,
     PLACE_V,
+    RANGE,
     SHOWN,
     SIDES,
     STRENGTH,
@@ -281,15 +282,68 @@ def add_glow_cores(
                 out[v, _THREE * u + _SECOND] += light * blue
 
 
+_SHINING = 500.0
+"""Luminance beyond which a surface shines by itself [cd/m²]: lamps do, and what reflects is darker when they count."""
+
+_SAME_PLACE = 1.0
+"""Difference of distances up to which a pixel shows a lamp of the same vehicle [m]."""
+
+
 @kernel
-def _drawn_about(luminance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
-    """Sum of the luminance of the sixteen pixels about a place, beyond that of the darkest, their background."""
-    drawn, least, count = 0.0, math.inf, 0
-    for v in range(max(0, v0 - 1), min(luminance.shape[0], v0 + 3)):
-        for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
-            here = _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
+def _luminance_at(luminance: NDArray[np.float32], v: int, u: int) -> float:
+    return _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
+
+
+@kernel
+def _drawn_about(
+    luminance: NDArray[np.float32], distance: NDArray[np.float32], u0: int, v0: int, far: float
+) -> tuple[float, float]:
+    """Luminance of the sixteen pixels about a place: sum beyond that of the darkest, and sum of those of lamps there.
+
+    Takes `far` [m].
+    """
+    drawn, shining, least, count = 0.0, 0.0, math.inf, 0
+    for v in range(max(0, v0 - 1), min(distance.shape[0], v0 + 3)):
+        for u in range(max(0, u0 - 1), min(distance.shape[1], u0 + 3)):
+            here = _luminance_at(luminance, v, u)
             drawn, least, count = drawn + here, min(least, here), count + 1
-    return max(drawn - count * least, 0.0)
+            if here > _SHINING and abs(distance[v, u] - far) < _SAME_PLACE:
+                shining += here
+    return max(drawn - count * least, 0.0), shining
+
+
+@kernel
+def _dim_about(
+    luminance: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    u0: int,
+    v0: int,
+    far: float,
+    share: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Take a share of what was drawn from those of the sixteen pixels about a place that show lamps (`far` [m])."""
+    for v in range(max(0, v0 - 1), min(distance.shape[0], v0 + 3)):
+        for u in range(max(0, u0 - 1), min(distance.shape[1], u0 + 3)):
+            if _luminance_at(luminance, v, u) > _SHINING and abs(distance[v, u] - far) < _SAME_PLACE:
+                for j in range(3 * u, 3 * u + 3):
+                    out[v, j] = max(out[v, j] - np.float32(share) * luminance[v, j], _ZERO)
+
+
+@kernel
+def _expected_about(lamps: NDArray[np.float64], number: int, focal: float, largest: float) -> tuple[float, bool]:
+    """Sum over pixels of the luminance of a lamp and those next to it [cd/m²], and whether no large one may be there.
+
+    Takes `focal` [px], `largest` [px²].
+    """
+    total, are_small = 0.0, True
+    for j in range(lamps.shape[0]):
+        other = lamps[j]
+        apart = max(abs(other[PLACE_U] - lamps[number, PLACE_U]), abs(other[PLACE_V] - lamps[number, PLACE_V]))
+        if apart < 2.5:
+            total += other[STRENGTH] * focal**2 / max(other[AHEAD], BEHIND) ** 3
+        are_small &= other[PIXELS] < largest or apart > 2.5 + 2.0 * math.sqrt(other[PIXELS])
+    return total, are_small
 
 
 @kernel
@@ -299,17 +353,19 @@ def add_direct_light(
     largest: float,
     faintest: float,
     luminance: NDArray[np.float32],
+    distance: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add what a renderer lost of small lamps.
+    """Add what a renderer lost of small lamps, and take away what it drew too much of them.
 
     What of the luminance that a lamp should show without fog was drawn already about the lamp, shared with its
-    neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The light goes to
-    the four pixels about the place.
+    neighbours, is not added again; a lamp smaller than the pixel that shows it was drawn too bright. Of a lamp behind
+    something the part that is hidden is left out. The light goes to the four pixels about the place.
 
-    Takes `focal` [px], `largest` [px²], `faintest` [cd/m²], `luminance`, `out` (rows, cols · 3) [cd/m²].
+    Takes `focal` [px], `largest` [px²], `faintest` [cd/m²], `luminance`, `out` (rows, cols · 3) [cd/m²], `distance`
+    (rows, cols) [m].
     """
-    rows, columns = out.shape[0], out.shape[1] // 3
+    rows, columns = distance.shape
     for i in range(lamps.shape[0]):
         lamp = lamps[i]
         inside = -1 < lamp[PLACE_U] < columns and -1 < lamp[PLACE_V] < rows and lamp[AHEAD] > BEHIND
@@ -317,14 +373,17 @@ def add_direct_light(
             continue
         # Sum over pixels of the luminance [cd/m²].
         expected = lamp[STRENGTH] * focal**2 / lamp[AHEAD] ** 3
-        transmittance = math.exp(-lamp[DEPTH]) * lamp[SHOWN]
+        kept = math.exp(-lamp[DEPTH])
+        transmittance = kept * lamp[SHOWN]
         if expected * transmittance < faintest:
             continue
         u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
-        drawn, around = _drawn_about(luminance, columns, u0, v0), 0.0
-        for j in range(lamps.shape[0]):
-            if abs(lamps[j, PLACE_U] - lamp[PLACE_U]) < 2.5 and abs(lamps[j, PLACE_V] - lamp[PLACE_V]) < 2.5:
-                around += lamps[j, STRENGTH] * focal**2 / max(lamps[j, AHEAD], BEHIND) ** 3
+        drawn, shining = _drawn_about(luminance, distance, u0, v0, lamp[RANGE])
+        around, are_small = _expected_about(lamps, i, focal, largest)
+        if are_small and shining > around:
+            share = kept * expected * (1.0 / around - 1.0 / shining)
+            _dim_about(luminance, distance, u0, v0, lamp[RANGE], share, out)
+            continue
         missing = expected * max(0.0, 1.0 - drawn / around) * transmittance
         right, below = lamp[PLACE_U] - u0, lamp[PLACE_V] - v0
         for corner in range(4):

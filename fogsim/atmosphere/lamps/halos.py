@@ -195,7 +195,7 @@ class Halos:
             above = np.ascontiguousarray(camera_axes(camera, pose)[:, 2])
             self._add_glow(image, distance, camera, above, lamps, light, faintest)
         drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
-        add_direct_light(lamps, camera.focal_length, _SMALL, faintest, drawn, image)
+        add_direct_light(lamps, camera.focal_length, _SMALL, faintest, drawn, distance, image)
 
     def _add_glow(
         self,

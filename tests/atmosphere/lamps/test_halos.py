@@ -91,6 +91,17 @@ def test_what_the_renderer_drew_is_not_added_again():
     assert flux(drawn(fog(math.inf), lamps(place), view), place) == pytest.approx(0.25 * 100.0 / far**2, rel=0.01)
 
 
+def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity():
+    place, view = (200.0, 0.0, 1.5), empty_view(CAMERA)
+    view.radiance[239, 319] = 3.0 * 100.0 / 200.0**2 * 576.9**2
+    # What shines at another distance is another lamp.
+    for there, shown in ((200.0, 1.0), (150.0, 3.0)):
+        view.distance[239, 319] = there
+        out = view.radiance.copy()
+        Halos().add(out, view, CAMERA, POSE, fog(math.inf), lamps(place))
+        assert flux(out, place) == pytest.approx(shown * 100.0 / 200.0**2, rel=0.01)
+
+
 def test_two_lamps_close_together_share_what_was_drawn():
     left, right = (200.0, 0.2, 1.5), (200.0, -0.2, 1.5)
     view = empty_view(CAMERA)

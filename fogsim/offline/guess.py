@@ -20,7 +20,7 @@ from fogsim.vision.lines.segments import RoadSegments, road_segments
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 _ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
-"""Default horizontal field of view of an unknown camera [rad]."""
+"""Default field of view of an unknown camera, along the longer side of its images [rad]."""
 
 _ASSUMED_MOUNT_HEIGHT = 1.3
 """Default height of a dash camera in a passenger car [m]."""
@@ -231,11 +231,13 @@ def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | N
         return _Guessed(focal, _METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
     degrees = math.degrees(_ASSUMED_FIELD_OF_VIEW)
     warning = (
-        f"the field of view is assumed to be {degrees:g}°, and an error of the focal length goes into every visibility "
-        "one to one: look it up and give it as --field-of-view"
+        f"the field of view is assumed to be {degrees:g}° along the longer side, and an error of the focal length goes "
+        "into every visibility one to one: look it up and give its angle from left to right as --field-of-view"
     )
-    focal = 0.5 * cols / math.tan(0.5 * _ASSUMED_FIELD_OF_VIEW)
-    return _Guessed(focal, _FIELD_DEVIATION, f"ASSUMED: a field of view of {degrees:g}°", (warning,))
+    # A camera that is held upright keeps its focal length.
+    focal = 0.5 * max(cols, rows) / math.tan(0.5 * _ASSUMED_FIELD_OF_VIEW)
+    reason = f"ASSUMED: a field of view of {degrees:g}° along the longer side"
+    return _Guessed(focal, _FIELD_DEVIATION, reason, (warning,))
 
 
 def _stated_focal_length(path: Path) -> float | None:

@@ -57,6 +57,13 @@ def test_what_is_not_stated_is_assumed_and_said(drive) -> None:
     assert "ASSUMED" in camera_text(by_angle)
 
 
+def test_an_unknown_camera_that_is_held_upright_has_the_same_focal_length(tmp_path: Path) -> None:
+    for name, size in (("upright.png", (480, 640, 3)), ("level.png", (640, 480, 3))):
+        Image.fromarray(np.full(size, 120, np.uint8)).save(tmp_path / name)
+    upright, level = (guess_camera(find_source(path), horizon_row=200.0) for path in sorted(tmp_path.iterdir()))
+    assert upright.camera.focal_length == level.camera.focal_length
+
+
 def test_the_metadata_of_a_photograph_state_its_focal_length(drive, tmp_path: Path) -> None:
     image = Image.fromarray(drive.frames[0])
     exif = Image.Exif()

@@ -254,7 +254,7 @@ def _light_a_road() -> None:
     camera = Camera(160, 120, 144.0, (80.0, 60.0), 1.4, pitch=0.03)
     far = np.full((120, 160), 30.0, np.float32), np.zeros((120, 160), np.int32)
     place, one = np.array([[20.0, 0.0, 0.65]]), np.ones(1)
-    beams = RoadBeams(place, 0.0 * one, 0.65 * one, (low_beam(),), np.zeros(1, np.int64), one, 0.1)
+    beams = RoadBeams(place, 0.0 * one, 0.0 * one, 0.65 * one, (low_beam(),), np.zeros(1, np.int64), one, 0.1)
     air = Air(FogField(0.03, airlight=(0.0, 0.0, 0.0)))
     view = View(np.full((120, 160, 3), 0.01, np.float32), *far)
     air.radiance(view, camera, CameraPose((0.0, 0.0, 1.4), 0.0), Lights((), LightSources.none(), beams=beams))

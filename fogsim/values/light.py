@@ -260,6 +260,7 @@ class RoadBeams:
 
     position: NDArray[np.float64]  # (n, 3): Middle between the lamps of a pair [m]
     heading: NDArray[np.float64]  # (n,): Direction of their axes, counter-clockwise from x [rad]
+    grade: NDArray[np.float64]  # (n,): Upward inclination of the road before them [rad]
     height: NDArray[np.float64]  # (n,): Height above the road [m]
     kinds: tuple[Beam, ...]  # Kinds of lamps
     kind: NDArray[np.int64]  # (n,) int64: Number of each pair's kind

@@ -30,6 +30,7 @@ def test_who_shines_lights_the_road_and_the_camera_itself_does_not() -> None:
     assert [tuple(BEAMS)[kind] for kind in found.kind] == [Lamp.LOW_BEAM, Lamp.FRONT_FOG, Lamp.LOW_BEAM]
     assert found.scale.tolist() == [2.0, 2.0, 2.0]
     np.testing.assert_allclose(found.position[:, 2] - 2.0, found.height)
+    assert found.grade.tolist() == [0.0, 0.0, 0.0]
     assert 0.5 < found.height[0] < 0.8
     assert found.height[1] < found.height[0]
 

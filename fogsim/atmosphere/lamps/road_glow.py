@@ -216,7 +216,12 @@ def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSou
     ahead = (flux * np.stack([road.middle[:, 0] for road in roads])).sum(axis=1) / total
     heading = beams.heading[chosen]
     position = beams.position[chosen] + np.stack(
-        (ahead * np.cos(heading), ahead * np.sin(heading), -beams.height[chosen]), axis=1
+        (
+            ahead * np.cos(heading),
+            ahead * np.sin(heading),
+            ahead * np.tan(beams.grade[chosen]) - beams.height[chosen],
+        ),
+        axis=1,
     )
     way = eye - position
     slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)

@@ -24,6 +24,7 @@ class BeamsAlike(NamedTuple):
 
     places: NDArray[np.float64]  # (n, 3): Where the lamps are [m]
     headings: NDArray[np.float64]  # (n,): Directions of their axes, counter-clockwise from x [rad]
+    slopes: NDArray[np.float64]  # (n,): Rise of the road before them over its length in plan [-]
     scales: NDArray[np.float64]  # (n,): How many lamps shine together at each place
     extinction: NDArray[np.float64]  # (n,): Of the fog before each [1/m]
     height: float  # Of the lamps above the road [m]
@@ -31,7 +32,7 @@ class BeamsAlike(NamedTuple):
 
 @kernel
 def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: float, ground: GroundLight) -> None:
-    """Add beams to a map of illuminance, and set how high up what stands there is lit: as high as the lamps.
+    """Add beams to a map of illuminance, and set how high up what stands there is lit: as high as lamps there.
 
     Takes `pattern` (m, 2 l + 1) [lx], `step` [m].
     """
@@ -46,8 +47,6 @@ def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: 
         side_x, side_y = half * (step / cell) ** 2 * abs(sine), half * (step / cell) ** 2 * abs(cosine)
         first_row, last_row = y0 + min(far_y, 0.0) - side_y, y0 + max(far_y, 0.0) + side_y
         first_column, last_column = x0 + min(far_x, 0.0) - side_x, x0 + max(far_x, 0.0) + side_x
-        # Light ends at `tops`, and has faded a metre above it.
-        top = np.float32(beams.places[i, 2] + 1.0)
         for row in range(max(0, math.ceil(first_row)), min(rows, math.floor(last_row) + 1)):
             for column in range(max(0, math.ceil(first_column)), min(columns, math.floor(last_column) + 1)):
                 along = (column - x0) * cosine + (row - y0) * sine
@@ -61,7 +60,9 @@ def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: 
                 way = math.sqrt(beams.height**2 + step**2 * (along**2 + (across - half) ** 2))
                 light = beams.scales[i] * (near + (far - near) * down) * math.exp(-beams.extinction[i] * way)
                 illuminance[row, column] += np.float32(light)
-                tops[row, column] = max(tops[row, column], top)
+                # Light fades from the height of the lamps to a metre above it.
+                top = beams.places[i, 2] + beams.slopes[i] * step * along + 1.0
+                tops[row, column] = max(tops[row, column], np.float32(top))
 
 
 _CELL, CELLS = 1.0, 160
@@ -121,12 +122,14 @@ class TrafficLight:
 def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
     ahead = np.array((math.cos(pose.heading), math.sin(pose.heading)))
     origin = np.array(pose.position[:2]) + _LOOKED_AHEAD * ahead - 0.5 * (CELLS - 1) * _CELL
-    ground = GroundLight(origin, _CELL, np.zeros((CELLS, CELLS), np.float32), np.zeros((CELLS, CELLS), np.float32))
+    dark, low = np.zeros((CELLS, CELLS), np.float32), np.full((CELLS, CELLS), -np.inf, np.float32)
+    ground = GroundLight(origin, _CELL, dark, low)
     dense = _extinction_before(fog, beams)
     for kind, beam in enumerate(beams.kinds):
         for height in np.unique(beams.height[beams.kind == kind]):
             rows = np.flatnonzero((beams.kind == kind) & (beams.height == height))
-            alike = BeamsAlike(beams.position[rows], beams.heading[rows], beams.scale[rows], dense[rows], float(height))
+            lamps = beams.position[rows], beams.heading[rows], np.tan(beams.grade[rows]), beams.scale[rows]
+            alike = BeamsAlike(*lamps, dense[rows], float(height))
             add_beam_illuminance(alike, _pattern(beam, float(height)), STEP, ground)
     return ground
 

@@ -109,6 +109,7 @@ def road_beams(
     return RoadBeams(
         position=state.position[rows] + up,
         heading=state.heading[rows],
+        grade=state.grade[rows],
         height=heights,
         kinds=tuple(beams.values()),
         kind=numbers.astype(np.int64),

@@ -53,6 +53,7 @@ def beams(*places: tuple[float, float]) -> RoadBeams:
     return RoadBeams(
         position=np.array([(x, y, 0.65) for x, y in places]),
         heading=np.full(count, math.pi),
+        grade=np.zeros(count),
         height=np.full(count, 0.65),
         kinds=(low_beam(),),
         kind=np.zeros(count, np.int64),

@@ -18,6 +18,7 @@ SKY, REFLECTANCE, HEIGHT = 0.05, 0.1, 0.65
 COMING = RoadBeams(
     position=np.array([[60.0, 3.5, HEIGHT]]),
     heading=np.array([math.pi]),
+    grade=np.zeros(1),
     height=np.array([HEIGHT]),
     kinds=(low_beam(), high_beam()),
     kind=np.array([0]),
@@ -80,6 +81,25 @@ def test_behind_lamps_and_above_them_there_is_no_light() -> None:
     assert lit[(height > 0.0) & (height < 0.6)].max() > 0.0
 
 
+def test_below_sea_level_there_is_no_light_above_the_lamps_either() -> None:
+    wall = road()
+    wall.distance[:], wall.radiance[:] = 20.0, REFLECTANCE * SKY / math.pi
+    pose = dataclasses.replace(POSE, position=(0.0, 0.0, POSE.position[2] - 10.0))
+    lower = dataclasses.replace(COMING, position=COMING.position - (0.0, 0.0, 10.0))
+    lit = TrafficLight().on(wall, CAMERA, pose, fog(math.inf), lower).radiance - wall.radiance
+    height = POSE.position[2] + 20.0 * rays()[..., 2]
+    assert lit[height > 1.7].max() == 0.0
+    assert lit[(height > 0.0) & (height < 0.6)].max() > 0.0
+
+
+def test_light_follows_the_road_uphill() -> None:
+    uphill = dataclasses.replace(COMING, position=COMING.position - (0.0, 0.0, 3.0), grade=np.array([math.atan(0.1)]))
+    light, near = formula(COMING)
+    east = places()[0][..., 0]
+    near &= (east > 12.0) & (east < 25.0)
+    assert added(uphill)[near].sum() == pytest.approx(light[near].sum(), rel=0.03)
+
+
 def test_fog_takes_the_light_of_its_way() -> None:
     field = fog(100.0)
     light, near = formula(COMING, field.extinction)
@@ -91,7 +111,7 @@ def test_fog_takes_the_light_of_its_way() -> None:
 
 def test_without_sky_or_lamps_nothing_is_changed() -> None:
     seen = road()
-    none = RoadBeams(np.zeros((0, 3)), *(np.zeros(0),) * 2, (low_beam(),), np.zeros(0, np.int64), np.zeros(0), SKY)
+    none = RoadBeams(np.zeros((0, 3)), *(np.zeros(0),) * 3, (low_beam(),), np.zeros(0, np.int64), np.zeros(0), SKY)
     for beams in (none, dataclasses.replace(COMING, sky_illuminance=0.0)):
         assert TrafficLight().on(seen, CAMERA, POSE, fog(math.inf), beams) is seen
 

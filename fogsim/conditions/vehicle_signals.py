@@ -172,7 +172,8 @@ OF_VEHICLES = {
         places=_VEHICLE,
     ),
     "X.lane": Signal(
-        "lane counted from the right, from 0; or `right` and `left`, the outermost ones",
+        "lane counted from the right, from 0; or `right` and `left`, the outermost ones (in left-hand traffic the "
+        "other way round)",
         _lane,
         Kind.LANE,
         least=0.0,

@@ -157,7 +157,7 @@ def _unknown_signals(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, s
     """Traffic lights that the timeline or conditions name, and the net does not have."""
     known = edges.signals
     return {
-        at: f"the net has no traffic lights {shown(signal)}; {suggest(signal, known) if known else 'it has none'}"
+        at: f"the net has no traffic lights {shown(signal)}; {_suggested(signal, known) if known else 'it has none'}"
         for at, signal in _named_signals(scenario)
         if signal not in known
     }

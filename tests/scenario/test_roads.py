@@ -182,10 +182,14 @@ def test_actors_drive_on_a_network_of_ones_own(tmp_path: Path) -> None:
     found = {one.get("id"): (one.get("depart"), float(one.get("departPos") or "")) for one in root.iter("vehicle")}
     assert found == {"ego": ("5", 60.0), "behind": ("5", pytest.approx(60.0 - 4.6 - 20.0))}
     assert {one.get("edges") for one in root.iter("route")} == {"same_way same_way.1"}
-    with pytest.raises(InputError, match=r"scenario.yaml:5: actors.ego: the net has no edge 'same'"):
+    with pytest.raises(InputError, match=r"scenario.yaml:5: actors.ego: the net has no edge 'same'; did you mean"):
         loaded(tmp_path, OWN_NET.replace("EDGES", "same"))
+    foot = (tmp_path / "road.net.xml").read_text(encoding="utf-8").replace("<lane ", '<lane allow="pedestrian" ')
     with pytest.raises(InputError, match=r"actors.ego: needs edges"):
         loaded(tmp_path, OWN_NET.replace("edges: [EDGES], ", ""))
+    (tmp_path / "road.net.xml").write_text(foot, encoding="utf-8")
+    with pytest.raises(InputError, match=r"actors.ego: edge 'same_way' has no lane for vehicles, only for pedestrians"):
+        loaded(tmp_path, OWN_NET.replace("EDGES", "same_way"))
 
 
 def test_actors_need_a_road(tmp_path: Path) -> None:

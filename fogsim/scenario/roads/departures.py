@@ -1,12 +1,11 @@
 """Vehicles of free types and ways that a timeline brings onto the road: where each begins."""
 
 from fogsim.errors import suggest
-from fogsim.scenario.roads.files import road_layout, traffic_files
+from fogsim.scenario.roads.files import no_edge, road_layout, traffic_files
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.timeline import Entries, operations
 from fogsim.scenario.timeline.vehicle_actions import DepartAction, VehicleActions
 from fogsim.traffic.road.configuration import configured_files
-from fogsim.traffic.road.network import read_net_edges
 from fogsim.traffic.templates import Actor, Placed, PlacementError, check_placement, read_ways
 from fogsim.traffic.templates.placement import Ways, edge_at
 from fogsim.units import KMH_PER_MPS
@@ -48,9 +47,7 @@ def _on_net(vehicle: str, action: DepartAction, scenario: ScenarioFile) -> Enter
     ways = read_ways(net, {first: action.edges})
     for edge in action.edges:
         if edge not in ways.edges:
-            known = read_net_edges(net, ())
-            hint = f"; {suggest(edge, known.lanes)}" if known else ""
-            raise PlacementError(vehicle, f"the net has no edge {edge!r}{hint}")
+            raise PlacementError(vehicle, no_edge(edge, net))
     length = ways.edges[first].length
     if (action.position_m or 0.0) > length:
         raise PlacementError(vehicle, f"position_m counts along {first!r}, which is {length:.0f} m long")

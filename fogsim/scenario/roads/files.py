@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from fogsim.core.files.generated_files import write_generated
-from fogsim.errors import InputError, suggest
+from fogsim.errors import InputError, nearest_of, suggest
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import ScenarioFile
+from fogsim.traffic.road.network import read_net_edges
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
     WALKING_SPEED,
@@ -39,6 +40,8 @@ from fogsim.traffic.templates import (
 
 _NET, _ROUTES, _BESIDE = "road.net.xml", "road.rou.xml", "road.add.xml"
 _SECONDS_PER_HOUR = 3600.0
+_MOST_NAMED = 10
+"""Edges that a message names."""
 AnyScenario = TypeVar("AnyScenario", bound=ScenarioFile)
 
 
@@ -116,9 +119,18 @@ def _actors_on(net: Path, scenario: ScenarioFile) -> str:
     for name, way in edges.items():
         for edge in way:
             if edge not in ways.edges:
-                raise PlacementError(name, f"the net has no edge {edge!r}")
+                raise PlacementError(name, no_edge(edge, net))
     check_placement(placed, ways)
     return actors_text(ways, placed)
+
+
+def no_edge(edge: str, net: Path) -> str:
+    """Say that a network has no such edge, and which it has."""
+    known = read_net_edges(net, ())
+    if known is None:
+        return f"the net has no edge {edge!r}"
+    more = f", … ({len(known.lanes)} in all)" if len(known.lanes) > _MOST_NAMED else ""
+    return f"the net has no edge {edge!r}; {suggest(edge, nearest_of(edge, known.lanes, _MOST_NAMED))}{more}"
 
 
 def _declared(name: str, sections: Mapping[str, ActorSection]) -> ActorSection:

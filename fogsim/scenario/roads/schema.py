@@ -276,7 +276,8 @@ class ActorSection(Section):
     """Way that it takes on a network of one's own: edges, one after the other; by default as `on`."""
 
     lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=9)] = "right"
-    """Lane: `right`, `left`, or its number from the right, from 0."""
+    """Lane: `right`, `left`, or its number from the right, from 0; in left-hand traffic the other way
+    round."""
 
     position_m: Distance | None = None
     """Position of its front bumper along its way; 200 where nothing else places it."""

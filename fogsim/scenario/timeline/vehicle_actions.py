@@ -177,8 +177,9 @@ class LaneAction(Section):
     """How many lanes to the left, negative to the right; in left-hand traffic the other way round."""
 
     to: Annotated[Whole, Field(ge=0, le=20)] | Literal["oncoming"] | None = None
-    """Or the lane to go to: its number from the right, from 0; or `oncoming`, the one beyond the left lane, where the
-    network lets vehicles overtake there (SUMO's `neigh`). Any other change leads back from it to the left lane."""
+    """Or the lane to go to: its number from the right, from 0 (in left-hand traffic: from the left); or `oncoming`, the
+    one beyond the left lane, where the network lets vehicles overtake there (SUMO's `neigh`). Any other change leads
+    back from it to the left lane."""
 
     duration_s: Annotated[Time, Field(le=LONGEST_CHANGE)] | None = None
     """Time that the way over takes in pictures and positions; 3 s a lane if not given. For SUMO it changes at once."""
@@ -233,7 +234,8 @@ class DepartAction(Section):
     """Position of its front bumper along its way, or along the first of its edges; by default at the beginning."""
 
     lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=20)] | None = None
-    """Lane: `right`, `left`, or its number from the right, from 0; by default the other one's, or the right one."""
+    """Lane: `right`, `left`, or its number from the right, from 0; by default the other one's, or the right one. In
+    left-hand traffic the other way round."""
 
     speed_kmh: SpeedKmh | None = None
     """Its speed; by default that of the other one, or what its type and the limit allow."""

@@ -177,7 +177,10 @@ def check_placement(placed: Sequence[Placed], layout: Ways) -> None:
         if not actor.length <= one.position <= length:
             room = f"{actor.length:g} … {length:.0f} m"
             raise PlacementError(actor.name, f"must begin within {room} of its way, got {one.position:.0f} m")
-        lanes = layout.edge(edge_at(layout, actor.way, one.position)[0]).lanes
+        edge, _ = edge_at(layout, actor.way, one.position)
+        lanes = layout.edge(edge).lanes
+        if not lanes:
+            raise PlacementError(actor.name, f"edge {edge!r} has no lane for vehicles, only for pedestrians")
         if not -lanes <= actor.lane < lanes:
             raise PlacementError(actor.name, f"there are lanes 0 to {lanes - 1}, got {actor.lane}")
     _check_apart(placed, layout)

@@ -89,9 +89,8 @@ def table() -> str:
         scenario = fogsim.load_scenario(name)
         file = picture_of(name)
         picture = f"![{name}](pictures/gallery/{file.name})" if file.is_file() else ""
-        expected = ", ".join(f"`{one}`" for one in scenario.expect)
-        told = f"**[{name}](../scenarios/{name}/README.md)**: {' '.join(scenario.description.split())}"
-        rows.append(f"| {picture} | {told}{f' Expects {expected}.' if expected else ''} |")
+        title = f"**[{name}](../scenarios/{name}/README.md)**{' (test)' if scenario.expect else ''}"
+        rows.append(f"| {picture} | {title}: {' '.join(scenario.description.split())} |")
     return "\n".join(rows)
 
 

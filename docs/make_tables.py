@@ -173,11 +173,6 @@ def signs() -> list[tuple[str, ...]]:
     return [(f"`{name}`", kind.code, kind.meaning) for name, kind in SIGN_KINDS.items()]
 
 
-def methods() -> list[tuple[str, ...]]:
-    """Estimators with the first line of what they say of themselves."""
-    return [(f"`{name}`", (inspect.getdoc(method) or "").partition("\n")[0]) for name, method in ESTIMATORS.items()]
-
-
 def repairs(kind: type[Repair]) -> list[tuple[str, ...]]:
     """Repairs of a paper's method: name, what the paper has, and what is done instead."""
     return [(f"`{one.value}`", one.paper, one.corrected) for one in kind]
@@ -315,7 +310,6 @@ TABLES = {
             ("huang2015_rough", Huang2015Repair),
         )
     },
-    "how_to/estimate.md": {"methods": (("method", "what it reads"), methods)},
     "reference/scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "allowed", "meaning"), scenario_keys),

@@ -223,7 +223,8 @@ class Huang2015:
 
     As published all measurements count alike and visibilities are averaged. Corrected, ln k is, weighted by the
     inverse variances too: a vehicle followed over 60 m says more than a frame of road. The deviation is the mixture's,
-    which does not shrink with the number of frames, because their errors are the same road's and the same camera's.
+    which does not shrink with the number of frames, because their errors are the same road's and the same camera's, and
+    grows as the latest measurement's weight falls.
 
     Parameters
     ----------
@@ -367,6 +368,7 @@ def _combined(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
     weights = [weight / max(sd, 1e-3) ** 2 for (_, weight), sd in zip(known, relative, strict=True)]
     mean, deviation = mixture(logs, weights, [min(sd, 3.0) for sd in relative])
     extinction = math.exp(mean)
+    deviation /= math.sqrt(max(weight for _, weight in known))
     if extinction <= 1.5 * _LEAST_EXTINCTION:
         return 0.0, max(m.deviation for m, _ in known)
     return extinction, extinction * deviation

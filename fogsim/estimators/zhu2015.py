@@ -31,6 +31,9 @@ from fogsim.vision.region.road_image import CannotTellError
 FRAMES = 3
 """Frames whose inflections are averaged, and equal classes that make a state."""
 
+_STALE = 2.0
+"""Age beyond which an earlier frame is not averaged [s]: a gap, or images taken one by one."""
+
 GROWTH, GROWTH_SHARE = 2.0, 0.8
 """G_max of the published growth [linear grey levels], of least mean error in the last table of `fogsim reproduce
 zhu2015`, and ρ, which changes nothing there [-]; the paper prints neither."""
@@ -66,6 +69,7 @@ class _Reading:
 
     rows: NDArray[np.float64]
     deviation: float
+    time: float  # [s]
 
 
 @checked_parameters
@@ -170,7 +174,9 @@ class Zhu2015:
         try:
             road = seen_road(image, self._camera, self._pitch_deviation, self._growth, self._repairs, observation.lead)
             diagnostics |= {"horizon_row": road.horizon.row, "vanishing_point": road.vanishing_point}
-            self._readings.append(self._reading(road))
+            while self._readings and observation.time - self._readings[0].time > _STALE:
+                self._readings.popleft()
+            self._readings.append(self._reading(road, observation.time))
         except CannotTellError as reason:
             self._readings.clear()
             self._classes.clear()
@@ -183,14 +189,14 @@ class Zhu2015:
             own = self._confirmation.of(own, image, free_road(observation.lead), observation.time)
         return self._classified(own) if own.valid else own
 
-    def _reading(self, road: SeenRoad) -> _Reading:
+    def _reading(self, road: SeenRoad, time: float) -> _Reading:
         per_row = 2.0 / self._camera.row_distance
         if Zhu2015Repair.STEEPEST_ROW in self._repairs:
             found = steepest_fog(road, self._camera, self._repairs)
-            return _Reading(np.array([found.extinction / per_row]), found.deviation)
+            return _Reading(np.array([found.extinction / per_row]), found.deviation, time)
         rows = inflection_rows(road)
         # A region's end is known to a row at best.
-        return _Reading(rows, per_row * math.hypot(1.0, float(rows.std())))
+        return _Reading(rows, per_row * math.hypot(1.0, float(rows.std())), time)
 
     def _averaged(self) -> tuple[float, float]:
         """Extinction of the last frames and its standard deviation [1/m]."""

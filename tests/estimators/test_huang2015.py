@@ -74,6 +74,16 @@ def test_old_and_distant_measurements_fade(render, road, monkeypatch):
     assert estimator.update(Observation(frame)).diagnostics["measurements"] == 1
 
 
+def test_what_is_remembered_becomes_unsure(render, road):
+    estimator = make("huang2015", road.camera)
+    fog, dark = render(road.but(visibility=60.0)), np.zeros((480, 640), np.uint8)
+    first = estimator.update(Observation(Frame(0.0, fog, road.camera)))
+    later = [estimator.update(Observation(Frame(time, dark, road.camera))) for time in (10.0, 40.0)]
+    assert later[0].extinction == first.extinction
+    assert later[0].standard_deviation == pytest.approx(math.sqrt(math.e) * first.standard_deviation)
+    assert later[1].visibility_interval[1] == math.inf
+
+
 def test_as_published_averages_visibilities(render, road):
     estimator = make("huang2015", road.camera, as_published=True, time_scale=1e9)
     for seed, visibility in enumerate((40.0, 60.0)):

@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import weighted_row, zhu_category
-from fogsim.values import FogCategory, LeadMeasurement, Observation, Response
+from fogsim.values import FogCategory, Frame, LeadMeasurement, Observation, Response
 
 LEAD = LeadMeasurement(25.0, 0.0)
 
@@ -146,6 +146,15 @@ def test_three_frames_are_averaged_and_three_equal_classes_make_a_state(render, 
     again = estimator.update(Observation(render(road, 0)))
     assert again.diagnostics["frames"] == 1
     assert again.diagnostics["state"] is None
+
+
+def test_frames_from_before_a_gap_are_not_averaged(render, road):
+    method = make("zhu2015", road.camera)
+    for time, visibility in ((0.0, 60.0), (0.1, 60.0), (5.0, 240.0)):
+        frame = Frame(time, render(road.but(visibility=visibility)), road.camera)
+        found = method.update(Observation(frame))
+    assert found.diagnostics["frames"] == 1
+    assert found.visibility == pytest.approx(240.0, rel=0.1)
 
 
 def test_interval_covers_the_truth(render, road):

@@ -176,7 +176,7 @@ class DecisiveFrames:
         if braking > _LEAST_BRAKING:
             self._keep("braking", -braking, f"Hardest braking: {braking:.1f} m/s²", step)
         if left is not None:
-            gap = "" if step.leader is None else f", {step.leader.gap:.0f} m behind the leader"
+            gap = "" if step.leader is None else f", {round(step.leader.gap)} m behind the leader"
             self._keep("approach", left, f"Least time to collision: {left:.1f} s{gap}", step)
         hit = next((one for one in step.collisions if step.traffic.ids[row] in (one.collider, one.victim)), None)
         if hit is not None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from fogsim.study.main_metrics import metric_words, signed
+from fogsim.study.main_metrics import metric_words, short_number, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 
@@ -132,9 +132,9 @@ def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
             change = here / baseline - 1.0 if baseline > 0.0 else 0.0
             if abs(change) > _MOVED_SHARE:
                 said.append(
-                    f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} {words.unit} under the "
-                    f"baseline ({signed(100.0 * change, 2)} %). Metrics divided by it compare different amounts of "
-                    "traffic."
+                    f"{words.label}: {short_number(here)} {words.unit} with {policy}, {short_number(baseline)} "
+                    f"{words.unit} under the baseline ({signed(100.0 * change, 2)} %). Metrics divided by it compare "
+                    "different amounts of traffic."
                 )
     cohorts: dict[str, NDArray[np.float64]] = {}
     for row in rows:

@@ -80,7 +80,12 @@ def main_metrics(chosen: Iterable[str], known: Iterable[str]) -> list[str]:
     return [name for name in tuple(chosen) or MAIN_METRICS if name in there]
 
 
+def short_number(value: float, digits: int = 3, sign: str = "-") -> str:
+    """A number to `digits` significant digits, or all of a longer whole part; `sign` as in format strings."""
+    text = f"{value:{sign}.{digits}g}"
+    return (f"{value:{sign}.0f}" if "e+" in text else text).replace("-", "−")
+
+
 def signed(value: float, digits: int = 3) -> str:
     """A difference with its sign, to `digits` significant digits."""
-    text = f"{value:+.{digits}g}"
-    return (f"{value:+.0f}" if "e+" in text else text).replace("-", "−")
+    return short_number(value, digits, "+")

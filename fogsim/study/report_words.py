@@ -8,7 +8,7 @@ from typing import NamedTuple
 from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
-from fogsim.study.main_metrics import MetricWords, metric_words, signed
+from fogsim.study.main_metrics import MetricWords, metric_words, short_number, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row, rows_of_cells
 
@@ -71,7 +71,7 @@ def _first_part(remark: str | None) -> list[str]:
 def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> TableCell:
     scale = metric_words(metric).scale
     values = [v for row in rows if (v := number_of(row.get(metric))) is not None]
-    text = f"{scale * sum(values) / len(values):.3g}" if values else "–"
+    text = short_number(scale * sum(values) / len(values)) if values else "–"
     events = _events(event_count(metric, rows))
     if one is None:
         return TableCell(text, events)
@@ -118,13 +118,13 @@ def comparison_table(
     body: list[list[str | TableCell]] = []
     for one in differences:
         unknown = one.untested or remarks.get(one.metric, "–")
-        interval = unknown if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
+        interval = unknown if one.low is None else f"{short_number(one.low)} … {short_number(one.high)}"
         means = zip((one.baseline_mean, one.mean), events_of_both(study, cells, one), strict=True)
         body.append(
             [
                 *(one.metric, *one.levels.values()),
-                *(TableCell(f"{mean:.3g}", _events(count)) for mean, count in means),
-                *(f"{one.difference:+.3g}", interval),
+                *(TableCell(short_number(mean), _events(count)) for mean, count in means),
+                *(signed(one.difference), interval),
                 *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
                 "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),
             ]

@@ -12,7 +12,7 @@ from fogsim.metrics import RunMetrics, step_metrics
 from fogsim.recorders import ReportRecorder, RunDirectory, RunInformation, versions
 from fogsim.recorders.report import key_numbers, shown_metric
 from fogsim.recorders.report_figures import MOST_PICTURES, Album, DecisiveFrames
-from fogsim.values import Step
+from fogsim.values import Leader, Step
 from tests.recorders.synthetic import METHODS, drive, make_step
 
 
@@ -121,6 +121,12 @@ def test_decisive_frames_are_those_of_the_extremes_in_order_of_time() -> None:
         ("Hardest braking", 2.0),
         ("Least time to collision", 3.0),
     ]
+
+
+def test_a_leader_that_is_touched_is_no_minus_0_m_ahead() -> None:
+    frames = DecisiveFrames()
+    frames.add(make_step(0, leader=Leader("lead", gap=-0.3, speed=0.0)), {"time_to_collision_s": 0.0})
+    assert frames.in_order()[0][0].endswith(", 0 m behind the leader")
 
 
 def test_pictures_say_where_and_what_was_true_and_believed(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fogsim.scenario import load_scenario
-from fogsim.study.main_metrics import MAIN_METRICS, signed
+from fogsim.study.main_metrics import MAIN_METRICS, short_number, signed
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.profile_figures import collisions_figure, speed_figure
 from fogsim.study.profiles import CLASSES, PooledProfiles, pool_profiles
@@ -271,3 +271,5 @@ def test_profiles_of_runs_add_up() -> None:
 def test_differences_are_signed_and_short() -> None:
     for value, said in [(-0.0123456, "−0.012"), (99.9, "+100"), (1234.5, "+1234"), (-2e-7, "−2e−07"), (0.0, "+0")]:
         assert signed(value, 2) == said
+    for value, said in [(-52.84, "−52.8"), (999.7, "1000"), (12345.6, "12346"), (0.02, "0.02")]:
+        assert short_number(value) == said

@@ -30,6 +30,8 @@ _LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, fl
     Surface.LAMP_INDICATOR_RIGHT: (Lamp.INDICATOR_RIGHT, 15e3, _AMBER),
     Surface.LAMP_HEAD: (_BEAMS, 30e3, _WHITE),
     Surface.LAMP_STREET: (Lamp.NONE, 30e3, _WARM),
+    Surface.DIODES_WHITE: (Lamp.NONE, 75.0, _WHITE),
+    Surface.DIODES_RED: (Lamp.NONE, 18.0, _RED),
     Surface.LENS_RED: (SignalLight.RED, _LENS, SIGNAL_COLOURS[SignalLight.RED]),
     Surface.LENS_YELLOW: (SignalLight.YELLOW, _LENS, SIGNAL_COLOURS[SignalLight.YELLOW]),
     Surface.LENS_GREEN: (SignalLight.GREEN, _LENS, SIGNAL_COLOURS[SignalLight.GREEN]),
@@ -38,7 +40,8 @@ _LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, fl
 
 Luminous intensity over area: a tail lamp of 8 cd and 60 cm², a stop lamp of 100 cd and 60 cm², a rear fog lamp of
 200 cd and 100 cm², a head lamp seen next to its beam with 500 cd and 150 cm², a street lamp of 9 klm over a tenth of a
-square metre [M], a lens of a traffic light of 200 cd and 200 mm (`SIGNAL_INTENSITY`).
+square metre [M], a lens of a traffic light of 200 cd and 200 mm (`SIGNAL_INTENSITY`). The diodes of message signs are
+dimmed as by night, to about the least of class L3 of EN 12966 below 4 lx, also by day [M].
 """
 
 
@@ -57,6 +60,4 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
 
 def lighting_bits(surface: Surface) -> int:
     """Bits of `Lamp`; any of them lights a surface. −1 for one that is always lit, 0 for what is no lamp."""
-    if surface == Surface.LAMP_STREET:
-        return -1
-    return int(_LAMPS[surface][0]) if surface in _LAMPS else 0
+    return (int(_LAMPS[surface][0]) or -1) if surface in _LAMPS else 0

@@ -278,6 +278,8 @@ def _copies(library: Any, shape: Mesh, batch: Batch, own: NDArray[np.bool_], whi
     reflectance = np.where(painted[:, None], paint, shape.reflectance)
     surface = shape.surface[shape.faces[:, 0]]
     shining = _shining(shape, surface, lamps)
+    if white > lamp_radiance(Surface.DIODES_WHITE).max():  # by day, diodes of signs are seen by what they reflect
+        shining &= surface < int(Surface.DIODES_WHITE)
     instance = instance or int(shape.instance[0])
     for kind in (None, *np.unique(surface[shining]).tolist()):
         chosen = ~shining if kind is None else shining & (surface == kind)

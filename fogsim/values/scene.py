@@ -33,7 +33,8 @@ class Surface(IntEnum):
 
     MATT is lit by the sky; PAINT in the same way, with the vehicle's paint in place of its own colour; ROAD has asphalt
     grain and painted lines; TERRAIN has grass grain; lamps and the lenses of traffic lights add light of their own
-    while lit, LAMP_STREET always; SHEETING is MATT by day and sends the light of head lamps back to where it came from.
+    while lit, LAMP_STREET and the diodes of signs always; SHEETING is MATT by day and sends the light of head lamps
+    back to where it came from.
     """
 
     MATT = 0
@@ -51,6 +52,8 @@ class Surface(IntEnum):
     LENS_RED = 12
     LENS_YELLOW = 13
     LENS_GREEN = 14
+    DIODES_WHITE = 15
+    DIODES_RED = 16
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,16 @@
+import contextlib
 import dataclasses
 
 import numpy as np
 import pytest
 
+from fogsim.render import make_renderer
 from fogsim.scene import build_scene
 from fogsim.scene.signs import SIGN_KINDS, gantries, sign_shapes
 from fogsim.scene.signs.kinds import face_of, shape_name
 from fogsim.scene.signs.symbols import BLACK, lettering
-from fogsim.values import Batch, RoadNetwork, Scene, Sign, SignMap, Surface
+from fogsim.values import Batch, Camera, CameraPose, RoadNetwork, Scene, Sign, SignMap, Surface
+from fogsim.values.scene import Instance
 
 LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
 ENDINGS = ["", ":far", ":tiny"]
@@ -112,6 +115,16 @@ def test_every_character_differs_and_stays_in_its_field() -> None:
         seen.add(positions.tobytes())
     assert len(seen) == 41
     assert len(lettering(" ", BLACK).faces) == 0
+
+
+def test_message_signs_shine_by_night_and_printed_ones_do_not(motorway: RoadNetwork) -> None:
+    camera = Camera(160, 120, 400.0, (80.0, 60.0), 1.4)
+    for kind, shining in (("speed_limit", False), ("variable_speed_limit", True)):
+        scene = build(motorway, dataclasses.replace(LIMIT, kind=kind))
+        with contextlib.closing(make_renderer("cpu", scene, 1e-4)) as renderer:
+            near, far = (renderer.render((), camera, CameraPose((x, -6.0, 2.2), 0.0)) for x in (190.0, 150.0))
+            lit = [float(view.radiance[view.instance == Instance.SIGN].max()) for view in (near, far)]
+        assert min(lit) > 10.0 if shining else max(lit) < 1e-4
 
 
 def test_posts_reach_from_the_ground_to_the_face(motorway: RoadNetwork) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.scene.signs.symbols import BLACK, FIELD, RED, Corners, flat
 from fogsim.scene.solids import Material, merge
-from fogsim.values.scene import Instance, Mesh
+from fogsim.values.scene import Instance, Mesh, Surface
 
 _ROUND = 36  # corners of what is round
 _CORE = 0.66  # size of the inner of two areas of a face that is very small in the picture
@@ -47,7 +47,9 @@ class Face:
         return _stacked(flat(self.coarse, self.frame), field, self.symbol)
 
     def tiny(self) -> Mesh:
-        """Two areas that have the mean colours of what is too small to see on them."""
+        """Two areas that have the mean colours of what is too small to see on them; diodes shine however small."""
+        if np.any(self.symbol.surface >= int(Surface.DIODES_WHITE)):
+            return self.far()
         field = _blended(flat(_scaled(self.coarse, self.widths[1]), self.field), self.symbol)
         core = flat(_scaled(self.coarse, _CORE), self.field)
         core = replace(core, reflectance=np.broadcast_to(field.reflectance[0], core.reflectance.shape).copy())

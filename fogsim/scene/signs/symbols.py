@@ -20,8 +20,8 @@ BLACK = _sheeting(0.022, 0.022, 0.022)
 GREY = _sheeting(0.24, 0.24, 0.24)
 YELLOW = _sheeting(0.62, 0.40, 0.02)
 BLUE = _sheeting(0.02, 0.07, 0.30)
-DIODES = Material((0.95, 0.93, 0.85))
-RED_DIODES = Material((0.75, 0.06, 0.05))
+DIODES = Material((0.95, 0.93, 0.85), Surface.DIODES_WHITE)
+RED_DIODES = Material((0.75, 0.06, 0.05), Surface.DIODES_RED)
 
 _BARS = (-0.28, -0.14, 0.0, 0.14, 0.28)
 

@@ -1,5 +1,6 @@
 """Policies to compare an agent with: nothing, one speed, FogSim's own rule, what knows the truth, and chance."""
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -15,6 +16,7 @@ from fogsim.errors import InputError
 from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
+from fogsim_envs.infos import numbers_of
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of
 from fogsim_envs.task.drive import FogDriveEnv
 from fogsim_envs.task.rewards import FRONT_FOG_LAMP_VISIBILITY, REAR_FOG_LAMP_VISIBILITY, TaskWeights
@@ -88,7 +90,7 @@ class Oracle(Unremembering):
 
     def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
         """Choose; see `Policy`."""
-        truth, limit = info["truth"], info["speed_limit_mps"]
+        truth, limit = numbers_of(info, "truth"), info["speed_limit_mps"]
         speeds = [*(speed for speed in ADVISED_SPEEDS if speed < limit), limit]
         # Off the lanes there is no limit, and no way to drive.
         sight, moves = truth["visibility_ahead_m"], math.isfinite(limit)
@@ -111,7 +113,8 @@ class RandomActions:
     """Any action, as likely as any other."""
 
     def __init__(self, action_space: spaces.Space[Any]) -> None:
-        self._space = action_space
+        # Episodes of a batch have one space, and each has numbers of its own.
+        self._space = copy.deepcopy(action_space)
 
     def reset(self, seed: int) -> None:
         """Begin the numbers of an episode; see `Policy.reset`."""

@@ -1,5 +1,6 @@
 """How good a policy is: return, safety and speed over episodes, with intervals."""
 
+import copy
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,9 +13,9 @@ from numpy.typing import NDArray
 
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim_envs.baselines import Info, Policy, baseline, check_baseline
-from fogsim_envs.infos import reward_terms_of, row_of, word_of
+from fogsim_envs.infos import numbers_of, row_of, word_of
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
@@ -33,7 +34,7 @@ class Predictor(Protocol):
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> Any:
-        """Choose an action; gives it and a state."""
+        """Choose an action; returns it and a state."""
 
 
 AnyPolicy = Policy | Predictor | Callable[..., Any] | str
@@ -128,9 +129,9 @@ def evaluate(
     Parameters
     ----------
     policy : Policy, Predictor or str
-        Callable of observation and info; an agent with ``predict(observation, deterministic=True)``, as those of
-        Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES` (of FogCorridor:
-        `fogsim_envs.corridor.baselines.SIGN_BASELINES`).
+        Callable of observation and info; an agent whose ``predict(observation, state, episode_start,
+        deterministic=True)`` returns an action and a state, as those of Stable-Baselines3; or the name of one of
+        `fogsim_envs.baselines.BASELINES` (of FogCorridor: `fogsim_envs.corridor.baselines.SIGN_BASELINES`).
     env_id : str, gymnasium.Env or pettingzoo.ParallelEnv
         The environment; one that is made here has ``split="test"`` and ``metrics=True`` by default. Of several agents
         (``fogsim/FogCorridor-v1``) each asks the policy by itself, and all are paid the same.
@@ -144,7 +145,8 @@ def evaluate(
     Raises
     ------
     InputError
-        If there are no seeds, the discount is none, or a baseline that advises speeds is given for FogDrive.
+        If there are no seeds, the discount is none, the environment is of version 0, or a baseline that advises speeds
+        is given for FogDrive.
     """
     numbers = tuple(seeds)
     if not numbers:
@@ -152,6 +154,11 @@ def evaluate(
     if discount == 0.0:
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
+        if not isinstance(env_id, gymnasium.Env) and not hasattr(env_id, "possible_agents"):
+            raise InputError(
+                f"env_id: expected an id, a gymnasium.Env or a pettingzoo.ParallelEnv, got {shown(env_id)}; "
+                "evaluate runs an id of a batch by itself"
+            )
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
     if env_id.rpartition(":")[2].startswith(_BATCH):
         return summarise(_batch_episodes(policy, env_id, numbers, discount, arguments))
@@ -163,7 +170,12 @@ def evaluate(
 
 
 def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
-    if env_id.rpartition(":")[2] != _CORRIDOR:
+    name = env_id.rpartition(":")[2]
+    if name.startswith("fogsim/") and name.endswith("-v0"):
+        raise InputError(
+            f"env_id: expected version 1 or later, since version 0 has no split of episodes, got {env_id!r}"
+        )
+    if name != _CORRIDOR:
         return gymnasium.make(env_id, **{"split": "test", "metrics": True, **arguments})
     # It needs PettingZoo, an extra.
     from fogsim_envs.corridor import parallel_env  # noqa: PLC0415
@@ -212,19 +224,21 @@ def bootstrap_interval(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 class _Predicting:
-    """A predictor as a policy."""
+    """A predictor as a policy of so many episodes at once (`number`)."""
 
-    def __init__(self, predictor: Predictor) -> None:
-        self._predictor = predictor
-        self._state: Any = None
-        self._starts = np.ones(1, dtype=bool)
+    def __init__(self, predictor: Predictor, number: int = 1) -> None:
+        self._predictor, self._number = predictor, number
+        self.reset(0)
 
     def reset(self, seed: int) -> None:  # noqa: ARG002 - the protocol's parameters
-        self._state, self._starts = None, np.ones(1, dtype=bool)
+        self._state: Any = None
+        self._is_first = True
 
     def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
-        action, self._state = self._predictor.predict(observation, self._state, self._starts, deterministic=True)
-        self._starts = np.zeros(1, dtype=bool)
+        # In a batch all episodes begin together.
+        starts = np.full(self._number, self._is_first)
+        action, self._state = self._predictor.predict(observation, self._state, starts, deterministic=True)
+        self._is_first = False
         return np.asarray(action)
 
 
@@ -251,6 +265,12 @@ def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
     raise InputError(f"policy: expected a callable, an agent with predict(), or a baseline's name; got {policy!r}")
 
 
+def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
+    """A policy for one of several episodes or agents at once, which has a memory of its own."""
+    one = _policy(policy, action_space)
+    return copy.deepcopy(one) if one is policy else one
+
+
 class _Sums:
     """What the rewards of an episode come to."""
 
@@ -264,12 +284,12 @@ class _Sums:
         self._weight *= self._discount
         self.steps += 1
         self.cost += float(info.get("cost", 0.0))
-        for name, term in reward_terms_of(info).items():
+        for name, term in numbers_of(info, "reward_terms").items():
             self.terms[name] = self.terms.get(name, 0.0) + float(term)
 
     def result(self, seed: int, info: Info, struck: bool) -> EpisodeResult:
         ending, time = word_of(info, "ending") or "time", float(info.get("time_s", math.nan))
-        metrics = dict(info.get("metrics", {}))
+        metrics = numbers_of(info, "metrics")
         return EpisodeResult(seed, self.value, self.steps, time, ending, struck, self.cost, self.terms, metrics)
 
 
@@ -290,9 +310,9 @@ def _batch_episodes(
     """All episodes at once."""
     envs: Any = gymnasium.make_vec(env_id, num_envs=len(seeds), **{"split": "test", **arguments})
     if isinstance(policy, Predictor):
-        together, policies = _policy(policy, envs.single_action_space), []
+        together, policies = _Predicting(policy, len(seeds)), []
     else:
-        policies = [_policy(policy, envs.single_action_space) for _ in seeds]
+        policies = [_own_policy(policy, envs.single_action_space) for _ in seeds]
         for one, seed in zip(policies, seeds, strict=True):
             one.reset(seed)
     observations, infos = envs.reset(seed=list(seeds))
@@ -317,7 +337,7 @@ def _batch_episodes(
 
 def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -> EpisodeResult:
     """One episode of several agents who are paid the same."""
-    policies = {agent: _policy(policy, env.action_space(agent)) for agent in env.possible_agents}
+    policies = {agent: _own_policy(policy, env.action_space(agent)) for agent in env.possible_agents}
     for number, one in enumerate(policies.values()):
         one.reset(len(policies) * seed + number)
     observations, infos = env.reset(seed=seed)

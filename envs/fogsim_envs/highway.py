@@ -169,7 +169,7 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
         If anything does not fit.
     """
     duration = [f"duration_s={float(config['duration'])!r}"] if "duration" in config else []
-    fog = f"fog.visibility_m={visibility!r}"
+    fog = f"fog.visibility_m={float(visibility)!r}"
     margin = f"traffic.stop_before_end_m={_END_MARGIN!r}"
     scenario = attached_scenario(EGO, [*duration, fog, margin, *_clocks(config), *overrides])
     if scenario.road is not None:

@@ -13,8 +13,6 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
 }
 """Words by the number that stands for each."""
 
-_TERMS = "reward_terms"
-
 
 def flat_numbers(info: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
     """Numbers of a nested info under keys like ``truth/visibility_m``; other values are left out."""
@@ -35,10 +33,10 @@ def word_of(info: Mapping[str, Any], key: str) -> str:
     return value if isinstance(value, str) else _WORDS[key][int(value)]
 
 
-def reward_terms_of(info: Mapping[str, Any]) -> dict[str, float]:
-    """Terms of the reward of an info, nested or flat."""
-    flat = {key.removeprefix(f"{_TERMS}/"): value for key, value in info.items() if key.startswith(f"{_TERMS}/")}
-    return flat or dict(info.get(_TERMS, {}))
+def numbers_of(info: Mapping[str, Any], group: str) -> dict[str, float]:
+    """Numbers of a group of an info, nested or flat, such as ``reward_terms``; empty if it has none."""
+    flat = {key.removeprefix(f"{group}/"): value for key, value in info.items() if key.startswith(f"{group}/")}
+    return flat or dict(info.get(group, {}))
 
 
 def row_of(infos: Mapping[str, Any], row: int) -> dict[str, Any]:

@@ -136,6 +136,43 @@ def test_the_belief_is_the_grid_filters() -> None:
         assert one["belief_deviation"] == pytest.approx(expected.log_standard_deviation, abs=0.05)
 
 
+class Alternating:
+    """A policy with a memory: no advice and 20 km/h in turn."""
+
+    def reset(self, seed: int) -> None:
+        self.number = seed
+
+    def __call__(self, _: Any, __: Any) -> np.ndarray:
+        self.number += 1
+        return np.array([12 * (self.number % 2), 0])
+
+
+class Recurrent:
+    """An agent that expects the beginning of each episode, as those with a recurrent network do."""
+
+    def predict(self, observation: Any, state: Any, episode_start: Any, **_: bool) -> tuple[np.ndarray, int]:
+        assert episode_start.tolist() == [state is None] * len(observation)
+        return np.tile([12, 0], (len(observation), 1)), 1
+
+
+def test_episodes_of_an_evaluation_do_not_depend_on_each_other() -> None:
+    for policy in ("random", Alternating()):
+        together = fogsim_envs.evaluate(policy, BATCH, [0, 1, 2])
+        alone = [fogsim_envs.evaluate(policy, BATCH, [seed]) for seed in range(3)]
+        assert [one.value for one in together.episodes] == [one.mean for one in alone]
+    assert fogsim_envs.evaluate(Recurrent(), BATCH, [0, 1]).mean == fogsim_envs.evaluate("none", BATCH, [0, 1]).mean
+
+
+def test_who_is_struck_is_not_at_fault() -> None:
+    envs, rng, found = made(200), np.random.default_rng(0), set[tuple[str, str]]()
+    envs.reset(seed=0)
+    for _ in range(300):
+        *_, infos = envs.step(np.stack([rng.choice([0, 12], 200), np.zeros(200, int)], axis=1))
+        ends = infos.get("final_info", infos)
+        found |= set(zip(ends["ending"].tolist(), ends["fault"].tolist(), strict=True))
+    assert found == {("", ""), ("arrived", ""), ("collision", "ego"), ("collision", "other")}
+
+
 @pytest.mark.parametrize("episodes", [40, pytest.param(200, marks=pytest.mark.nightly)])
 def test_baselines_rank_as_on_sumo(episodes: int) -> None:
     found = {name: fogsim_envs.evaluate(name, BATCH, range(episodes)) for name in ("none", "rule", "oracle", "random")}

@@ -21,7 +21,7 @@ from fogsim_envs.corridor.baselines import DARK
 from fogsim_envs.corridor.loops import InductionLoops, LoopReading
 from fogsim_envs.corridor.observation import CORRIDOR_FEATURES, RoadKnowledge, loop_places, sign_observation
 from fogsim_envs.corridor.rewards import CorridorReward, lost_share, overdriven
-from fogsim_envs.infos import reward_terms_of
+from fogsim_envs.infos import numbers_of
 from fogsim_envs.task import FogDistribution
 from tests.helpers.vehicles import vehicles
 
@@ -93,7 +93,11 @@ def test_a_sign_shows_what_its_agent_chose_and_all_are_paid_the_same(signs: FogC
     assert second[shown["shown_speed_upstream"]] == first[shown["shown_speed"]]
     assert first[shown["shown_speed_downstream"]] == second[shown["shown_speed"]] == 1.0
     assert np.array_equal(signs.state(), np.concatenate([first, second]))
-    assert rewards["sign_0"] == rewards["sign_1"] == pytest.approx(sum(reward_terms_of(infos["sign_0"]).values()))
+    assert (
+        rewards["sign_0"]
+        == rewards["sign_1"]
+        == pytest.approx(sum(numbers_of(infos["sign_0"], "reward_terms").values()))
+    )
     heard = signs._step.traffic.advised_speed
     assert np.isclose(heard[np.isfinite(heard)], 60 / 3.6).all()
     assert np.isfinite(heard).any()

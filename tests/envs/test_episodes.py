@@ -1,10 +1,13 @@
 """Episodes that are drawn: repeated, and of splits."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.scenario import load_scenario
+from fogsim.scenario import Scenario, load_scenario
+from fogsim_envs.task import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
 
@@ -15,6 +18,22 @@ def test_a_repeated_episode_is_of_the_same_scenario() -> None:
     for _ in range(3):
         again, repeated = source.draw(rng, EpisodeChoice(episode=drawn.episode.as_info()))
         assert (again, repeated.scenario) == (seed, drawn.scenario)
+
+
+def test_numpys_numbers_draw_the_same_episodes() -> None:
+    def drawn(number: Any, scenario: str | None) -> Scenario:
+        fog = None if scenario else FogDistribution(bank_length=(number, number), clear_share=0.0, even_share=0.0)
+        scenes = (
+            ScenarioDistribution(pitch_error=number / 1024, focal_length_error=number / 1024)
+            if scenario is None
+            else None
+        )
+        source = EpisodeSource(scenario, scenes, fog, (), "train")
+        return source.draw(np.random.default_rng(0), EpisodeChoice(visibility=number))[1].scenario
+
+    for scenario in (None, "clear_day"):
+        expected = drawn(2.0, scenario)
+        assert all(drawn(one(2), scenario) == expected for one in (np.float64, np.float32, np.int64))
 
 
 def test_splits_share_no_seed() -> None:

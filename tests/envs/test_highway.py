@@ -178,7 +178,9 @@ def test_bad_arguments() -> None:
 @pytest.mark.parametrize(("name", "config"), [("highway-v0", FEW), ("merge-v1", {}), ("roundabout-v1", {})])
 def test_the_wrapper_adds_a_camera(name: str, config: dict[str, Any]) -> None:
     plain = gymnasium.make(name, config=config)
-    env = FogCameraWrapper(gymnasium.make(name, config=config), image_size=(64, 48), drivers=False)
+    env = FogCameraWrapper(
+        gymnasium.make(name, config=config), image_size=(64, 48), drivers=False, visibility=np.int64(100)
+    )
     observation, info = env.reset(seed=4)
     expected, _ = plain.reset(seed=4)
     for _ in range(3):

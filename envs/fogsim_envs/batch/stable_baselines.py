@@ -28,10 +28,11 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each, with the seed that `seed` has set."""
-        first = self._seeds[0]
+        first, options = self._seeds[0], self._options[0]
         self._earned[:] = self._cost[:] = 0.0
         self._reset_seeds()
-        return self.envs.reset(seed=first)[0]
+        self._reset_options()
+        return self.envs.reset(seed=first, options=options)[0]
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for `step_wait`."""

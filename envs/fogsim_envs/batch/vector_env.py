@@ -20,6 +20,7 @@ from fogsim_envs.batch.beginning_kernels import begin
 from fogsim_envs.batch.drawing import draw_numbers
 from fogsim_envs.batch.drive_kernels import LIMIT, advance
 from fogsim_envs.batch.layout import (
+    COLLISION,
     DRAWN,
     ENDINGS,
     KNOWN_QUANTILES,
@@ -44,6 +45,7 @@ _SHOWN = (
     "time", "position", "speed", "struck", "ending", "rule_speed", "rule_lamps",
     "quantile_5", "quantile_50", "quantile_95", "visibility", "visibility_ahead",
 )  # fmt: skip
+_FAULTS = np.array(["", "ego", "other"])
 _LAMPS = np.array([int(one) for one in LAMP_MODES])
 
 
@@ -220,7 +222,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
             "route_position_m": ego["position"],
             "speed_mps": ego["speed"],
             "speed_limit_mps": np.full(self.num_envs, LIMIT),
-            "fault": np.where(ego["struck"] == 1, "ego", ""),
+            "fault": _FAULTS[np.where(ego["ending"] == COLLISION, 2 - ego["struck"], 0)],
             "ending": np.array(ENDINGS)[ego["ending"]],
             "built_in_advice_mps": ego["rule_speed"],
             "built_in_lamps": _LAMPS[ego["rule_lamps"]],

@@ -304,7 +304,7 @@ class ScenarioDistribution:
         lanes, demand, trucks = (values[int(rng.integers(len(values)))] for values in self._values())
         illuminance = _log_uniform(rng, _LIGHT[light])
         braking = _uniform(rng, 500.0, 2000.0), _uniform(rng, 3.0, 7.0), _uniform(rng, 5.0, 30.0)
-        pitch, focal = self.pitch_error * rng.standard_normal(), self.focal_length_error * rng.standard_normal()
+        pitch, focal = (float(error) * rng.standard_normal() for error in (self.pitch_error, self.focal_length_error))
         return Scene(
             light, script, driver, int(lanes), float(demand), float(trucks), illuminance, braking, pitch, focal
         )
@@ -320,7 +320,7 @@ def fog_setting(fog: Mapping[str, Any]) -> str:
 
 def _uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """The same number as `rng.uniform` gives, which takes several times as long."""
-    return low + (high - low) * rng.random()
+    return float(low + (high - low) * rng.random())
 
 
 def _log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:

@@ -138,11 +138,12 @@ class EpisodeSource:
         is_replaced = self._is_own and choice.scenario is not None
         defaults, scenes = (_NO_DEFAULTS, None) if is_replaced else (self._defaults, self._scenes)
         fog = self._given_fog or defaults.fog
-        episode = stated or _drawn(own, scenes, fog, choice.visibility)
+        visibility = None if choice.visibility is None else float(choice.visibility)
+        episode = stated or _drawn(own, scenes, fog, visibility)
         episode = replace(episode, seed=seed, driver=choice.driver or episode.driver)
         settings = [*episode.settings, *defaults.overrides, *self._overrides]
-        if choice.visibility is not None and (fog is None or stated is not None):
-            settings.append(f"fog.visibility_m={choice.visibility!r}")
+        if visibility is not None and (fog is None or stated is not None):
+            settings.append(f"fog.visibility_m={visibility!r}")
         written = choice.scenario if choice.scenario is not None else named
         return seed, Drawn(episode, self._loaded(written, (*settings, *choice.overrides)))
 

@@ -56,6 +56,13 @@ def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
     assert ended == code
 
 
+def test_text_that_the_encoding_lacks_is_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    code, printed, said = run_in_shell("-m fogsim list", tmp_path)
+    assert (code, said) == (0, "")
+    assert "grades of \\xb12 and" in printed
+
+
 OPENED = """\
 import json, os, subprocess, sys
 from fogsim.core.files.standard_streams import open_standard_streams

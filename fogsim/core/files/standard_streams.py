@@ -1,5 +1,6 @@
 """Standard streams of a process that was started without them, such as a daemon or a command with ``>&-``."""
 
+import io
 import os
 import sys
 
@@ -18,3 +19,10 @@ def open_standard_streams() -> None:
         if getattr(sys, name) is None:
             mode = "w" if descriptor else "r"
             setattr(sys, name, open(descriptor, mode, encoding="utf-8", closefd=False))  # noqa: SIM115 - for the process's life
+
+
+def print_any_text() -> None:
+    """Let stdout and stderr print characters that the locale's encoding lacks as escapes; Python raises an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

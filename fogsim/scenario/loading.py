@@ -437,10 +437,11 @@ def _placed_files(document: Document, scenario: Scenario) -> TrafficFiles:
 
 
 def _no_file(document: Document, directory: Path, key_path: KeyPath, path: Path) -> str:
-    folder = (directory / path).parent
+    is_folder = _is_folder(directory / path)
+    folder = directory / path if is_folder else (directory / path).parent
     pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
     there = sorted(p.name for p in folder.glob(pattern)) if _is_folder(folder) else []
     return (
-        f"{document.where(key_path)}: {dotted(key_path)}: there is no file {shown(str(path))} in "
-        f"{directory}; {suggest(path.name, there)}"
+        f"{document.where(key_path)}: {dotted(key_path)}: there is {'a folder and ' if is_folder else ''}no file "
+        f"{shown(str(path))} in {directory}; {suggest(path.name, there)}"
     )

@@ -137,3 +137,8 @@ def test_a_person_is_no_ego(tmp_path: Path) -> None:
     config.write_text('<configuration><net-file value="grid.net.xml"/></configuration>', encoding="utf-8")
     with pytest.raises(InputError, match=r"there is no vehicle 'ego': no route file is named$"):
         scenario_from_config(config, "ego", ["fog.visibility_m=120"])
+
+
+def test_a_folder_is_no_configuration_but_may_have_some() -> None:
+    with pytest.raises(InputError, match=r"there is a folder and no file 'grid' in .*; did you mean 'grid\.sumocfg'\?"):
+        scenario_from_config(GRID.parent, "ego", ["fog.visibility_m=120"])

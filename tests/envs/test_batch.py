@@ -210,3 +210,15 @@ def test_what_does_not_fit_is_refused() -> None:
         made(2, scenario_distribution=ScenarioDistribution(demand=(500.0, 2100.0)))
     with pytest.raises(InputError, match=r"rule\.quantile: expected one of"):
         made(2, rule=RuleConstants(quantile=0.1))
+
+
+def test_options_reach_the_batch_through_stable_baselines() -> None:
+    pytest.importorskip("stable_baselines3", reason="an extra")
+    from fogsim_envs.batch.stable_baselines import BatchVecEnv
+
+    envs = BatchVecEnv(made(2))  # type: ignore[arg-type]
+    envs.set_options({"visibility": 50.0})
+    with pytest.raises(InputError, match="no options"):
+        envs.reset()
+    envs.set_options()
+    assert envs.reset().shape == (2, 22)

@@ -93,11 +93,8 @@ def test_a_sign_shows_what_its_agent_chose_and_all_are_paid_the_same(signs: FogC
     assert second[shown["shown_speed_upstream"]] == first[shown["shown_speed"]]
     assert first[shown["shown_speed_downstream"]] == second[shown["shown_speed"]] == 1.0
     assert np.array_equal(signs.state(), np.concatenate([first, second]))
-    assert (
-        rewards["sign_0"]
-        == rewards["sign_1"]
-        == pytest.approx(sum(numbers_of(infos["sign_0"], "reward_terms").values()))
-    )
+    terms = numbers_of(infos["sign_0"], "reward_terms")
+    assert rewards["sign_0"] == rewards["sign_1"] == pytest.approx(sum(terms.values()))
     heard = signs._step.traffic.advised_speed
     assert np.isclose(heard[np.isfinite(heard)], 60 / 3.6).all()
     assert np.isfinite(heard).any()

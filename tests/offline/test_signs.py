@@ -126,6 +126,15 @@ def test_signs_are_found_where_map_and_track_have_them(folder: Path) -> None:
     assert not (drawn[:480] == MUTED).all(axis=2).any()
 
 
+def test_images_of_16_bits_show_signs_as_those_of_8_do(folder: Path) -> None:
+    looks = []
+    for pixels in (image(80.0), image(80.0).astype(np.uint16) * 257):
+        watching = watch()
+        looks.append(watching.look(pixels, 0.0, watching.sightings(0.0) or ()))
+    assert looks[0][0].detected
+    assert looks[0] == looks[1]
+
+
 def test_gpx_and_csv_with_headings_tell_the_same(folder: Path) -> None:
     tracks = [load_track(one) for one in (csv_track(folder / "a.csv", heading="30"), gpx_track(folder / "b.gpx"))]
     for track in tracks:

@@ -114,6 +114,9 @@ class SignWatch:
         tuple of SignLook
             One for each sign that the image may show.
         """
+        if image.dtype == np.uint16 and self._camera.bits == 8:
+            # Of the whole range, the upper half of the bits shows signs well enough.
+            image = (image >> 8).astype(np.uint8)
         watched = self._watch.look(Observation(Frame(time, image, self._camera), signs=sightings))
         self._passed += watched.passed
         return sign_looks(watched, self._watch.tracks)

@@ -47,6 +47,7 @@ _LINE_WIDTH = 0.2
 _LOOK = 2.0  # whether a side is free is looked at every so many metres
 _CLOSER = 8  # and so many times as closely where that changes
 _OVERLAP = 0.03  # neighbouring lanes overlap by this much on each side [m], so that no gap shows between them
+_LONGER = 0.1  # lanes reach this far beyond their ends [m], for junctions' outlines may leave gaps of centimetres
 _LIFT = 0.002  # above the lane [m]
 _STOP_WIDTH, _YIELD_WIDTH = 0.5, 0.35  # along the road [m]
 _SETBACK = 0.4  # from the lane's end [m]
@@ -56,6 +57,7 @@ _INSET = 0.16  # the middle of each of two lines between directions lies this fa
 def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
     """One lane as a strip with its road attributes."""
     centre = refined(cleaned(lane.centreline), LONGEST)
+    placed = _lengthened(np.column_stack((centre, chainage.along(lane, centre))))
     half = lane.width / 2
     lines = 3 * LINE_CODE[lane.left] + LINE_CODE[lane.right]
     # Lanes without lines are what runs across junctions; where they overlap others, the painted ones must show.
@@ -64,14 +66,23 @@ def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
     lift -= 0.0005 * chainage.follows(lane)
     left, right = (_INSET * (marking is LaneMarking.DOUBLE) for marking in (lane.left, lane.right))
     return strip(
-        centre,
+        placed[:, :3],
         (half + _OVERLAP, -half - _OVERLAP),
         lift,
         half - 0.5 * (left + right),
         lines,
-        chainage.along(lane, centre),
+        placed[:, 3],
         middle=0.5 * (right - left),
     )
+
+
+def _lengthened(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A line a little longer at both ends (`line` (n, 3 or more) [m])."""
+    longer = line.copy()
+    for end, inner in ((0, 1), (-1, -2)) if len(line) > 1 else ():
+        step = line[end] - line[inner]
+        longer[end] += _LONGER / np.hypot(step[0], step[1]) * step
+    return longer
 
 
 def strip(

@@ -8,7 +8,8 @@ import pytest
 from fogsim.scene import build_scene, street_lamp_heads
 from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.road import KERB, transverse_markings
+from fogsim.scene.polyline import Chainage
+from fogsim.scene.road import KERB, lane_mesh, transverse_markings
 from fogsim.scene.terrain import Terrain
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
 from tests.scene.conftest import road_under
@@ -134,6 +135,16 @@ def test_a_line_to_give_way_at_is_broken_and_a_crossing_is_striped() -> None:
     (stripes,) = transverse_markings([zebra])
     assert len(stripes.faces) == 2 * 10
     assert transverse_markings([dataclasses.replace(way, end=LaneEnd.OPEN)]) == []
+
+
+def test_lanes_reach_over_the_gaps_that_outlines_of_junctions_leave() -> None:
+    line = np.array([[10.0, 0.0, 1.0], [10.0, 30.0, 1.0], [40.0, 30.0, 1.0]])
+    lane = Lane("a_0", "a", line, 3.5, 20.0, LaneMarking.DASHED, LaneMarking.SOLID, outermost=True)
+    drawn = lane_mesh(lane, Chainage([lane]))
+    assert drawn.positions[:, 1].min() == pytest.approx(-0.1, abs=1e-6)
+    assert drawn.positions[:, 0].max() == pytest.approx(40.1, abs=1e-5)
+    # Its dashes are not stretched.
+    assert np.ptp(drawn.road[:, 0]) == pytest.approx(60.2, abs=1e-4)
 
 
 def test_a_double_line_lies_inside_its_lane() -> None:

@@ -55,7 +55,7 @@ def test_by_the_command_line() -> None:
     for arguments, why in (
         (("--lamps", "low_beam"), "--lamps goes with --night"),
         (("--night", "--lamps", "low_bean"), "did you mean 'low_beam'?"),
-        (("--night", "--head-lamps", "none.yaml"), "none.yaml"),
+        (("--night", "--head-lamps", "none.yaml"), "--head-lamps none.yaml: there is no such file"),
     ):
         code, told = run(*arguments)
         assert code != 0

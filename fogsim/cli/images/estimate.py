@@ -191,6 +191,7 @@ def _night_drive(
     night: bool, lamps: str | None, setback: float | None, head_lamps: Path | None, halos: Path | None
 ) -> "NightDrive | None":
     from fogsim.calibration.veil_references import lamps_named
+    from fogsim.estimators.night.own_light import KNOWN_HEAD_LAMPS
     from fogsim.offline import NightDrive
 
     if not night:
@@ -203,6 +204,9 @@ def _night_drive(
             if value is not None:
                 raise InputError(f"{option} goes with --night")
         return None
+    for option, file in (("--head-lamps", head_lamps), ("--halos", halos)):
+        if file is not None and not file.is_file() and str(file) not in KNOWN_HEAD_LAMPS:
+            raise InputError(f"{option} {file}: there is no such file")
     usual = NightDrive()
     lit = usual.lamps if lamps is None else lamps_named(lamps)
     return NightDrive(lit, usual.setback if setback is None else setback, head_lamps, halos)

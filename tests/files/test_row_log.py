@@ -1,6 +1,7 @@
 """Rows that survive the process that writes them."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow as pa
 import pytest
@@ -31,6 +32,27 @@ def test_a_log_that_was_cut_off_in_a_row_keeps_those_before(tmp_path: Path, miss
     log.append(batch((1, 2.0)))
     log.path.write_bytes(log.path.read_bytes()[:-missing])
     assert read_rows(log.path)["index"].to_pylist() == [0]
+
+
+def test_a_damaged_row_ends_the_log_and_not_the_process(tmp_path: Path) -> None:
+    schema = pa.schema([("index", pa.int64()), ("name", pa.string())])
+    log = RowLog(tmp_path / "rows", schema)
+    for index in range(2):
+        log.append(pa.RecordBatch.from_pydict({"index": [index], "name": ["abc"]}, schema=schema))
+    content = log.path.read_bytes()
+    place = content.rindex((3).to_bytes(4, "little") + bytes(4))
+    log.path.write_bytes(content[:place] + (2**30).to_bytes(4, "little") + content[place + 4 :])
+    assert read_rows(log.path).to_pydict() == {"index": [0], "name": ["abc"]}
+
+
+def test_a_disk_that_fails_is_not_the_end_of_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise OSError(5, "Input/output error")
+
+    log = RowLog(tmp_path / "rows", SCHEMA)
+    monkeypatch.setattr(pa.ipc, "open_stream", lambda _: SimpleNamespace(schema=SCHEMA, read_next_batch=fail))
+    with pytest.raises(OSError, match="Input/output error"):
+        read_rows(log.path)
 
 
 def test_what_is_no_log_is_told(tmp_path: Path) -> None:

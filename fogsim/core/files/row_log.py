@@ -1,5 +1,6 @@
 """Rows in a file that stays readable however its process ends."""
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -8,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from fogsim.core.files.atomic import Reserve, naming
-from fogsim.errors import InputError
+from fogsim.errors import FogSimError, InputError
 
 
 class RowLog:
@@ -65,20 +66,38 @@ def row_batches(path: Path) -> Iterator[Any]:
     """Batches of rows of a log (pyarrow.RecordBatch) up to where it was cut off."""
     # Opened here, since Arrow accepts only names in UTF-8.
     with path.open("rb") as file:
-        # Unreadable data is the end of a log that was cut off.
         reader = _reader(path, file)
         while True:
             try:
-                batch = reader.read_next_batch()
-            except (StopIteration, pa.ArrowInvalid, OSError):
+                with _noting_damage(path):
+                    batch = reader.read_next_batch()
+                    # What reads damaged places would end the process.
+                    batch.validate(full=True)
+            except (StopIteration, InputError):
+                # Unreadable data is the end of a log that was cut off.
                 return
             yield batch
 
 
 def _reader(path: Path, file: IO[bytes]) -> Any:
+    with _noting_damage(path):
+        reader = pa.ipc.open_stream(file)
+        if "index" in reader.schema.names:
+            return reader
+    raise InputError(f"{path} holds no rows that can be read: there is no column index")
+
+
+@contextlib.contextmanager
+def _noting_damage(path: Path) -> Iterator[None]:
+    """Raise InputError for damage, but not if the disk or memory fails: the rows are there still."""
     try:
-        return pa.ipc.open_stream(file)
-    except pa.ArrowInvalid as error:
+        yield
+    except MemoryError as error:
+        raise FogSimError(f"{path}: too little memory for its rows, or damaged: {error}") from error
+    except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
+        # Those of Arrow's own have no number.
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
         raise InputError(f"{path} holds no rows that can be read: {error}") from error
 
 

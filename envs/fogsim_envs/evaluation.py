@@ -148,7 +148,7 @@ def evaluate(
         If there are no seeds, the discount is none, the environment is of version 0, or a baseline that advises speeds
         is given for FogDrive.
     """
-    numbers = tuple(seeds)
+    numbers = tuple(int(seed) if isinstance(seed, np.integer) else seed for seed in seeds)
     if not numbers:
         raise InputError("seeds: expected at least one")
     if discount == 0.0:
@@ -331,7 +331,7 @@ def _batch_episodes(
             info = row_of(ends, i)
             sums[i].add(rewards[i], info)
             if terminated[i] or truncated[i]:
-                results[i] = sums[i].result(seeds[i], info, info["fault"] == "ego")
+                results[i] = sums[i].result(seeds[i], info, word_of(info, "fault") == "ego")
     return [results[i] for i in range(len(seeds))]
 
 

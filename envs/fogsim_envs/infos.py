@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.values import DriverWarning, Ending
 
 _WORDS: Mapping[str, tuple[str, ...]] = {
@@ -24,6 +27,18 @@ def flat_numbers(info: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             flat[f"{prefix}{key}"] = float(_WORDS[key].index(value))
         elif isinstance(value, Real):
             flat[f"{prefix}{key}"] = float(value)
+    return flat
+
+
+def flat_arrays(infos: Mapping[str, Any], prefix: str = "") -> dict[str, NDArray[np.float64]]:
+    """Numbers of a vector's nested infos under the keys of `flat_numbers`, an array each."""
+    flat: dict[str, NDArray[np.float64]] = {}
+    for key, value in infos.items():
+        if isinstance(value, Mapping):
+            flat |= flat_arrays(value, f"{prefix}{key}/")
+        else:
+            numbers = [_WORDS[key].index(word) for word in value.tolist()] if key in _WORDS else value
+            flat[f"{prefix}{key}"] = np.array(numbers, float)
     return flat
 
 

@@ -90,6 +90,14 @@ def test_the_next_episode_begins_with_the_next_step_if_asked() -> None:
         made(2, autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED)
 
 
+def test_flat_infos_are_arrays_of_numbers() -> None:
+    nested, flat = made(2).reset(seed=0)[1], made(2, flat_info=True).reset(seed=0)[1]
+    assert {value.dtype for value in flat.values()} == {np.dtype(float)}
+    assert np.array_equal(flat["truth/visibility_m"], nested["truth"]["visibility_m"])
+    found, expected = (fogsim_envs.evaluate("oracle", BATCH, range(8), flat_info=one) for one in (True, False))
+    assert found == expected
+
+
 def test_seeds_are_taken_as_gymnasium_takes_them() -> None:
     envs, other = made(3), made(3)
     first, _ = envs.reset(seed=np.int64(3))
@@ -157,7 +165,8 @@ class Recurrent:
 
 def test_episodes_of_an_evaluation_do_not_depend_on_each_other() -> None:
     for policy in ("random", Alternating()):
-        together = fogsim_envs.evaluate(policy, BATCH, [0, 1, 2])
+        together = fogsim_envs.evaluate(policy, BATCH, np.arange(3))
+        assert '"seed": 2' in together.as_json()
         alone = [fogsim_envs.evaluate(policy, BATCH, [seed]) for seed in range(3)]
         assert [one.value for one in together.episodes] == [one.mean for one in alone]
     assert fogsim_envs.evaluate(Recurrent(), BATCH, [0, 1]).mean == fogsim_envs.evaluate("none", BATCH, [0, 1]).mean

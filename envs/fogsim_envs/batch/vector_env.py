@@ -31,6 +31,7 @@ from fogsim_envs.batch.layout import (
     RuleConstants,
     SurrogateArrays,
 )
+from fogsim_envs.infos import flat_arrays
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_space
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
@@ -61,7 +62,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
 
     ### Arguments
     num_envs : how many episodes at once
-    fog_distribution, scenario_distribution, split, continuous, discrete, reward_weights, surrogate : as in
+    fog_distribution, scenario_distribution, split, continuous, discrete, reward_weights, surrogate, flat_info : as in
         `FogAdvisoryFastEnv`
     rule : `RuleConstants` of the built-in adviser
     autoreset_mode : `AutoresetMode` SAME_STEP or NEXT_STEP, or its value, "SameStep" or "NextStep"
@@ -85,6 +86,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         reward_weights: TaskWeights | None = None,
         surrogate: str | Path | None = None,
         rule: RuleConstants | None = None,
+        flat_info: bool = False,
         autoreset_mode: AutoresetMode | Literal["SameStep", "NextStep"] = AutoresetMode.SAME_STEP,
     ) -> None:
         mode = AutoresetMode(autoreset_mode)
@@ -93,7 +95,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         if continuous and discrete:
             raise InputError("continuous and discrete: expected one of them at most")
-        self.num_envs = num_envs
+        self.num_envs, self._is_flat = num_envs, flat_info
         self.single_observation_space = task_space("state", None)
         self.single_action_space = (
             spaces.Discrete(int(np.prod(ACTION_LEVELS))) if discrete else action_space(continuous)
@@ -217,7 +219,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         ego, terms = {name: self._episodes.ego[name].copy() for name in _SHOWN}, self._episodes.terms.copy()
         needed = ego["speed"] * REACTION_TIME + ego["speed"] ** 2 / (2.0 * DECELERATION)
         unseen = np.maximum(0.0, 1.0 - ego["visibility_ahead"] / np.maximum(needed, 1e-9))
-        return {
+        infos = {
             "time_s": ego["time"],
             "route_position_m": ego["position"],
             "speed_mps": ego["speed"],
@@ -235,6 +237,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
             "truth": {"visibility_m": ego["visibility"], "visibility_ahead_m": ego["visibility_ahead"]},
             "reward_terms": {name: terms[:, i] for i, name in enumerate(TERMS)},
         }
+        return flat_arrays(infos) if self._is_flat else infos
 
 
 class FogAdvisoryBatchV2Env(FogAdvisoryBatchEnv):

@@ -58,6 +58,8 @@ EGO = "ego"
 """Name of the ego in conditions, whatever its id."""
 
 
+Point = tuple[float, float]
+
 _FARTHEST_STEP = 50.0  # Farthest that vehicles come in a step [m]; positions along a closed route jump farther
 
 
@@ -70,6 +72,8 @@ class _Memory:
     )  # x, y [m] and way so far [m] by vehicle
     # Time of the latest step [s], and distances in it and in the one before [m], by pair of points
     signed: dict[tuple[str, ...], tuple[float, float, float]] = field(default_factory=dict)
+    # Time of the latest step [s], and places in it and in the one before [m], by point of a vehicle
+    points: dict[tuple[str, float], tuple[float, "Point", "Point"]] = field(default_factory=dict)
 
 
 class Moment:
@@ -136,6 +140,22 @@ class Moment:
         self._memory.signed[pair] = self.step.time, signed, before
         is_passed = before * signed < 0.0 and abs(before) + abs(signed) < _FARTHEST_STEP
         return 0.0 if is_passed else abs(signed)
+
+    def nearest_to(self, vehicle: str, behind: float, place: Point) -> float | None:
+        """Least distance of a point of a vehicle from a place since the step before [m]; None if it is not there."""
+        row = self.row(vehicle)
+        if row is None:
+            return None
+        now = body_of(self.traffic, row).behind(behind)
+        time, last, before = self._memory.points.get((vehicle, behind), (-math.inf, now, now))
+        before = before if time == self.step.time else last
+        self._memory.points[vehicle, behind] = self.step.time, now, before
+        x, y = now[0] - before[0], now[1] - before[1]
+        if (length := math.hypot(x, y)) == 0.0 or length > _FARTHEST_STEP:
+            return math.dist(now, place)
+        along = ((place[0] - before[0]) * x + (place[1] - before[1]) * y) / length**2
+        along = min(max(along, 0.0), 1.0)
+        return math.dist((before[0] + along * x, before[1] + along * y), place)
 
     def extent(self, vehicle: str) -> Extent | None:
         """The part of the route that a vehicle covers; None if it is not on it."""

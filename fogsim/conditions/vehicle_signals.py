@@ -136,6 +136,10 @@ def _distance_to(moment: Moment, vehicle: str, behind: str, x: str, y: str) -> f
     return math.dist(body.behind(parse_quantity(behind, "m")), (parse_quantity(x, "m"), parse_quantity(y, "m")))
 
 
+def _nearest_to(moment: Moment, vehicle: str, behind: str, x: str, y: str) -> float | None:
+    return moment.nearest_to(vehicle, parse_quantity(behind, "m"), (parse_quantity(x, "m"), parse_quantity(y, "m")))
+
+
 def _clearance(moment: Moment, one: str, other: str) -> float | None:
     first, second = _body(moment, one), _body(moment, other)
     return None if first is None or second is None else clearance(first, second)
@@ -209,6 +213,11 @@ OF_VEHICLES = {
     "distance_to(X, LENGTH, LENGTH, LENGTH)": length_signal(
         "straight distance between the point that is a length behind X's front bumper and the place x, y of the map",
         _distance_to,
+        places=(Place.VEHICLE, *[Place.LENGTH] * 3),
+    ),
+    "nearest_to(X, LENGTH, LENGTH, LENGTH)": length_signal(
+        "the same, the least since the step before",
+        _nearest_to,
         places=(Place.VEHICLE, *[Place.LENGTH] * 3),
     ),
     "clearance(X, Y)": length_signal(

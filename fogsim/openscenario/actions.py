@@ -252,7 +252,7 @@ class Actions(LateralActions):
         else:
             x, y = points[-1][:2]
             effect.has_unknown_end |= origin != "map" or math.dist(points[0][:2], (x, y)) < 2.0 * _AT_THE_END
-            end = f"distance_to({self.vehicles[actor].called}, {vehicle.front:g} m, {x:.3f} m, {y:.3f} m)"
+            end = f"nearest_to({self.vehicles[actor].called}, {vehicle.front:g} m, {x:.3f} m, {y:.3f} m)"
             effect.ends.append(f"{end} < {_AT_THE_END} m")
             if effect.is_at_start:
                 self.positions.paths[actor] = [(x, y) for x, y, *_ in points]

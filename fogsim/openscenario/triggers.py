@@ -16,6 +16,7 @@ _INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
 NEAR = 0.05  # Difference up to which speeds are equal [m/s]
 STEP = "0.001 s"  # Less than a camera period: what is delayed by it was so one step before
+_BESIDE = 1.5  # Least distance at which a vehicle in the same lane has been at a place [m]
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
@@ -213,13 +214,13 @@ class Triggers:
         return (f"{signal} < {near} or {signal} > {far}",)
 
     def reach_position_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`distance_to` a position; on the ego's route, ahead of the vehicle, `X.position` from its tolerance on."""
-        around = node.number("tolerance")
-        place, begins = self.positions.along_ego(node.need("Position")), self.positions.along_ego(one)
-        if place is not None and begins is not None and begins < place + one.front - around:
-            # However far it drives between two looks, it has been there.
-            return f"{one.called}.position", ">=", f"{place + one.front - around:.3f} m"
-        return self._distance_to(node, one), "<=", f"{around:.9g} m"
+        """`nearest_to` a position; with a small tolerance on the ego's route `X.position` from that on, in its lane."""
+        around, near = node.number("tolerance"), self._distance_to(node, one).replace("distance_to", "nearest_to")
+        place = self.positions.along_ego(node.need("Position"))
+        if place is None or around >= _BESIDE:
+            return near, "<=", f"{around:.9g} m"
+        # Vehicles drive in the middle of their lane, where the position need not be.
+        return (f"{one.called}.position >= {place + one.front - around:.3f} m and {near} <= {_BESIDE} m",)
 
     def _distance_to(self, node: Node, one: Vehicle) -> str:
         position = node.need("Position")

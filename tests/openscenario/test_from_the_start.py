@@ -59,6 +59,18 @@ def test_reference_points_pass_each_other_between_two_steps(tmp_path: Path) -> N
     assert steps[-1].time == pytest.approx(2.0, abs=0.11)
 
 
+@pytest.mark.parametrize(
+    ("y", "tolerance", "time"), [(-1.75, 0.2, 2.3), (-3.4, 0.2, 5.0), (-4.6, 2.0, 5.0), (-4.6, 3.0, 2.2)]
+)
+def test_a_position_is_reached_between_two_steps_but_not_beside_it(
+    tmp_path: Path, y: float, tolerance: float, time: float
+) -> None:
+    place = f'<Position><WorldPosition x="120" y="{y}"/></Position>'
+    reach = _condition(f'<ReachPositionCondition tolerance="{tolerance}">{place}</ReachPositionCondition>')
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach + after(5.0)))
+    assert steps[-1].time == pytest.approx(time, abs=0.11)
+
+
 def test_the_offset_of_one_that_drives_against_a_lane_is_kept(tmp_path: Path) -> None:
     place = '<Position><RelativeRoadPosition entityRef="Ego" ds="300" dt="0.5"><Orientation h="3.14159"/>'
     begin = {"Ego": EGO, "Other": f"{place}</RelativeRoadPosition></Position>\n{speed(10)}"}

@@ -73,7 +73,7 @@ def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
         (
             '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="7" laneId="-2" s="200"/></Position>'
             "</ReachPositionCondition>",
-            "ego.position >= 201.671 m",
+            "nearest_to(ego, 3.8 m, 300.000 m, -25.250 m) <= 2 m",
         ),
         (
             '<DistanceCondition value="9" freespace="false" rule="lessThan"><Position><RelativeObjectPosition '
@@ -83,7 +83,7 @@ def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
         (
             '<ReachPositionCondition tolerance="2"><Position><WorldPosition x="300" y="40" h="1"/></Position>'
             "</ReachPositionCondition>",
-            "distance_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m",
+            "nearest_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m",
         ),
         (
             '<DistanceCondition value="50" freespace="false" rule="greaterThan"><Position><RoadPosition roadId="7" '

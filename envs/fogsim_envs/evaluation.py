@@ -112,7 +112,8 @@ class Evaluation:
 
     def as_json(self) -> str:
         """All of it as JSON."""
-        return json.dumps(asdict(self))
+        # Seeds from numpy's ranges.
+        return json.dumps(asdict(self), default=int)
 
 
 @checked_parameters
@@ -148,7 +149,7 @@ def evaluate(
         If there are no seeds, the discount is none, the environment is of version 0, or a baseline that advises speeds
         is given for FogDrive.
     """
-    numbers = tuple(int(seed) if isinstance(seed, np.integer) else seed for seed in seeds)
+    numbers = tuple(seeds)
     if not numbers:
         raise InputError("seeds: expected at least one")
     if discount == 0.0:

@@ -138,15 +138,20 @@ def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Pa
     has_frames = scenario.traffic.has_ego and scenario.renderer != NO_RENDERER
     steps: Iterable[TrafficStep] = run(scenario, seed) if scenario.traffic.has_ego else run_traffic(scenario, seed)
     video = VideoRecorder(folder / _VIDEO, scenario.clocks.camera_period_s) if has_frames and instants else None
-    for step in steps:
-        for log in logs.values():
-            log.update(step)
-        if video is not None and isinstance(step, Step) and -BEFORE <= step.time - min(instants) <= AFTER:
-            video.record(step, step_metrics(step))
-        if instants and step.time >= max(instants) + AFTER:
-            break
-    if video is not None:
-        video.close(complete=True)
+    complete = False
+    try:
+        for step in steps:
+            for log in logs.values():
+                log.update(step)
+            if video is not None and isinstance(step, Step) and -BEFORE <= step.time - min(instants) <= AFTER:
+                video.record(step, step_metrics(step))
+            if instants and step.time >= max(instants) + AFTER:
+                break
+        complete = True
+    finally:
+        # Otherwise its encoder would wait for more.
+        if video is not None:
+            video.close(complete)
     for title, log in logs.items():
         if log.values:
             write_text(folder / f"{title}.svg", plot_signals(log, title, instants))

@@ -1,4 +1,5 @@
 import errno
+import io
 import json
 import math
 import re
@@ -163,10 +164,13 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, ending: str) -> None:
     """No room for files of this ending."""
     opened = Path.open
 
-    def refuse(path: Path, mode: str = "r", *about: Any, **more: Any) -> Any:
-        if path.name.endswith(f"{ending}.part") and "w" in mode:
-            path.touch()
+    class Full(io.FileIO):
+        def write(self, _: object) -> int:
             raise OSError(errno.ENOSPC, "No space left on device")
+
+    def refuse(path: Path, mode: str = "r", *about: Any, **more: Any) -> Any:
+        if path.name.endswith(f"{ending}.part"):
+            return Full(path, mode.replace("b", ""))
         return opened(path, mode, *about, **more)
 
     monkeypatch.setattr(Path, "open", refuse)

@@ -81,3 +81,16 @@ def test_what_goes_wrong_is_told_and_does_no_harm(
     work = KeepFailures({"a": (finding_from_json(finding("failed")),)})
     assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:78)"
     assert json.loads((tmp_path / "a.json").read_text())["status"] == "failed"
+
+
+def test_a_video_is_closed_when_its_run_fails(
+    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks(_: Scenario, __: int) -> Iterator[Step]:
+        yield next(iter(drive()))
+        raise RuntimeError("no more")
+
+    monkeypatch.setattr(artefacts, "run", breaks)
+    work = KeepFailures({"a": (finding_from_json(finding("failed", time=0.0)),)})
+    assert str(work(scenario, 0, tmp_path / "a.json")).startswith("RuntimeError: no more")
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["video.mp4"]

@@ -217,7 +217,7 @@ class FieldFilter:
         # The errors of pictures that follow one another are alike: each counts for the share of time that is new.
         floor = max(self._floor, common)
         widened = max(deviation, floor) / math.sqrt(self._share)
-        self._field.learn(start, end, value, widened, self._outlier_share, floor)
+        self._field.learn(start, end, value, widened, self._outlier_share, floor, self._share)
 
     def _hear(self, report: FogReport, time: float, place: float) -> None:
         """Learn what others have measured."""

@@ -98,13 +98,15 @@ class RouteField:
     def _weights(self, start: float, end: float) -> Floats:
         return route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
 
-    def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> float:
+    def learn(
+        self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float, share: float = 1.0
+    ) -> float:
         """Update with a measurement of the mean extinction over a stretch; return the probability that it is right [-].
 
         Takes `start`, `end` [m].
         """
         weights = self._weights(start, end)
-        return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor)
+        return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor, share)
 
     def learn_at_most(
         self, end: float, value: float, softness: float, wrong: float = 0.0, share: float = 1.0, side: float = 1.0

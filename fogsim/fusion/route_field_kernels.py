@@ -121,8 +121,11 @@ def learn(
     deviation: float,
     wrong: float,
     floor: float,
+    share: float,
 ) -> float:
     """Update in place with the mean extinction measured over a stretch; return the probability that it is right.
+
+    The deviation is widened by 1 / √`share` for errors that repeat; whether it is wrong is judged without that.
 
     Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
@@ -130,7 +133,8 @@ def learn(
     total, apart = variance + max(deviation, floor) ** 2, value - before
     if variance <= floor**2 and apart**2 < 4.0 * total:
         return 1.0
-    density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / total) / math.sqrt(2.0 * math.pi * total)
+    alone = variance + max(deviation * math.sqrt(share), floor) ** 2
+    density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / alone) / math.sqrt(2.0 * math.pi * alone)
     right = density / (density + wrong / _LOG_RANGE)
     gain = variance / total
     narrowed = right * gain * variance - right * (1.0 - right) * (gain * apart) ** 2

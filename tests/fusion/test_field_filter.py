@@ -254,3 +254,12 @@ def test_reports_do_not_date_a_belief_that_knows_no_places():
         fusion.update_at([seen(100.0)], 0.0, 0.0)
     ages = [fusion.update_at([], 70.0, 0.0, [report(100.0, 50.0, 70.0)]).age for fusion in heard.values()]
     assert ages == [70.0, 0.0]
+
+
+def test_methods_that_disagree_leave_the_interval_wide_enough_for_either():
+    rng, fusion, held = np.random.default_rng(3), make("field_filter"), []
+    for i in range(150):
+        right, wrong = (seen(v * math.exp(0.1 * rng.standard_normal()), 0.1) for v in (100.0, 300.0))
+        belief = fusion.update_at([right, wrong], PERIOD * i, SPEED * PERIOD * i)
+        held.append(belief.visibility_quantile(0.025) <= 100.0 <= belief.visibility_quantile(0.975))
+    assert np.mean(held) > 0.7

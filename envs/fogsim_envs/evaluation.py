@@ -112,8 +112,7 @@ class Evaluation:
 
     def as_json(self) -> str:
         """All of it as JSON."""
-        # Seeds from numpy's ranges.
-        return json.dumps(asdict(self), default=int)
+        return json.dumps(asdict(self))
 
 
 @checked_parameters
@@ -149,7 +148,8 @@ def evaluate(
         If there are no seeds, the discount is none, the environment is of version 0, or a baseline that advises speeds
         is given for FogDrive.
     """
-    numbers = tuple(seeds)
+    given: Iterable[Any] = seeds
+    numbers = tuple(int(seed) if isinstance(seed, np.integer) else seed for seed in given)
     if not numbers:
         raise InputError("seeds: expected at least one")
     if discount == 0.0:

@@ -35,7 +35,7 @@ _SELDOM = (
     *("device.fcd-replay.files", "device.fcd-replay.file", "device.ssm.filter-edges.input-file"),
     *("astar.all-distances", "astar.landmark-distances"),
 )
-"""Files that do not decide a run, but without some of which SUMO does not start."""
+"""Files that do not decide a run; SUMO does not start if some of them are missing."""
 _READ_BY = frozenset(("rerouter", "variableSpeedSign"))
 """Elements whose attribute ``file`` is one that SUMO reads."""
 _MOST_BYTES = 50_000_000  # of a file that may name others

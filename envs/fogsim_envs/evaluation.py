@@ -277,7 +277,7 @@ class _Sums:
 
     def __init__(self, discount: float) -> None:
         self._discount, self._weight = discount, 1.0
-        self.value, self.steps, self.cost = 0.0, 0, 0.0
+        self.value, self.steps, self.cost, self.collisions = 0.0, 0, 0.0, 0.0
         self.terms: dict[str, float] = {}
 
     def add(self, reward: float, info: Info) -> None:
@@ -285,6 +285,7 @@ class _Sums:
         self._weight *= self._discount
         self.steps += 1
         self.cost += float(info.get("cost", 0.0))
+        self.collisions += float(info.get("collisions", 0.0))
         for name, term in numbers_of(info, "reward_terms").items():
             self.terms[name] = self.terms.get(name, 0.0) + float(term)
 
@@ -347,4 +348,4 @@ def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -
         actions = {agent: policies[agent](observations[agent], infos[agent]) for agent in env.agents}
         observations, rewards, _, _, infos = env.step(actions)
         sums.add(rewards[first], infos[first])
-    return sums.result(seed, infos[first], sums.terms["collision"] < 0.0)
+    return sums.result(seed, infos[first], sums.collisions > 0.0)

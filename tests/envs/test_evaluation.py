@@ -26,3 +26,23 @@ def test_what_evaluate_cannot_run_is_refused() -> None:
     ]:
         with pytest.raises(InputError, match=f"env_id: {message}"):
             fogsim_envs.evaluate("none", env, [0])
+
+
+class Sign:
+    """A corridor of one sign and one period, in which vehicles collide."""
+
+    possible_agents = agents = ("sign_0",)
+
+    def action_space(self, _: str) -> gymnasium.spaces.Discrete:
+        return gymnasium.spaces.Discrete(6)
+
+    def reset(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        return {"sign_0": None}, {"sign_0": {}}
+
+    def step(self, _: Any) -> tuple[dict[str, Any], ...]:
+        self.agents = ()
+        return {"sign_0": None}, {"sign_0": 0.0}, {}, {}, {"sign_0": {"reward_terms/collision": 0.0, "collisions": 1.0}}
+
+
+def test_a_collision_counts_whatever_its_weight() -> None:
+    assert fogsim_envs.evaluate("none", Sign(), [0]).struck == 1.0

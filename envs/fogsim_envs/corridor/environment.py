@@ -302,6 +302,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             reward.add(self._step, elapsed)
             if self._step.ending is not None:
                 break
+        self._collisions = reward.collisions
         return reward.terms()
 
     def _observe(self) -> dict[str, NDArray[np.float32]]:
@@ -340,6 +341,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             "time_s": step.time,
             "vehicles": len(step.traffic.ids),
             "waiting": step.waiting,
+            "collisions": self._collisions,
             "ending": "" if step.ending is None else step.ending.value,
         }
         return {

@@ -58,6 +58,11 @@ class CorridorReward:
         }
         self._amounts = {name: amount + found[name] for name, amount in self._amounts.items()}
 
+    @property
+    def collisions(self) -> int:
+        """Number of collisions [-]."""
+        return int(self._amounts["collision"])
+
     def terms(self) -> dict[str, float]:
         """Weighted terms by the names of `CorridorWeights`; the reward is their sum."""
         return {name: -getattr(self._weights, name) * amount for name, amount in self._amounts.items()}

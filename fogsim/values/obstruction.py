@@ -187,8 +187,8 @@ def _straightened(line: NDArray[np.float64]) -> NDArray[np.float64]:
 _LEAST_HEIGHT = 2.0
 """A roof is a structure of kind tunnel whose underside is higher than this above its line [m]."""
 
-_SKIN = 0.1
-"""How far a space reaches into the roof over it, stays within it to the sides, and ends before its portals [m].
+_SKIN, _END = 0.1, 0.02
+"""How far a space reaches into the roof over it and stays within it to the sides, and ends before its portals [m].
 
 So what is seen of ceiling and walls from within is in it, and what is seen from without is not, rounding or no.
 """
@@ -212,9 +212,9 @@ class Tunnel:
         """Its space as boxes (m, 10), in order along its line; see `fogsim.values.obstruction`."""
         rows = np.array(_box_rows(self.line, self.half_width - _SKIN, (-1.0, self.height + _SKIN)))
         # The first begins, and the last ends, behind the portal.
-        rows[0, :3] += _SKIN * np.append(rows[0, 3:5], rows[0, 5])
-        rows[0, 6] -= _SKIN
-        rows[-1, 6] -= _SKIN
+        rows[0, :3] += _END * np.append(rows[0, 3:5], rows[0, 5])
+        rows[0, 6] -= _END
+        rows[-1, 6] -= _END
         return rows
 
 

@@ -28,7 +28,7 @@ def test_its_space_ends_within_its_walls_and_portals() -> None:
     assert not is_in(50.0, 0.0, 8.2)
     assert is_in(50.0, 5.8, 4.0)
     assert not is_in(50.0, 6.0, 4.0)  # the outer face of its wall
-    assert not is_in(0.05, 0.0, 3.0)
-    assert is_in(0.15, 0.0, 3.0)
+    assert not is_in(0.01, 0.0, 3.0)
+    assert is_in(0.03, 0.0, 3.0)  # no strip of wall at the portal is lit as if outside
     assert is_in(140.0, 30.0, 5.0)
     assert not is_in(179.99, 60.0, 5.0)

@@ -118,7 +118,9 @@ def comparison_table(
     body: list[list[str | TableCell]] = []
     for one in differences:
         unknown = one.untested or remarks.get(one.metric, "–")
-        interval = unknown if one.low is None else f"{short_number(one.low)} … {short_number(one.high)}"
+        interval = (
+            unknown if one.low is None or one.high is None else f"{short_number(one.low)} … {short_number(one.high)}"
+        )
         means = zip((one.baseline_mean, one.mean), events_of_both(study, cells, one), strict=True)
         body.append(
             [

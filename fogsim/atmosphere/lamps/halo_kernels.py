@@ -291,7 +291,8 @@ _SAME_PLACE = 1.0
 
 @kernel
 def _luminance_at(luminance: NDArray[np.float32], v: int, u: int) -> float:
-    return _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
+    """Luminance of a pixel (`luminance` (rows, cols · 3)) [cd/m²]."""
+    return float(_RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2])
 
 
 @kernel

@@ -236,8 +236,10 @@ def _fitted(points: Points, curvature: float, camera: Camera, horizon: Horizon) 
     """Fit a course to lines that are found as straight ones once a bend has been taken off."""
     focal, unit = camera.focal_length, camera.row_distance
     bend = 0.5 * curvature * focal * unit
-    ahead = Points(*(part[points.below > LIMITS[-1] * focal] for part in points))
-    lines = straight_lines(ahead._replace(across=ahead.across - bend / ahead.below), camera, horizon)
+    ahead = points.below > LIMITS[-1] * focal
+    below = points.below[ahead]
+    straightened = Points(points.across[ahead] - bend / below, below, points.kind[ahead])
+    lines = straight_lines(straightened, camera, horizon)
     marks = (lines.kind == RIDGE) & (np.abs(lines.slope) * camera.mount_height < _FARTHEST_MARK)
     if not marks.any():
         return None

@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import os
+import signal
 
 import numpy as np
 import pytest
@@ -122,6 +124,9 @@ def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
     with ClosedLoop(scenario, camera_processes=1) as loop:
         loop.start(1)
         process = loop._fleet._pools[0]._process
+        for signum in (signal.SIGINT, signal.SIGHUP):
+            os.kill(process.pid, signum)
+        loop.advance(Command())
         process.kill()
         process.join()
         with pytest.raises(SimulationError, match="has died"):

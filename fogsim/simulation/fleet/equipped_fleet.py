@@ -104,8 +104,9 @@ class UnitProcess:
 
 def _serve(link: Connection, config: RunConfig) -> None:
     """Do what is asked over a link until it is closed."""
-    # Ctrl-C, which a terminal sends to all, ends the process that asks, and that this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Ctrl-C and a terminal's end, which reach all, end the process that asks, and that this one.
+    for signum in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(signum, signal.SIG_IGN)
     pool = UnitPool(config)
     with contextlib.suppress(EOFError, OSError), contextlib.closing(pool):
         while True:

@@ -5,7 +5,7 @@ from typing import Any
 
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
-from fogsim.openscenario.positions import vertices_of
+from fogsim.openscenario.positions import from_there_on, vertices_of
 from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
@@ -225,7 +225,7 @@ class Actions(LateralActions):
         return headway, distance, action.flag("freespace")
 
     def follow_trajectory_action(self, action: Node, actor: str, effect: Effect) -> None:
-        """`path`: a polyline, by its times or at the vehicle's speed, on the lanes or off them."""
+        """`path`: a polyline, or the rest of one, by its times or at the vehicle's speed, on the lanes or off them."""
         trajectory = self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory")
         vertices = vertices_of(trajectory)
         places = [one.need("Position") for one in vertices]
@@ -238,7 +238,9 @@ class Actions(LateralActions):
         origin, points = self._own_points(places, actor, effect) or ("map", list(on_map))
         if any(len(one) == 2 for one in points) and len(points) > 1:
             points = [one[:2] for one in points]
-        vehicle = self.vehicles[actor]
+        if (left_out := action.number("initialDistanceOffset", 0.0)) and timing:
+            action.refuse("initialDistanceOffset: what has times is followed from its first vertex on; write 0")
+        points, vehicle = from_there_on(points, left_out), self.vehicles[actor]
         path: dict[str, Any] = {"points": points, "ahead_m": vehicle.front, "origin": origin}
         path |= {"stays": True} if vehicle.body else {}
         times = [one.number("time", 0.0 if timing is None else None) for one in vertices]

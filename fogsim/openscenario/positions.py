@@ -264,6 +264,25 @@ def vertices_of(trajectory: Node) -> list[Node]:
     return trajectory.need("Shape").need("Polyline").some("Vertex")
 
 
+def from_there_on(points: list[list[float]], distance: float) -> list[list[float]]:
+    """What follows of points (x, y [m], perhaps heading [°]) after a distance [m]; ValueError if nothing does."""
+    if distance < 0.0:
+        raise ValueError(f"initialDistanceOffset: expected at least 0, got {distance:g}")
+    left = distance
+    for n, (here, there) in enumerate(itertools.pairwise(points)):
+        if left <= 0.0:
+            return points[n:]
+        if left < (length := math.dist(here[:2], there[:2])):
+            share = left / length
+            place = [a + share * (b - a) for a, b in zip(here[:2], there[:2], strict=True)]
+            turns = [a + share * math.remainder(b - a, 360.0) for a, b in zip(here[2:], there[2:], strict=True)]
+            return [[*place, *turns], *points[n + 1 :]]
+        left -= length
+    if distance > 0.0:
+        raise ValueError(f"initialDistanceOffset: the trajectory is no longer than {distance - left:.1f} m")
+    return points
+
+
 def sense(spot: Spot) -> float:
     """1 on a lane along its road, -1 against it: numbers of lanes, and t, grow to the left of the road."""
     return 1.0 if all("_-" in one for one in spot.lane.origins) else -1.0

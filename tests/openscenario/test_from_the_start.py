@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from tests.openscenario.writing import CAR, after, begun, box, event, group, lane, motion_at, run, speed, write
 
@@ -30,6 +31,20 @@ def _condition(test: str, who: str = "Ego") -> str:
         '<Condition name="c" delay="0" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
         f'triggeringEntitiesRule="any"><EntityRef entityRef="{who}"/></TriggeringEntities><EntityCondition>{test}'
         "</EntityCondition></ByEntityCondition></Condition>"
+    )
+
+
+def _trajectory(offset: float) -> str:
+    """Action to follow one from (100, 10) by (160, 10) to (160, 60), from an offset on."""
+    inner = "".join(
+        f'<Vertex><Position><WorldPosition x="{x}" y="{y}"/></Position></Vertex>'
+        for x, y in ((100, 10), (160, 10), (160, 60))
+    )
+    return (
+        f'<PrivateAction><RoutingAction><FollowTrajectoryAction initialDistanceOffset="{offset}"><TrajectoryRef>'
+        f'<Trajectory name="t" closed="false"><Shape><Polyline>{inner}</Polyline></Shape></Trajectory></TrajectoryRef>'
+        '<TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/>'
+        "</FollowTrajectoryAction></RoutingAction></PrivateAction>"
     )
 
 
@@ -69,6 +84,17 @@ def test_a_position_is_reached_between_two_steps_but_not_beside_it(
     reach = _condition(f'<ReachPositionCondition tolerance="{tolerance}">{place}</ReachPositionCondition>')
     steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach + after(5.0)))
     assert steps[-1].time == pytest.approx(time, abs=0.11)
+
+
+def test_a_trajectory_is_followed_from_an_offset_on(tmp_path: Path) -> None:
+    begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(90, 1)}\n{speed(10)}\n{_trajectory(70)}"}
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=after(2.0)))
+    # 60 m and 10 m of the trajectory are left out; the front is 3.7 m ahead of the point that follows it.
+    for time in (0.1, 1.0):
+        expected = 160.0, 20.0 + 10.0 * time + 3.7
+        assert motion_at(steps, time, "Other")[:2] == pytest.approx(expected, abs=0.02)
+    with pytest.raises(InputError, match=r"initialDistanceOffset: the trajectory is no longer than 110.0 m"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(10)}\n{_trajectory(110)}"}))
 
 
 def test_the_offset_of_one_that_drives_against_a_lane_is_kept(tmp_path: Path) -> None:

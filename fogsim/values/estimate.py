@@ -206,9 +206,11 @@ class Estimate:
                 visibility_from_extinction(self.bounds.least / widened),
             )
         half_width = NORMAL_90_PERCENT * self.standard_deviation
+        least = self.extinction - half_width
         return (
             visibility_from_extinction(self.extinction + half_width),
-            visibility_from_extinction(max(self.extinction - half_width, 0.0)),
+            # What rounding leaves of a difference of equals is no visibility of 1e18 m.
+            visibility_from_extinction(least if least > 1e-9 * half_width else 0.0),
         )
 
     @property

@@ -7,7 +7,7 @@ import pytest
 
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
-from fogsim.values.estimate import ExtinctionBounds, FogCategory, fog_category
+from fogsim.values.estimate import NORMAL_90_PERCENT, ExtinctionBounds, FogCategory, fog_category
 
 
 def test_categories_of_negru2013() -> None:
@@ -32,6 +32,8 @@ def test_visibility_of_an_estimate_and_its_interval() -> None:
 
 def test_an_interval_that_reaches_clear_air_has_no_end() -> None:
     assert Estimate("negru2013", 0.01, 0.01).visibility_interval[1] == math.inf
+    # As deep as its extinction, but for rounding.
+    assert Estimate("negru2013", 0.01, (0.01 - 1e-17) / NORMAL_90_PERCENT).visibility_interval[1] == math.inf
 
 
 def test_no_estimate_says_nothing() -> None:

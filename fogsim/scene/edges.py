@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined, true_spans
-from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, strip
+from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, lengthened, strip
 from fogsim.scene.solids import Material, grid, mesh
 from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Lane, LaneKind, LaneMarking
@@ -112,25 +112,26 @@ def edge_meshes(edge: Edge, terrain: Terrain, index: LaneIndex, along: NDArray[n
     if edge.speed_limit <= TOWN:
         footway = footway_mesh(edge.line, (edge.side * edge.inner, edge.side * paved))
         return [*([footway] if edge.shoulder > 0 else []), *_down(edge, paved, KERB, terrain, index)]
-    outer = edge.inner + edge.room
+    outer, placed = edge.inner + edge.room, lengthened(np.column_stack((edge.line, distance)))
     rows = [
-        parallel(edge.line, edge.side * (paved - 0.02), -_SHOULDER_DROP - 0.001),
-        parallel(edge.line, edge.side * outer, -0.06),
+        parallel(placed[:, :3], edge.side * (paved - 0.02), -_SHOULDER_DROP - 0.001),
+        parallel(placed[:, :3], edge.side * outer, -0.06),
     ]
     verge = grid(np.stack(rows, axis=1), _GRAVEL, (0, 0, 1))
-    return [_shoulder(edge, paved, distance), verge, *_down(edge, outer, -0.06, terrain, index)]
+    return [_shoulder(edge, paved, placed), verge, *_down(edge, outer, -0.06, terrain, index)]
 
 
-def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]) -> Mesh:
+def _shoulder(edge: Edge, paved: NDArray[np.float64], placed: NDArray[np.float64]) -> Mesh:
+    """Shoulder along a line and the distance along it (`placed` (n, 4) [m])."""
     marking = LINE_CODE[edge.marking]
     return strip(
-        edge.line,
+        placed[:, :3],
         (edge.side * (edge.inner - 0.02), edge.side * paved),
         -_SHOULDER_DROP,
         edge.shoulder / 2,
         # It shows its half of the line next to it: on its right if it lies to the left of the road.
         marking if edge.side > 0 else 3 * marking,
-        along,
+        placed[:, 3],
         _SHOULDER,
         middle=edge.side * (edge.inner + edge.shoulder / 2),
     )

@@ -57,7 +57,7 @@ _INSET = 0.16  # the middle of each of two lines between directions lies this fa
 def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
     """One lane as a strip with its road attributes."""
     centre = refined(cleaned(lane.centreline), LONGEST)
-    placed = _lengthened(np.column_stack((centre, chainage.along(lane, centre))))
+    placed = lengthened(np.column_stack((centre, chainage.along(lane, centre))))
     half = lane.width / 2
     lines = 3 * LINE_CODE[lane.left] + LINE_CODE[lane.right]
     # Lanes without lines are what runs across junctions; where they overlap others, the painted ones must show.
@@ -76,7 +76,7 @@ def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
     )
 
 
-def _lengthened(line: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengthened(line: NDArray[np.float64]) -> NDArray[np.float64]:
     """A line a little longer at both ends (`line` (n, 3 or more) [m])."""
     longer = line.copy()
     for end, inner in ((0, 1), (-1, -2)) if len(line) > 1 else ():

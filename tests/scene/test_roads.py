@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.scene import build_scene, street_lamp_heads
+from fogsim.scene.edges import Edge, edge_meshes
 from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Chainage
@@ -145,6 +146,15 @@ def test_lanes_reach_over_the_gaps_that_outlines_of_junctions_leave() -> None:
     assert drawn.positions[:, 0].max() == pytest.approx(40.1, abs=1e-5)
     # Its dashes are not stretched.
     assert np.ptp(drawn.road[:, 0]) == pytest.approx(60.2, abs=1e-4)
+
+
+def test_shoulders_reach_over_gaps_as_lanes_do() -> None:
+    line, lane = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0]]), (3.5, 30.0, LaneMarking.DASHED, LaneMarking.SOLID)
+    lanes = [Lane("a_0", "a", line, *lane, outermost=True)]
+    edge = Edge(line, -1, 1.75, 30.0, 2.5, np.full(2, 3.2), LaneMarking.SOLID)
+    for part in edge_meshes(edge, Terrain(lanes), LaneIndex(lanes))[:2]:
+        assert part.positions[:, 0].min() == pytest.approx(-0.1, abs=1e-6)
+        assert part.positions[:, 0].max() == pytest.approx(30.1, abs=1e-5)
 
 
 def test_a_double_line_lies_inside_its_lane() -> None:

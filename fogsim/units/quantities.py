@@ -79,9 +79,13 @@ def _factors(written: str, unit: str) -> tuple[float, float]:
     try:
         target = units.parse_units(unit)
         there, back = units.Quantity(1.0, source).to(target), units.Quantity(1.0, target).to(source)
-        return float(there.magnitude), float(back.magnitude)
+        # To pint, angles, vehicles and persons are plain numbers.
+        fits = units.get_root_units(source)[1] == units.get_root_units(target)[1]
     except pint.PintError:
-        raise ValueError(f"the unit {written!r} does not fit; expected one such as in {example_of(unit)!r}") from None
+        fits = False
+    if not fits:
+        raise ValueError(f"the unit {written!r} does not fit; expected one such as in {example_of(unit)!r}")
+    return float(there.magnitude), float(back.magnitude)
 
 
 @functools.cache

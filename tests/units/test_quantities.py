@@ -47,6 +47,13 @@ def test_what_does_not_fit_is_refused_with_an_example():
         assert "10 m" in str(error.value)
 
 
+def test_angles_vehicles_and_persons_are_no_plain_numbers():
+    for text, unit in [("5 deg", "%"), ("10 %", "deg"), ("5 cd/m^2", "lx"), ("5 lm", "cd"), ("9 veh/h", "persons/h")]:
+        with pytest.raises(ValueError, match="does not fit"):
+            parse_quantity(text, unit)
+    assert parse_quantity("5 lm/m^2", "lx") == 5.0
+
+
 def test_every_suffix_has_a_unit_that_can_be_read():
     for unit in UNIT_OF_SUFFIX.values():
         assert parse_quantity(f"2 {unit}", unit) == 2.0

@@ -6,7 +6,9 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario, resolved
+from fogsim.scenario.loading import override
 from fogsim.scenario.timeline import vehicles_of
+from fogsim.scenario.written_form import as_written
 
 BLIND = ("renderer=none", "estimators=[]", "traffic.events=[]", "fog={visibility_m: 100}")
 
@@ -35,6 +37,16 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: this key is missing"),
         ("{lead: {speed: {to_kmh: 3, like: ego}}}", "do.lead.speed: say which speed: to_kmh, like"),
         ("{lead: {speed: {over: 3 s}}}", "do.lead.speed: say which speed: to_kmh, like"),
+        ("{lead: {speed: {to_kmh: 3, factor: 0.5}}}", "do.lead.speed: factor and plus_kmh go with like"),
+        ("{lead: {speed: {profile: [[1, 30]], shape: sinusoidal}}}", "do.lead.speed: shape goes with to_kmh or like"),
+        (
+            "{lead: {arrive: {vehicle: ego, distance_m: 9, its_distance_m: 9, factor: 1}}}",
+            "do.lead.arrive: factor goes with to_kmh",
+        ),
+        (
+            "{lead: {arrive: {vehicle: ego, distance_m: 9, its_distance_m: 9, to_kmh: 1, steady_m: 1, steady_s: 1}}}",
+            "do.lead.arrive: give steady_m or steady_s, not both",
+        ),
         ("{lead: {speed: {profile: [[2, 30], [1, 40]]}}}", "do.lead.speed: profile: each time must be later"),
         ("{lead: {follow: {vehicle: ego}}}", "do.lead.follow: say how far behind: headway_s, gap_m or both"),
         ("{lead: {path: {points: [[1, 2]]}}}", "do.lead.path: give a heading with each of points or with none"),
@@ -140,3 +152,10 @@ def test_an_end_is_a_condition_that_the_run_can_tell() -> None:
         with pytest.raises(InputError, match="end_when: ") as error:
             load_scenario("motorway_fog_bank", [*BLIND, f"end_when={written}"])
         assert told in str(error.value)
+
+
+def test_a_resolved_timeline_loads_again() -> None:
+    begins = "{when: time > 1 s, do: {lead: {brake: {hold_s: null}}, new: {depart: {like: lead, gap_m: 50}}}}"
+    scenario = load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{begins}]"])
+    assert override(scenario, []) == scenario
+    assert as_written(scenario)["timeline"][0]["do"]["lead"] == [{"brake": {"hold_s": None}}]

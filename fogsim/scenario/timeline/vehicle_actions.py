@@ -1,8 +1,8 @@
 """Keys of what a timeline makes a vehicle or person do."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer, model_validator
 
 from fogsim.errors import UnknownNameError
 from fogsim.scenario.section import (
@@ -65,6 +65,10 @@ class SpeedAction(Section):
             raise ValueError("profile: each time must be later than the one before")
         if self.continuous and self.like is None:
             raise ValueError("continuous goes with like, the vehicle whose speed it follows")
+        if self.like is None and (self.factor != 1.0 or self.plus_kmh != 0.0):
+            raise ValueError("factor and plus_kmh go with like, the vehicle whose speed they change")
+        if self.profile and self.shape is Shape.SINUSOIDAL:
+            raise ValueError("shape goes with to_kmh or like: a profile is even between its times")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
         if len(given) > 1 or (given and (self.profile or self.shape is Shape.STEP)):
             raise ValueError("give over_s, rate_mps2, profile or shape: step, not two of them")
@@ -82,6 +86,11 @@ class BrakeAction(Section):
 
     hold_s: Period | None = 30.0
     """How long it keeps that speed, from the beginning of the braking; null for the rest of the run."""
+
+    @model_serializer(mode="wrap")
+    def _with_null(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Without the null, the default would be read back.
+        return {**dump(self), **({"hold_s": None} if self.hold_s is None else {})}
 
 
 class BreakDownAction(Section):
@@ -142,6 +151,15 @@ class ArriveAction(Section):
 
     steady_s: Time = 0.0
     """Or the time."""
+
+    @model_validator(mode="after")
+    def _with_a_speed(self) -> Self:
+        given = [key for key in ("factor", "steady_m", "steady_s") if getattr(self, key)]
+        if given and self.to_kmh is None:
+            raise ValueError(f"{given[0]} goes with to_kmh, which is missing")
+        if self.steady_m and self.steady_s:
+            raise ValueError("give steady_m or steady_s, not both")
+        return self
 
 
 class StopAction(Section):
@@ -251,7 +269,7 @@ class DepartAction(Section):
     def _one_place(self) -> Self:
         if (self.like is None) != (self.gap_m is None):
             raise ValueError("like and gap_m go together: near whom, and how far")
-        own = [key for key in ("on", "edges", "position_m") if key in self.model_fields_set]
+        own = [key for key in ("on", "edges", "position_m") if getattr(self, key) not in (None, ())]
         if self.like is not None and own:
             raise ValueError(f"give like, or a route ({' and '.join(own)}), not both")
         if self.like is not None and isinstance(self.lane, str):

@@ -171,7 +171,9 @@ class Fog(Section):
         if self.airlight != "photons":
             return self
         uneven = ("outside_visibility_m", "patches", "top_edge_m", "base_m", "scale_height_m", "airlight_shading")
-        given = [key for key in (*uneven, "forward_scatter") if getattr(self, key)]
+        defaults = type(self).model_fields
+        given = [key for key in (*uneven, "forward_scatter") if getattr(self, key) != defaults[key].default]
+        given += ["top_m: inf"] if math.isinf(self.top_m) else []
         if given or any(change.base_m is not None for change in self.changes):
             raise ValueError(
                 "airlight: photons is known of even fog in a layer on the ground (visibility_m, top_m), not with "

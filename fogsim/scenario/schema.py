@@ -239,6 +239,19 @@ class ScenarioFile(Section):
         return self
 
     @model_validator(mode="after")
+    def _exposed_to_light(self) -> Self:
+        if (
+            not self.camera.automatic
+            and self.camera.saturation_luminance_cdpm2 is None
+            and not self.light.illuminance_lx
+        ):
+            raise ValueError(
+                "camera.saturation_luminance_cdpm2 is missing: light.illuminance_lx is 0, and a fixed exposure goes by "
+                "the airlight without it"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _can_be_shown(self, info: ValidationInfo) -> Self:
         check_expectations(self, is_shortened=bool((info.context or {}).get("is_shortened")))
         check_timeline(self)

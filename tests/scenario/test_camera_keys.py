@@ -24,6 +24,13 @@ def test_exposure_is_automatic_unless_it_is_fixed() -> None:
         assert scenario(*overrides).camera.automatic is automatic
 
 
+def test_a_fixed_exposure_needs_light_or_a_luminance() -> None:
+    dark = ["camera.exposure.mode=fixed", "light.illuminance_lx=0"]
+    with pytest.raises(InputError, match=r"camera\.saturation_luminance_cdpm2 is missing"):
+        scenario(*dark)
+    assert not scenario(*dark, "camera.saturation_luminance_cdpm2=5").camera.automatic
+
+
 def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:
     """Airlight of 10 000 lx: 0.406 · 10 000 / π · 1.02 in the brightest channel."""
     assert build.camera_config(scenario()).sensor.saturation_luminance == pytest.approx(

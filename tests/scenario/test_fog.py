@@ -129,7 +129,8 @@ def test_layers_that_photons_do_not_know_are_told() -> None:
         (("top_m=17.5",), "fog.top_m must be above the highest point of the road and the camera"),
         (("top_m=1000", "visibility_m=20"), "optical thickness up to 100, got 149.8"),
         (("changes=[{at_s: 0}, {at_s: 60, density: 40}]",), "optical thickness up to 100, got 299.6"),
-        (("top_m=.inf",), "flat land, not with no top"),
+        (("top_m=.inf",), "not with top_m: inf"),
+        (("base_m=0",), "not with base_m"),
         (("patches={correlation_length_m: 60}",), "not with patches"),
         (("changes=[{at_s: 0, base_m: 5, top_m: 90}]",), "not with base_m in changes"),
     ]:

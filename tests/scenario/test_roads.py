@@ -94,6 +94,7 @@ def test_mistakes_are_told_where_they_stand(tmp_path: Path) -> None:
         ("ahead_of: ego", "ahead_of: eggo", "scenario.yaml:7: actors.slow: there is no actor 'eggo'"),
         ("gap: 60 m, ", "", "gap_m goes with ahead_of or behind"),
         ("ahead_of: ego", "ahead_of: ego, behind: ego", "give one of position_m, ahead_of"),
+        ("lamps: failed", "stands: true", "actors.slow: it stands, and speed_kmh is 80"),
         ("fog:", "traffic: {net: a.net.xml}\nfog:", "give road or traffic.net, not both"),
         ("road:", "# road:", "traffic: this key is missing"),
     ]:

@@ -350,6 +350,8 @@ class ActorSection(Section):
             raise ValueError(f"give one of position_m, ahead_of, behind and beside, got {' and '.join(given)}")
         if (self.gap_m is not None) != (given in (["ahead_of"], ["behind"])):
             raise ValueError("gap_m goes with ahead_of or behind, which need it")
+        if self.stands and self.speed_kmh:
+            raise ValueError(f"it stands, and speed_kmh is {self.speed_kmh:g}; leave one of them out")
         return self
 
     @property

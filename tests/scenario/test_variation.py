@@ -111,10 +111,16 @@ def test_a_seed_that_is_not_in_the_file_has_draws_of_its_own() -> None:
     assert case == many.cases[7]
 
 
+def test_numbers_that_differ_have_cases_of_their_own() -> None:
+    cases = varied({"x": [0.1234567, 0.1234568]}).cases
+    assert [case.label for case in cases] == ["x=0.1234567", "x=0.1234568"]
+
+
 def test_mistakes_are_told() -> None:
     for vary, told in [
         ({"x": []}, "vary.x: needs at least one value"),
         ({"x": [1, 1]}, r"vary.x.1: 1 stands twice"),
+        ({"x": [1, 1.0]}, r"vary.x.1: 1.0 stands twice"),
         ({"x": [None]}, "vary.x.0: a value is a number, text, true or false; got None"),
         ({"x": 3}, "vary.x: expected a list"),
         ({"x": {"form": 1}}, "vary.x.form: unknown key; did you mean 'from'"),
@@ -123,6 +129,7 @@ def test_mistakes_are_told() -> None:
         ({"x": {"from": "1 m", "to": "2 s", "step": "1 m"}}, "same unit, got m and s"),
         ({"x": {"from": "near", "to": 2, "step": 1}}, "vary.x.from: expected a number"),
         ({"x": {"from": 0, "to": 1, "step": 1e-9}}, "vary.x.step: 1000000000 values are more than 100000"),
+        ({"x": {"from": 1e5, "to": 100_001, "step": 0.1}}, "vary.x.step: its values are the same to six digits"),
         ({"x": {"from": -1e308, "to": 1e308, "step": 1}}, "vary.x.step: more than 100000 values"),
         ({"x": {"uniform": [2, 1]}, "run": "2 seeds"}, "vary.x.uniform: expected its lower and upper end"),
         ({"x": {"uniform": [1]}, "run": "2 seeds"}, "vary.x.uniform: expected two values"),

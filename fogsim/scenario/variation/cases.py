@@ -28,6 +28,7 @@ from fogsim.scenario.variation.levels import (
     number_with_unit,
     parse_levels,
     parse_space,
+    value_text,
 )
 from fogsim.units.quantities import split_quantity
 
@@ -97,11 +98,6 @@ class Case:
     def folder_name(self) -> str:
         """Name of the case's folder; ``seedN`` for a file without variation."""
         return re.sub(r"[^\w.,=-]", "_", self.label)[:100] or f"seed{self.seed}"
-
-
-def value_text(value: Value) -> str:
-    """A value as labels and files show it."""
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from scipy.special import ndtr, ndtri
@@ -30,6 +30,14 @@ _LARGEST_EXPONENT = 709.0  # of a floating-point number
 
 Value = str | float | int | bool
 """Value of a name in one case."""
+
+
+def value_text(value: Value) -> str:
+    """A value as labels and files show it."""
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 class LevelsError(ValueError):
@@ -227,15 +235,18 @@ def _listed(written: list[object]) -> Levels:
             raise LevelsError(f"a value is a number, text, true or false; got {shown(one)}", place)
         if isinstance(one, str) and not one.isprintable():
             raise LevelsError(f"a text names its case and is one line of visible characters; got {shown(one)}", place)
-    _refuse_repeated(written)
-    return Levels(tuple(one for one in written if isinstance(one, str | int | float | bool)))
+    levels = Levels(tuple(one for one in written if isinstance(one, str | int | float | bool)))
+    _refuse_repeated(levels.values)
+    return levels
 
 
-def _refuse_repeated(written: list[object], *below: str) -> None:
-    typed = [(type(one), one) for one in written]
-    for place, one in enumerate(typed):
-        if one in typed[:place]:
-            raise LevelsError(f"{shown(one[1])} stands twice", *below, place)
+def _refuse_repeated(values: Iterable[Value], *below: str) -> None:
+    """Refuse values that name the same case, as 1 and 1.0 do."""
+    texts: set[str] = set()
+    for place, value in enumerate(values):
+        if value_text(value) in texts:
+            raise LevelsError(f"{shown(value)} stands twice", *below, place)
+        texts.add(value_text(value))
 
 
 def _range(written: dict[str, object]) -> Levels:
@@ -250,7 +261,10 @@ def _range(written: dict[str, object]) -> Levels:
     number = math.floor((last - first) / step + 1e-9) + 1
     if number > _MOST_VALUES:
         raise LevelsError(f"{number} values are more than {_MOST_VALUES}", "step")
-    return Levels(tuple(number_with_unit(first + i * step, unit) for i in range(number)))
+    values = tuple(number_with_unit(first + i * step, unit) for i in range(number))
+    if len(set(values)) < number:
+        raise LevelsError("its values are the same to six digits, which they are rounded to", "step")
+    return Levels(values)
 
 
 def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:

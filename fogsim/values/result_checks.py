@@ -14,16 +14,20 @@ from fogsim.values import (
     Belief,
     Command,
     Control,
+    DenserFog,
     Display,
     DriverWarning,
     EgoControl,
     Estimate,
+    FogProfile,
     Lamp,
     LampChoice,
+    OpticalDepths,
     SpeedAdvice,
     Stretch,
     StretchAdvice,
 )
+from fogsim.values.estimate import ExtinctionBounds
 from fogsim.values.light import ALL_LAMPS
 
 T = TypeVar("T")
@@ -46,6 +50,10 @@ def checked_estimate(method: str, value: object) -> Estimate:
         _check_number(who, "extinction", estimate.extinction, " [1/m]; return Estimate.invalid if there is no estimate")
         _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
         _check_number(who, "common_deviation", estimate.common_deviation, " [-]")
+    if not (_is_number(estimate.reach) and estimate.reach >= 0.0):
+        raise InputError(f"{who}: reach must be at least 0 [m], or inf; got {shown(estimate.reach)}")
+    for name, kind in (("bounds", ExtinctionBounds), ("optical_depths", OpticalDepths), ("denser", DenserFog)):
+        _check_part(who, name, getattr(estimate, name), kind)
     return estimate
 
 
@@ -71,6 +79,10 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
         )
+    for name, kind in (("denser", DenserFog), ("profile", FogProfile)):
+        _check_part(who, name, getattr(belief, name), kind)
+    if not (_is_number(belief.age) and belief.age >= 0.0):
+        raise InputError(f"{who}: age must be at least 0 [s], or inf; got {shown(belief.age)}")
     return belief
 
 
@@ -135,7 +147,7 @@ def checked_control(controller: str, value: object) -> Control:
     if control.acceleration is not None and control.speed is not None:
         raise InputError(f"{who}: expected an acceleration or a speed, got both: {shown(control)}")
     if control.lamps is not None:
-        _of_type(f"{who}: lamps", control.lamps, Lamp)
+        _real_lamps(who, _of_type(f"{who}: lamps", control.lamps, Lamp))
     if control.warning is not None:
         _of_type(f"{who}: warning", control.warning, DriverWarning)
     return control
@@ -192,6 +204,11 @@ def _check_stretch_advice(who: str, value: object) -> None:
 def _check_kind(who: str, field: str, value: object, kind: type, expected: str) -> None:
     if not isinstance(value, kind):
         raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
+
+
+def _check_part(who: str, field: str, value: object, kind: type) -> None:
+    if value is not None:
+        _check_kind(who, field, value, kind, f"of type {kind.__module__}.{kind.__name__}, or None")
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:

@@ -12,11 +12,12 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
 from fogsim.simulation.advised_driving import AdvisedDriving
-from fogsim.values import Command, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import Command, Control, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.result_checks import (
     checked_advice,
     checked_belief,
     checked_command,
+    checked_control,
     checked_estimate,
     checked_lamp_choice,
     checked_lamps,
@@ -37,6 +38,8 @@ def test_estimates() -> None:
         (Estimate("mine", 0.1, math.nan), "standard_deviation must be .*; got nan"),
         (Estimate("mine", 0.1, math.inf), "standard_deviation must be .*; got inf"),
         (Estimate("mine", 0.1, 0.1, valid=None), "valid must be True or False"),  # type: ignore[arg-type]  # wrong
+        (Estimate("mine", 0.1, 0.1, reach=math.nan), "reach must be at least 0 .*; got nan"),
+        (Estimate("mine", 0.1, 0.1, denser=50.0), "denser must be of type .*DenserFog, or None; got 50"),  # type: ignore[arg-type]  # wrong
         (Estimate("other", 0.1, 0.1), "method must be its name in the registry, 'mine'; got 'other'"),
     ]:
         with pytest.raises(InputError, match=message):
@@ -60,6 +63,8 @@ def test_beliefs() -> None:
         ({"probability": good.probability[1:]}, "must be of one length"),
         ({"log_extinction": backward}, "ascending"),
         ({"log_extinction": unknown}, "finite"),
+        ({"age": math.nan}, r"age must be at least 0 \[s\]"),
+        ({"profile": unknown}, "profile must be of type .*FogProfile, or None"),
     ):
         with pytest.raises(InputError, match=message):
             checked_belief("mine", dataclasses.replace(good, **change))  # type: ignore[arg-type]  # wrong on purpose
@@ -121,6 +126,8 @@ def test_lamps() -> None:
             checked_lamps("mine", wrong)
     with pytest.raises(InputError, match=r"'mine': lamps\(\): no lamp has the bits 4096; there are POSITION, LOW_BEAM"):
         checked_lamps("mine", Lamp.LOW_BEAM | Lamp(4096))
+    with pytest.raises(InputError, match=r"^controller 'mine': no lamp has the bits 4096"):
+        checked_control("mine", Control(lamps=Lamp(4096)))
     choice = LampChoice(Lamp.LOW_BEAM)
     assert checked_lamp_choice("mine", choice) is choice
     with pytest.raises(InputError, match=r"choose_lamps\(\): lamps must be of type"):

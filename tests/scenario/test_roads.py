@@ -213,3 +213,10 @@ expect: {flows: {never: collisions > 0}}
     assert len(scenario.traffic.along) > 1
     named = override(scenario, ["traffic.along=[same_way]"])
     assert named.traffic.along == ("same_way",)
+
+
+def test_a_speed_that_an_actor_never_reaches_is_refused(tmp_path: Path) -> None:
+    timeline = "timeline: [{{when: time > 1 s, do: {{slow: {{speed: {{to: {} km/h}}}}}}}}]\n"
+    with pytest.raises(InputError, match=r"do\.slow: slow begins with speed_kmh: 80 and never .* come to 90"):
+        loaded(tmp_path, TEXT + timeline.format(90))
+    loaded(tmp_path, TEXT + timeline.format(80))

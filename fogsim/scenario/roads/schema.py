@@ -295,8 +295,8 @@ class ActorSection(Section):
     """That gap."""
 
     speed_kmh: SpeedKmh | None = None
-    """Speed with which it begins, and which it keeps where nothing slows it; by default that of the road and type, and
-    5 of persons."""
+    """Speed with which it begins, which it keeps where nothing slows it, and never exceeds; by default that of the road
+    and type, and 5 of persons."""
 
     depart_s: Time | None = None
     """When it appears; the ego's appearance begins the run. By default 0, or as the actor that it is placed by."""

@@ -67,6 +67,7 @@ def _mistakes(scenario: "ScenarioFile") -> Iterator[tuple[KeyPath, str]]:
                 _mistake(doing, scenario)
                 or _person_mistake(subject, doing, scenario)
                 or _lamp_mistake(subject, doing, scenario)
+                or _speed_mistake(subject, doing, scenario)
             )
             if mistake:
                 yield (number, "do", subject), mistake
@@ -94,6 +95,28 @@ def _lamp_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str |
         return None
     kind = _kind(subject, scenario)
     return None if kind is None else lamp_mistake(kind, doing.lamps)
+
+
+def _speed_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str | None:
+    """A speed above the one with which a vehicle begins, which is its type's maximum then."""
+    if not isinstance(doing, VehicleActions):
+        return None
+    named = scenario.traffic.ego if subject == EGO else subject
+    actor = scenario.actors.get(named)
+    begins = [actor.speed_kmh] if actor is not None else []
+    for entry in scenario.timeline:
+        for name, other in operations(entry):
+            if name == subject and isinstance(other, VehicleActions) and other.depart and other.depart.like is None:
+                begins.append(other.depart.speed_kmh)
+    wanted = [] if doing.speed is None else [doing.speed.to_kmh or 0.0, *(speed for _, speed in doing.speed.profile)]
+    wanted += [] if doing.arrive is None or doing.arrive.factor else [doing.arrive.to_kmh or 0.0]
+    most = max((speed or math.inf for speed in begins), default=math.inf)
+    if max(wanted, default=0.0) <= most:
+        return None
+    return (
+        f"{subject} begins with speed_kmh: {most:g} and never drives faster, so it does not come to {max(wanted):g}; "
+        "begin with the highest speed, or leave speed_kmh out"
+    )
 
 
 def _kind(subject: str, scenario: "ScenarioFile") -> str | None:

@@ -3,13 +3,14 @@
 import dataclasses
 import logging
 import math
-import multiprocessing
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from fogsim.cli.printing import stderr, stdout
+from fogsim.errors import FogSimError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -62,33 +63,44 @@ def compile_command() -> None:
 
 def compile_kernels() -> Iterator[str]:
     """Compile and cache the kernels of drives by day and by night; yield a description of each finished part."""
-    from fogsim.core.jit import processors
+    try:
+        yield from _compiled()
+    except BrokenProcessPool as error:
+        raise FogSimError(
+            "a process that compiles died, as when memory runs out; the same command compiles what is missing"
+        ) from error
 
-    with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
+
+def _compiled() -> Iterator[str]:
+    from fogsim.core.jit import processors
+    from fogsim.study.pool import worker_pool
+
+    with worker_pool(min(2, processors()), __name__) as pool:
         # Estimators share hardly any kernels with rendering; the other drives share many with the first.
         first, *others = _DRIVES
         pending: dict[Future[None], str] = {
-            pool.submit(_drive, *_DRIVES[first]): first,
-            pool.submit(_estimate_visibility): "estimators",
-            pool.submit(_detect_signs): "signs",
-            pool.submit(_find_lamps): "lamps",
-            pool.submit(read_own_beams): "methods of the night",
-            pool.submit(_light_a_road): "head lamps on the road",
-            pool.submit(_cross_a_footway): "footways",
-            pool.submit(_restore_contrast): "contrast restoration",
+            pool.submit(_quietly, _drive, *_DRIVES[first]): first,
+            pool.submit(_quietly, _estimate_visibility): "estimators",
+            pool.submit(_quietly, _detect_signs): "signs",
+            pool.submit(_quietly, _find_lamps): "lamps",
+            pool.submit(_quietly, read_own_beams): "methods of the night",
+            pool.submit(_quietly, _light_a_road): "head lamps on the road",
+            pool.submit(_quietly, _cross_a_footway): "footways",
+            pool.submit(_quietly, _restore_contrast): "contrast restoration",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
                 done.result()
                 ready = pending.pop(done)
                 if ready == first:
-                    pending |= {pool.submit(_drive, *_DRIVES[name]): name for name in others}
+                    pending |= {pool.submit(_quietly, _drive, *_DRIVES[name]): name for name in others}
                 yield ready
 
 
-def _be_quiet() -> None:
-    """Keep these processes from announcing their own compilation."""
+def _quietly(work: Callable[..., None], *arguments: Any) -> None:
+    """Do work in a process that does not announce its own compilation."""
     logging.getLogger("fogsim").setLevel(logging.ERROR)
+    work(*arguments)
 
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:

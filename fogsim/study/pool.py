@@ -52,7 +52,7 @@ def _run_until_broken(
     """Execute runs from the end of a list, removing them; return those in progress when a process died."""
     under_way: dict[Future[str | None], StudyRun] = {}
     try:
-        with _pool(processes, work.__module__) as pool:
+        with worker_pool(processes, work.__module__) as pool:
             while waiting or under_way:
                 while waiting and len(under_way) < processes:
                     run = waiting[-1]
@@ -78,7 +78,8 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 
 
 @contextlib.contextmanager
-def _pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end with this one, and at once if the block raises an error; `module` has their work."""
     # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
     # imported what they need.
     open_standard_streams()

@@ -1,14 +1,19 @@
 """Compiling is announced, and what is compiled ahead is what a run needs."""
 
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from fogsim import Camera, Frame, Observation
-from fogsim.cli.compile import _foggy_road
+from fogsim.cli.compile import _foggy_road, compile_kernels
 from fogsim.core import jit
+from fogsim.errors import FogSimError
 from fogsim.estimators import ESTIMATORS
+from fogsim.study import pool
 from tests.helpers.command import run_python
 
 COMPILE = """
@@ -59,3 +64,16 @@ def test_it_says_how_far_compiling_has_come() -> None:
     assert len(told) == 2
     assert "compiling for this processor" in told[0]
     assert told[1] == "fogsim: compiled 3 functions in 13 s"
+
+
+def test_a_compiling_process_that_dies_ends_it_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are a study's processes, which also end with this one."""
+
+    def killed(*_: object) -> Future[None]:
+        dead: Future[None] = Future()
+        dead.set_exception(BrokenProcessPool("killed"))
+        return dead
+
+    monkeypatch.setattr(pool, "worker_pool", lambda *_: nullcontext(SimpleNamespace(submit=killed)))
+    with pytest.raises(FogSimError, match="a process that compiles died"):
+        list(compile_kernels())

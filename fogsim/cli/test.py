@@ -51,6 +51,7 @@ def check_command(
     from fogsim.testing import find_files
     from fogsim.testing.junit import write_junit
     from fogsim.testing.page import PageContent, totals_text, write_page
+    from fogsim.testing.session import begin_session
 
     begun, chosen = time.monotonic(), with_timeout(settings, method_timeout)
     found = find_files(files or ["."])
@@ -58,12 +59,13 @@ def check_command(
     tests = _asked_for(found, keywords, case, chosen, out if of_last else None)
     number = processes or os.cpu_count() or 1
     try:
-        outcomes = _run(tests, out, number, resume=resume, exit_first=exit_first)
-        kept = _evidence(outcomes, out, number) if evidence else {}
-        for outcome in outcomes:
-            _print_outcome(outcome, chosen)
-            if shrink:
-                _print_smallest(outcome, chosen, out)
+        with begin_session(out, resume=resume):
+            outcomes = _run(tests, out, number, exit_first=exit_first)
+            kept = _evidence(outcomes, out, number) if evidence else {}
+            for outcome in outcomes:
+                _print_outcome(outcome, chosen)
+                if shrink:
+                    _print_smallest(outcome, chosen, out)
     except KeyboardInterrupt:
         stdout.print(
             "Interrupted; cases that are done are kept, and the same command with --resume goes on.", soft_wrap=True
@@ -111,12 +113,10 @@ def _asked_for(
     return tests
 
 
-def _run(
-    tests: "Sequence[FogTest]", out: Path, processes: int, *, resume: bool, exit_first: bool
-) -> "list[FileOutcome]":
+def _run(tests: "Sequence[FogTest]", out: Path, processes: int, *, exit_first: bool) -> "list[FileOutcome]":
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing import run_tests
     from fogsim.testing.execution import check_to_file
+    from fogsim.testing.session import run_cases
 
     total = sum(len(test.runs) for test in tests)
     with progress_bar(stderr, stays=True) as progress:
@@ -127,7 +127,7 @@ def _run(
             progress.update(task, completed=done, description=f"{done} of {total} runs{failures}")
 
         engine = ProcessPool(processes, check_to_file)
-        return run_tests(tests, out, engine, resume=resume, first_failure_ends=exit_first, watch=show)
+        return run_cases(tests, out, engine, first_failure_ends=exit_first, watch=show)
 
 
 def _evidence(outcomes: "Sequence[FileOutcome]", out: Path, processes: int) -> "Kept":

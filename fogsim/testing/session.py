@@ -119,31 +119,39 @@ def run_tests(
     KeyboardInterrupt
         On Ctrl-C: completed cases are kept, for `resume`.
     """
-    with begin_session(out, resume=resume) as results:
-        names = {run.key: (*test.lines,) for test in tests for run in test.runs}
-        found = {run.key: completed_result(results, run, names[run.key]) for test in tests for run in test.runs}
-        waiting = [run for test in tests for run in test.runs if found[run.key] is None]
-        done = failed = 0
-        for one in found.values():
-            done, failed = done + (one is not None), failed + (one is not None and one.has_failed)
+    with begin_session(out, resume=resume):
+        return run_cases(tests, out, engine, first_failure_ends=first_failure_ends, watch=watch)
+
+
+def run_cases(
+    tests: Sequence[FogTest], out: Path, engine: Engine, *, first_failure_ends: bool = False, watch: Watch = _unwatched
+) -> list[FileOutcome]:
+    """Run and judge all cases in a session that `begin_session` has begun in `out`, as `run_tests` does."""
+    results = results_folder(out)
+    names = {run.key: (*test.lines,) for test in tests for run in test.runs}
+    found = {run.key: completed_result(results, run, names[run.key]) for test in tests for run in test.runs}
+    waiting = [run for test in tests for run in test.runs if found[run.key] is None]
+    done = failed = 0
+    for one in found.values():
+        done, failed = done + (one is not None), failed + (one is not None and one.has_failed)
+    watch(done, failed)
+
+    def count(run: StudyRun, _: str | None) -> None:
+        nonlocal done, failed
+        one = read_result(results, run, names[run.key]) or CaseResult(run, "its result cannot be read")
+        found[run.key] = one
+        done, failed = done + 1, failed + one.has_failed
         watch(done, failed)
+        if failed and first_failure_ends:
+            raise _FirstFailure
 
-        def count(run: StudyRun, _: str | None) -> None:
-            nonlocal done, failed
-            one = read_result(results, run, names[run.key]) or CaseResult(run, "its result cannot be read")
-            found[run.key] = one
-            done, failed = done + 1, failed + one.has_failed
-            watch(done, failed)
-            if failed and first_failure_ends:
-                raise _FirstFailure
-
-        try:
-            if not (failed and first_failure_ends):
-                engine.run(waiting, results, count)
-        except _FirstFailure:
-            pass
-        outcomes = [_outcome(test, found) for test in tests]
-        _end(out, outcomes)
+    try:
+        if not (failed and first_failure_ends):
+            engine.run(waiting, results, count)
+    except _FirstFailure:
+        pass
+    outcomes = [_outcome(test, found) for test in tests]
+    _end(out, outcomes)
     return outcomes
 
 

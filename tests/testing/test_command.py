@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from early_motorway import ROUTES
 
-from fogsim.testing import check_one_case
+from fogsim.core.files.writer_lock import LOCK_NAME
+from fogsim.testing import artefacts, check_one_case
 from fogsim.testing.execution import ThisProcess
 from tests.helpers.command import Command
 
@@ -129,3 +130,17 @@ def test_pytest_collects_files_and_has_a_fixture(
     assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in told
     assert "short.fog.yaml --case 'visibility=5 km'" in told
     assert "inconclusive: stops.whenever" in told
+
+
+def test_evidence_is_gathered_under_the_lock_of_the_results(
+    file: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked: list[bool] = []
+
+    def keep(_: object, out: Path, *__: object) -> dict[str, str]:
+        locked.append((out / LOCK_NAME).exists())
+        return {}
+
+    monkeypatch.setattr(artefacts, "keep_artefacts", keep)
+    assert command("test", str(file), "-j", "1", cwd=file.parent).returncode == 1
+    assert locked == [True]

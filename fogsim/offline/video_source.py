@@ -1,5 +1,6 @@
 """Videos that are read frame by frame by ffmpeg."""
 
+import contextlib
 import os
 import re
 import struct
@@ -14,7 +15,7 @@ from typing import IO, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.files.atomic import partial_path, publish
+from fogsim.core.files.atomic import opened_alone, partial_path, publish
 from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.errors import InputError
 from fogsim.offline.image_files import Pixels
@@ -37,12 +38,18 @@ class VideoWriter:
     def __init__(self, out: Path, rate_factor: int = _RATE_FACTOR) -> None:
         self._out, self._rate_factor = out, rate_factor
         self._encoder: Encoder | None = None
+        self._lock = contextlib.ExitStack()
+        self._leftover: Path | None = None
 
     def write(self, frame: Pixels, time: float) -> None:
         """Add a frame (rows, cols, 3), red first, of the first frame's size, from a time on [s] later than the last."""
         rows, cols = frame.shape[:2]
         if self._encoder is None:
-            self._encoder = Encoder(encoding_command(partial_path(self._out), ["-f", "ivf"], self._rate_factor))
+            part = partial_path(self._out)
+            # The encoder writes the same file, which stays locked.
+            self._lock.enter_context(opened_alone(part))
+            self._leftover = part
+            self._encoder = Encoder(encoding_command(part, ["-f", "ivf"], self._rate_factor))
             self._encoder.write(struct.pack("<4sHH4sHHIIQ", b"DKIF", 0, 32, b"RGBA", cols, rows, _TICKS, 1, 0))
         pixels = np.full((rows, cols, 4), 255, np.uint8)
         pixels[..., :3] = frame
@@ -56,13 +63,16 @@ class VideoWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Give the video its name, or remove it."""
-        try:
-            if self._encoder is not None:
-                self._encoder.finish()
-                if kind is None:
-                    publish(self._out)
-        finally:
-            partial_path(self._out).unlink(missing_ok=True)
+        with self._lock:
+            try:
+                if self._encoder is not None:
+                    self._encoder.finish()
+                    if kind is None:
+                        publish(self._out)
+                        self._leftover = None
+            finally:
+                if self._leftover is not None:
+                    self._leftover.unlink(missing_ok=True)
 
 
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:

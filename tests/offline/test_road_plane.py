@@ -13,7 +13,7 @@ from fogsim.offline.camera_file import Calibration
 from fogsim.offline.fog_image import fog_file
 from fogsim.offline.fog_video import fog_video
 from fogsim.offline.rectification import RoadPlane, calibration_from_options
-from fogsim.offline.video_source import VideoFile
+from fogsim.offline.video_source import VideoFile, VideoWriter
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Response
 
@@ -161,3 +161,13 @@ def test_a_video_that_is_left_or_refused_leaves_no_file(clear_video: Path, tmp_p
     with pytest.raises(InputError, match="--visibility must be"):
         next(fog_video(VideoFile.open(clear_video), road, 0.0, out))
     assert [path.name for path in tmp_path.iterdir()] == ["clear.mp4"]
+
+
+def test_a_video_that_another_process_writes_is_left_alone(tmp_path: Path) -> None:
+    out, frame = tmp_path / "out.mp4", np.zeros((32, 32, 3), np.uint8)
+    with VideoWriter(out) as first:
+        first.write(frame, 0.0)
+        with pytest.raises(InputError, match="another process is writing it"), VideoWriter(out) as second:
+            second.write(frame, 0.0)
+        first.write(frame, 1.0)
+    assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]

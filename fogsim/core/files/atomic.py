@@ -89,7 +89,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
         return
     part = partial_path(path)
-    with naming(part), _opened_alone(part) as file:
+    with naming(part), opened_alone(part) as file:
         try:
             yield file
             file.flush()
@@ -101,7 +101,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextlib.contextmanager
-def _opened_alone(part: Path) -> Iterator[BinaryIO]:
+def opened_alone(part: Path) -> Iterator[BinaryIO]:
     """An empty file that no other process is writing; InputError if one is."""
     # What an earlier process left: a link would be followed, and a file can be write-protected.
     if part.is_symlink() or not (part.is_file() and os.access(part, os.W_OK)):
@@ -111,12 +111,19 @@ def _opened_alone(part: Path) -> Iterator[BinaryIO]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError(f"{part}: another process is writing it; wait for its end, or give another name") from None
+            raise _other_writer(part) from None
         except OSError:
             # This file system has no locks.
             pass
+        # Its writer may have published it since it was opened.
+        if not (part.exists() and os.path.samestat(part.stat(), os.fstat(file.fileno()))):
+            raise _other_writer(part)
         file.truncate()
         yield file
+
+
+def _other_writer(part: Path) -> InputError:
+    return InputError(f"{part}: another process is writing it; wait for its end, or give another name")
 
 
 def _opened_stream(path: Path) -> BinaryIO:

@@ -192,7 +192,8 @@ def read_document(path: Path) -> Document:
         where = path if error.line is None else f"{path}:{error.line}"
         raise InputError(f"{where}: not valid YAML: {error.problem}") from error
     if not isinstance(data, dict):
-        raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
+        got = "the file is empty" if data is None else f"got {type(data).__name__}"
+        raise InputError(f"{path}: expected a mapping of keys to values, {got}")
     return Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
 
 

@@ -55,7 +55,7 @@ def scenario_file(name_or_path: str | Path) -> Path:
     known = catalogue()
     if str(name_or_path) in known:
         return known[str(name_or_path)]
-    if path.suffix in {".yaml", ".yml", ".xosc"} or len(path.parts) > 1:
+    if path.suffix in {".yaml", ".yml", ".xosc"} or "/" in str(name_or_path):
         raise InputError(f"{name_or_path}: there is no such scenario file{nearest_file(path)}")
     raise UnknownNameError("scenario", str(name_or_path), known)
 
@@ -217,6 +217,9 @@ def read_space(
 
 def check_configuration(config: Path) -> None:
     """Raise InputError unless a file's first element is that of a SUMO configuration."""
+    if _is_folder(config):
+        there = sorted(one.name for one in config.glob("*.sumocfg"))
+        raise InputError(f"{config} is a folder; expected a SUMO configuration; in it: {', '.join(there) or 'none'}")
     if not _is_file(config):
         raise InputError(_no_file(Document(config, {}, {}), config.parent, ("traffic", "config"), Path(config.name)))
     check_sumo_file("config", config)

@@ -11,6 +11,7 @@ from fogsim.errors import nearest, printable, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
+from fogsim.units.quantities import UNIT_OF_SUFFIX, split_quantity
 
 _MOST_LISTED = 50
 """Maximum number of mistakes that are listed one by one."""
@@ -122,7 +123,15 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
     if isinstance(value, dict | BaseModel):
         # A message about a whole block names its values itself.
         return f"{message}; got a block of keys" if detail["type"].endswith("_type") else message
-    return f"{message}; got {shown(value)}"
+    return f"{message}; got {shown(value)}{_plain_number(one.path, value)}"
+
+
+def _plain_number(path: KeyPath, value: object) -> str:
+    """How to write a number with a unit under a key that ends with its own; "" for other values."""
+    _, _, suffix = str(path[-1] if path else "").rpartition("_")
+    unit = UNIT_OF_SUFFIX.get(suffix)
+    written = split_quantity(value) if isinstance(value, str) and unit else None
+    return f"; write a number alone, which is in {unit}, such as {written[0]:g}" if written and written[1] else ""
 
 
 def _message(detail: ErrorDetails) -> str:

@@ -54,7 +54,7 @@ HOSTILE = {
     "unknown alias": ("a: *b\n", ":1: .*found undefined alias 'b'"),
     "unclosed": ("a: [1, 2", "not valid YAML"),
     "text": ("just words", "expected a mapping of keys to values, got str"),
-    "nothing": ("", "expected a mapping of keys to values, got NoneType"),
+    "nothing": ("", "expected a mapping of keys to values, the file is empty"),
     "huge": ("#" * (MOST_BYTES + 1), f"cannot be read: larger than {MOST_BYTES} bytes"),
 }
 

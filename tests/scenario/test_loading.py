@@ -7,6 +7,7 @@ import pytest
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.scenario import attached_scenario, catalogue, load_scenario, override, resolved
 from fogsim.scenario.document import apply_overrides, parse_override
+from fogsim.scenario.loading import check_configuration
 
 
 @pytest.fixture
@@ -158,6 +159,19 @@ def test_unknown_scenarios() -> None:
         load_scenario("motorway_fog_bnk")
     with pytest.raises(InputError, match="there is no such scenario file"):
         load_scenario("nowhere/scenario.yaml")
+    with pytest.raises(InputError, match=r"\./rising_son: there is no such scenario file"):
+        load_scenario("./rising_son")
+
+
+def test_a_number_with_a_unit_under_a_key_with_its_own() -> None:
+    with pytest.raises(InputError, match=r"got '80m'; write a number alone, which is in m, such as 80$"):
+        load_scenario("motorway_fog_bank", ["fog.visibility_m=80m"])
+
+
+def test_a_folder_is_no_sumo_configuration(tmp_path: Path) -> None:
+    (tmp_path / "town.sumocfg").touch()
+    with pytest.raises(InputError, match=r"is a folder; expected a SUMO configuration; in it: town\.sumocfg"):
+        check_configuration(tmp_path)
 
 
 def test_homogeneous_fog_takes_the_place_of_banks() -> None:

@@ -16,10 +16,22 @@ STARTING = "starting; a first run compiles for some seconds"
 """Description of a bar before the first step."""
 
 
+class _Bar(Progress):
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None and not any(task.completed for task in self.tasks):
+            self.live.transient = True
+            # `stop` would print an empty line into a file.
+            self.live.stop()
+        else:
+            super().__exit__(kind, error, trace)
+
+
 def progress_bar(console: Console, *, stays: bool = False) -> Progress:
     """Bar, share, description and time left; it `stays` when full, and is then printed even without a terminal.
 
-    Otherwise it disappears, and nothing is drawn without a terminal.
+    Otherwise it disappears, as at an error before anything is done, and nothing is drawn without a terminal.
     """
     # rich would redirect stdout to its own console, stderr: fine on a terminal, but wrong for a pipe or a file.
     to_terminal = sys.stdout.isatty()
@@ -31,7 +43,7 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
         TextColumn("left"),
     )
     hidden = not stays and not console.is_terminal
-    return Progress(*columns, console=console, transient=not stays, redirect_stdout=to_terminal, disable=hidden)
+    return _Bar(*columns, console=console, transient=not stays, redirect_stdout=to_terminal, disable=hidden)
 
 
 @contextlib.contextmanager
@@ -69,4 +81,4 @@ class SimulationProgress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self._progress.__exit__(kind, error, trace)

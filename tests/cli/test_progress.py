@@ -1,13 +1,15 @@
 """The bar of a run, and the commands that take a SUMO configuration, inside this process."""
 
+import io
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from fogsim.cli import app
 from fogsim.cli.printing import stderr
-from fogsim.cli.progress import SimulationProgress
+from fogsim.cli.progress import SimulationProgress, progress_bar
 from fogsim.errors import InputError
 from fogsim.values import Ending
 from tests.recorders.synthetic import make_step, make_traffic_step
@@ -66,3 +68,13 @@ def test_a_data_set_of_nothing_or_of_two_things_is_refused(arguments: list[str],
     with pytest.raises(InputError, match=message):
         CliRunner().invoke(app.app, ["dataset", *arguments, "--out", str(out), "--frames", "1"], catch_exceptions=False)
     assert not out.exists()
+
+
+def test_a_bar_without_progress_does_not_stay_before_an_error() -> None:
+    for begun in (False, True):
+        console = Console(file=io.StringIO())
+        progress = progress_bar(console, stays=True)
+        progress.start()
+        progress.add_task("starting", total=2, completed=int(begun))
+        progress.__exit__(InputError, InputError("--out"), None)
+        assert bool(console.file.getvalue()) is begun  # type: ignore[attr-defined]  # a StringIO

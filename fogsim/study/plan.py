@@ -340,3 +340,17 @@ def needs_camera(scenario: Scenario) -> bool:
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))
+
+
+def grid_text(study: Study) -> str:
+    """Size of a study's grid: ``2 policies × 3 seeds``."""
+    sizes = [counted(len(levels), name) for name, levels in study.factors.items()]
+    return " × ".join([*sizes, counted(len({run.seed for run in study.runs}), "seed")])
+
+
+def counted(number: int, name: str) -> str:
+    """A number of things, whose name is in the singular: ``2 policies``, ``1 fog``."""
+    if number == 1 or name.endswith("s"):
+        return f"{number} {name}"
+    is_y = name.endswith("y") and name[-2:-1] not in "aeiou"
+    return f"{number} {name[:-1]}ies" if is_y else f"{number} {name}s"

@@ -9,7 +9,7 @@ from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
 from fogsim.study.main_metrics import MetricWords, metric_words, short_number, signed
-from fogsim.study.plan import Study
+from fogsim.study.plan import Study, counted, grid_text
 from fogsim.study.table import Row, rows_of_cells
 
 _EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
@@ -190,11 +190,9 @@ def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Diffe
 
 
 def _compared(study: Study, rows: Sequence[Row]) -> str:
-    shape = " × ".join(f"{len(levels)} {name}" for name, levels in study.factors.items())
-    seeds = len({run.seed for run in study.runs})
     done = sum(row["status"] == "complete" for row in rows)
     return (
-        f"{shape} × {seeds} seeds = {len(rows)} runs, {'all' if done == len(rows) else done} complete. "
+        f"{grid_text(study)} = {counted(len(rows), 'run')}, {'all' if done == len(rows) else done} complete. "
         f"Policies are compared to {' · '.join(study.baseline.values())} with the same seed."
     )
 

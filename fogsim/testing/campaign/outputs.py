@@ -38,6 +38,12 @@ _METRICS = {
 
 _CELLS = 121
 _MAPS = 6
+_PURPOSES = {
+    Purpose.SPACE: "to fill the space",
+    Purpose.BOUNDARY: "near the boundary",
+    Purpose.LEVEL: "to approach failures",
+    Purpose.RATE: "for the failure rate",
+}
 _COLOURS = LinearSegmentedColormap.from_list("outcome", ["#b5d8c7", "#f7f4ee", "#efb3af"])
 _MARKS = {"passed": ("#1f7a4d", "o"), "failed": ("#a31f1a", "X"), "inconclusive": ("#9a6700", "s"), "error": (INK, "*")}
 
@@ -141,7 +147,11 @@ def write_report(
             for caption, figure in maps(campaign, found)
         ],
         failures=list(_failures(test, found, settings)),
-        purposes=[(purpose, sum(one.purpose is purpose for one in found.drawn)) for purpose in Purpose],
+        purposes=", ".join(
+            f"{number} {words}"
+            for purpose, words in _PURPOSES.items()
+            if (number := sum(one.purpose is purpose for one in found.drawn))
+        ),
     )
     write_text(path, page)
 

@@ -57,6 +57,7 @@ def files(campaign: Campaign, found: Findings, folder: Path) -> dict[str, bytes]
 
 def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, tmp_path: Path) -> None:
     whole = files(campaign, run_campaign(campaign, tmp_path / "a", Closed()), tmp_path / "a")
+    assert b"<p>Cases: 16 to fill the space" in whole["report.html"]
     for most in (5, 12, 21):
         with pytest.raises(KeyboardInterrupt):
             run_campaign(campaign, tmp_path / "b", Closed(most))

@@ -343,9 +343,10 @@ def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
 
 
 def _array_check(scalar: type[np.generic]) -> Check:
+    scalar = get_origin(scalar) or scalar
     # Any precision of floating point fits; integers would wrap.
     kind = np.floating if issubclass(scalar, np.floating) else scalar
-    expected = f"an array of {np.dtype(scalar)}"
+    expected = f"an array of {'whole numbers' if scalar is np.integer else np.dtype(scalar)}"
 
     def check(value: object) -> str | None:
         return None if isinstance(value, np.ndarray) and issubclass(value.dtype.type, kind) else expected

@@ -104,6 +104,7 @@ def test_seeds_are_taken_as_gymnasium_takes_them() -> None:
     assert np.array_equal(first, other.reset(seed=3)[0])
     again, _ = envs.reset(seed=[3, 4, None])
     assert np.array_equal(again[:2], first[:2])
+    assert np.array_equal(made(3).reset(seed=np.array([3, 4, 5]))[0], first)
     assert np.array_equal(again[2], other.reset()[0][2])
 
 

@@ -36,6 +36,7 @@ from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
 from fogsim_envs.task.observation import task_space
+from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import split_number
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable
@@ -50,6 +51,7 @@ _FAULTS = np.array(["", "ego", "other"])
 _LAMPS = np.array([int(one) for one in LAMP_MODES])
 
 
+@takes_plain_data
 @checked_parameters
 class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     """Many episodes of ``fogsim/FogAdvisoryFast-v1`` in one kernel, without SUMO: for training.
@@ -123,13 +125,16 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
 
     @checked_parameters
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], Infos]:
         """Begin all episodes.
 
         Parameters
         ----------
-        seed : int, or sequence of int or None
+        seed : int, sequence of int or None, or array of int
             Seed of each environment; a single one is that of the first, and the others have the following ones. None
             goes on with the numbers of before.
         options : None
@@ -145,6 +150,8 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         seeds: Sequence[int | None]
         if isinstance(seed, int | np.integer):
             seeds = range(int(seed), int(seed) + self.num_envs)
+        elif isinstance(seed, np.ndarray):
+            seeds = seed.ravel().tolist()
         else:
             seeds = [None] * self.num_envs if seed is None else seed
         if len(seeds) != self.num_envs:

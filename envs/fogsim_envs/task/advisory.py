@@ -29,6 +29,7 @@ from fogsim_envs.rewards import advice_standard
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
+from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
 from fogsim_envs.task.sampling import (
     MOTORWAY,
@@ -59,6 +60,7 @@ class OwnDriver:
         return dataclasses.replace(command, advice=SpeedAdvice(own))
 
 
+@takes_plain_data
 @checked_parameters
 class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     """Advise a vehicle's speed and lamps in fog that only its camera can judge, another one each episode.

@@ -22,6 +22,7 @@ from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env, FogAdvisoryV2Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
+from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import Defaults
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, EstimatorSurrogate, SurrogateTable
@@ -35,6 +36,7 @@ FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
 FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
 
 
+@takes_plain_data
 @checked_parameters
 class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     """Advise a vehicle's speed and lamps in fog, without frames: for fast learning.

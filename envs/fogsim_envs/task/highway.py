@@ -26,6 +26,7 @@ from fogsim_envs.hosting import TIMEOUT, Timeout
 from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
+from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 
 _HIGHWAY_FOG = FogDistribution(ahead=(100.0, 500.0), reach=1000.0, bank_length=(300.0, 800.0))
@@ -68,6 +69,7 @@ def _scenario(settings: Mapping[str, Any], more: Sequence[str]) -> Scenario:
     return highway_scenario(settings, math.inf, [*one_frame_clocks(settings), *more])
 
 
+@takes_plain_data
 @checked_parameters
 class FogHighwayV1Env(FogAdvisoryV1Env):
     """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env, in another fog each episode.

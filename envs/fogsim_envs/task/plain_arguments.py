@@ -1,0 +1,29 @@
+"""Arguments as plain data, as `gymnasium.envs.registration.EnvSpec.from_json` has them."""
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Mapping
+from typing import Any, TypeVar, get_args
+
+E = TypeVar("E", bound=type)
+
+
+def takes_plain_data(environment: E) -> E:
+    """Decorator of an environment: an argument that is an instance of a dataclass may be the mapping of its values."""
+    call = environment.__init__  # type: ignore[misc]  # that of this class
+
+    @functools.wraps(call)
+    def checked(self: Any, *arguments: Any, **options: Any) -> None:
+        known = inspect.signature(call).parameters
+        call(self, *arguments, **{k: _made(known[k].annotation, v) if k in known else v for k, v in options.items()})
+
+    environment.__init__ = checked  # type: ignore[misc]
+    return environment
+
+
+def _made(annotation: Any, value: Any) -> Any:
+    kinds = [one for one in get_args(annotation) or (annotation,) if dataclasses.is_dataclass(one)]
+    if not (isinstance(value, Mapping) and kinds):
+        return value
+    return kinds[0](**{name: tuple(one) if isinstance(one, list) else one for name, one in value.items()})

@@ -111,3 +111,17 @@ def test_check_builds_the_fog_along_the_road(tmp_path: Path) -> None:
 def test_shipped_scenarios_can_be_put_in_words(name: str) -> None:
     said = {heading: words(load_scenario(name)) for heading, words in SENTENCES.items()}
     assert all(text.endswith(".") and "None" not in text for text in said.values())
+
+
+def test_the_mix_of_a_template_s_demand_and_clear_air_outside_banks_are_in_the_text(tmp_path: Path) -> None:
+    text = """
+name: lorries
+road: {template: motorway}
+demand: {same_way: 600 veh/h, mix: {truck: 60 %}}
+fog: {outside_visibility: inf, banks: [{start: 300 m, end: 600 m, visibility: 50 m}]}
+"""
+    (tmp_path / "scenario.yaml").write_text(text, encoding="utf-8")
+    scenario = load_scenario(tmp_path)
+    assert SENTENCES["Demand"](scenario).startswith("Vehicles per hour: same way 600 (truck 60 %, car 40 %).")
+    fog = SENTENCES["Fog"](scenario)
+    assert fog.startswith("Clear air outside banks, and 50 m from 300 to 600 m (edges of 100 m), up to 250 m above the")

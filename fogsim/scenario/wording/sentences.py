@@ -93,7 +93,9 @@ def _demand_words(scenario: ScenarioFile) -> str:
         demand = scenario.demand
         rates = {} if demand is None else {key: value for key, value in demand if key.endswith("_vph") and value}
         flows = ", ".join(f"{key.removesuffix('_vph').replace('_', ' ')} {value:g}" for key, value in rates.items())
-        mix = {name: share for name, share in usual_mix(scenario.road.template) if share}
+        written = None if demand is None else demand.mix
+        shares = dict(usual_mix(scenario.road.template)) if written is None else written
+        mix = {name: share for name, share in shares.items() if share}
         return (f"Vehicles per hour: {flows} ({_shares(mix)})." if flows else "No traffic flows.") + _actors(scenario)
     config, files = scenario.traffic.config, traffic_files(scenario)
     of_config = () if config is None else configured_demand(scenario.directory / config).files
@@ -127,12 +129,13 @@ def _fog_words(scenario: ScenarioFile) -> str:
             f"{one.visibility_m:g} m from {one.start_m:g} to {one.end_m:g} m (edges of {one.edge_m:g} m)"
             for one in fog.banks
         )
-        text = f"Meteorological visibility {outside:g} m outside banks, and {banks or 'no banks'}"
+        text = "Clear air" if outside is None or math.isinf(outside) else f"Meteorological visibility {outside:g} m"
+        text += f" outside banks, and {banks or 'no banks'}"
     return f"{text}{_layers(fog)}; illuminance by the sky {scenario.light.illuminance_lx:g} lx."
 
 
 def _layers(fog: Fog) -> str:
-    parts = [f"up to {fog.top_m:g} m above the road"] if math.isfinite(fog.top_m) else []
+    parts = [f"up to {fog.top_m:g} m above the lowest point of the road"] if math.isfinite(fog.top_m) else []
     parts += [f"from {fog.base_m:g} m on"] if fog.base_m is not None else []
     parts += [f"thinning upwards with a scale height of {fog.scale_height_m:g} m"] if fog.scale_height_m else []
     if fog.patches is not None:

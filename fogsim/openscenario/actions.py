@@ -5,7 +5,8 @@ from typing import Any
 
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
-from fogsim.openscenario.positions import from_there_on, vertices_of
+from fogsim.openscenario.positions import from_there_on
+from fogsim.openscenario.shapes import Place, positions_of, sampled, shape_of
 from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
@@ -24,6 +25,8 @@ LAMPS = {  # Of each type of light
 }
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
+_AT_THE_GAP, _AT_THE_HEADWAY, _AT_THE_SPEED = 0.1, 0.02, 0.1
+"""Differences at which a distance [m], or a time gap [s], is reached and kept by both speeds [m/s]."""
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")  # By the one at a distance
 
 
@@ -172,15 +175,29 @@ class Actions(LateralActions):
             effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def longitudinal_distance_action(self, action: Node, actor: str, effect: Effect) -> None:
-        """`follow`, by `timeGap` or `distance`, `continuous`, of a vehicle ahead; in `Init` also the place at once."""
+        """`follow`, by `timeGap` or `distance`, of a vehicle ahead, for good or until it is reached; or a place."""
         headway, distance, is_between_bumpers = self.gap(action)
+        if id(action) in self.positions.at_once:
+            return
         if action.word("displacement", DISPLACEMENTS, "any") == DISPLACEMENTS[1]:
             raise ValueError("displacement: while it drives, a vehicle keeps a distance to one ahead, not behind")
-        if not action.flag("continuous"):
-            raise ValueError("continuous: while a vehicle drives, a distance, once reached, is kept; write true")
-        effect.is_endless = True
-        other = self.vehicles.of(action)
-        further = 0.0 if is_between_bumpers else self.vehicles[actor].front + other.rear
+        is_kept, other, own = action.flag("continuous"), self.vehicles.of(action), self.vehicles[actor]
+        further = 0.0 if is_between_bumpers else own.front + other.rear
+        effect.is_endless |= is_kept
+        if not is_kept:
+            if effect.is_at_start:
+                raise ValueError("continuous: in Init a distance with DynamicConstraints is kept; write true")
+            if action.one("DynamicConstraints") is None:
+                message = "without DynamicConstraints it is there at once, as in Init; write these, or continuous=true"
+                raise ValueError(f"continuous: while a vehicle drives, it comes to a distance in time; {message}")
+            pair = f"{own.called}, {other.called}"
+            signal, wanted, near, unit = f"gap({pair})", distance - further, _AT_THE_GAP, "m"
+            if headway:
+                signal, wanted, near, unit = f"headway({pair}, {further:g} m)", headway, _AT_THE_HEADWAY, "s"
+            parts = (signal, wanted, near, unit), (f"speed_difference({pair})", 0.0, _AT_THE_SPEED, "m/s")
+            reached = " and ".join(f"{s} > {v - n:.9g} {u} and {s} < {v + n:.9g} {u}" for s, v, n, u in parts)
+            effect.ends.append(reached)
+            effect.reached[actor] = reached
         effect.add(actor, follow={"vehicle": other.named, "headway_s": headway, "gap_m": distance - further})
 
     def synchronize_action(self, action: Node, actor: str, effect: Effect) -> None:
@@ -225,17 +242,16 @@ class Actions(LateralActions):
         return headway, distance, action.flag("freespace")
 
     def follow_trajectory_action(self, action: Node, actor: str, effect: Effect) -> None:
-        """`path`: a polyline, or the rest of one, by its times or at the vehicle's speed, on the lanes or off them."""
-        trajectory = self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory")
-        vertices = vertices_of(trajectory)
-        places = [one.need("Position") for one in vertices]
+        """`path`: a trajectory, or the rest of it, by its times or at the vehicle's speed, on the lanes or off them."""
+        shape = shape_of(self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory"))
+        positions = positions_of(shape)
         mode = action.one("TrajectoryFollowingMode") or action
         mode.word("followingMode", ("position", "follow"), "follow")
         has_times = action.within("TimeReference", "None") is None
         timing = action.within("TimeReference", "Timing") if has_times else None
-        there = (self.positions.point(place) for place in places)
-        on_map = ([x, y] if heading is None else [x, y, math.degrees(heading)] for x, y, heading, _ in there)
-        origin, points = self._own_points(places, actor, effect) or ("map", list(on_map))
+        own = None if effect.is_at_start else self._own_places(positions, shape, actor)
+        origin, places = own or ("map", [self.positions.point(one) for one in positions])
+        points, times = sampled(shape, places, timing is not None)
         if any(len(one) == 2 for one in points) and len(points) > 1:
             points = [one[:2] for one in points]
         if (left_out := action.number("initialDistanceOffset", 0.0)) and timing:
@@ -243,7 +259,6 @@ class Actions(LateralActions):
         points, vehicle = from_there_on(points, left_out), self.vehicles[actor]
         path: dict[str, Any] = {"points": points, "ahead_m": vehicle.front, "origin": origin}
         path |= {"stays": True} if vehicle.body else {}
-        times = [one.number("time", 0.0 if timing is None else None) for one in vertices]
         if timing:
             scale, offset = timing.number("scale"), timing.number("offset")
             base = timing.word("domainAbsoluteRelative", ("absolute", "relative"))
@@ -260,13 +275,16 @@ class Actions(LateralActions):
                 self.positions.paths[actor] = [(x, y) for x, y, *_ in points]
         effect.add(actor, path=path)
 
-    def _own_points(self, places: list[Node], actor: str, effect: Effect) -> tuple[str, list[list[float]]] | None:
-        """Points from the place that the actor itself has when it begins, and along which axes; None if not all are."""
-        inner = [one for place in places for one in place.all()]
+    def _own_places(self, positions: list[Node], shape: Node, actor: str) -> tuple[str, list[Place]] | None:
+        """Places from the one that the actor itself has when it begins, and along which axes; None if not all are."""
+        inner = [one for position in positions for one in position.all()]
         own = [one for one in inner if one.tag in _OWN_AXES and one.get("entityRef") == actor and not one.children]
-        if effect.is_at_start or own != inner or len({one.tag for one in inner}) != 1:
+        if own != inner or len({one.tag for one in inner}) != 1:
             return None
-        return _OWN_AXES[inner[0].tag], [[one.number(key) for key in ("dx", "dy")] for one in inner]
+        axes = _OWN_AXES[inner[0].tag]
+        if shape.tag.startswith("Clothoid") and axes == "place":
+            return None
+        return axes, [(one.number("dx"), one.number("dy"), None, None) for one in inner]
 
     def assign_route_action(self, action: Node, actor: str, effect: Effect) -> None:
         """The way through the waypoints, with changes of lane as needed, and then straight on; the ego's in `Init`."""

@@ -61,7 +61,17 @@ class Vehicle:
 
 
 class Vehicles(dict[str, Vehicle]):
-    """Vehicles by name."""
+    """Vehicles by name; `selections` are lists of names."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.selections: dict[str, list[Node]] = {}
+
+    def selected(self, nodes: Iterable[Node]) -> list[str]:
+        """Names of the entities to which elements refer, those of selections one by one; unknown ones are refused."""
+        each = [part for one in nodes for part in self.selections.get(one.get("entityRef"), [one])]
+        self.known(each)
+        return list(dict.fromkeys(one.get("entityRef") for one in each))
 
     @property
     def ego(self) -> str:
@@ -99,6 +109,12 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> Vehicles:
         found[name] = Vehicle(name, entity, "car", 4.6, 1.85, 1.5, 3.7)
         with entity.refusing():
             found[name] = _vehicle(name, catalogs.need(entity, *_CATEGORIES))
+    for one in entities.all("EntitySelection"):
+        if (name := sumo_name(one.get("name"))) in found:
+            one.refuse(f"there is an entity {name!r} already")
+        with one.refusing():
+            found.selections[name] = one.need("Members").some("EntityRef")
+            found.known(found.selections[name])
     for name, vehicle in found.items():
         found[name] = replace(vehicle, named="ego" if name == found.ego else name)
     return found

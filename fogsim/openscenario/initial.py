@@ -1,7 +1,7 @@
 """The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +9,7 @@ from fogsim.openscenario.actions import DISPLACEMENTS, Actions
 from fogsim.openscenario.environment import Environment, Vehicle, environment_of
 from fogsim.openscenario.lateral import Effect
 from fogsim.openscenario.positions import ALONG, POSITIONS
+from fogsim.openscenario.shapes import positions_of, shape_of
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
@@ -45,8 +46,8 @@ class Beginning:
     def _of_name(self, named: str) -> str:
         return self.vehicles.ego if named == "ego" else named
 
-    def read(self, init: Node | None) -> None:
-        """Read the element ``Init``."""
+    def read(self, init: Node | None, at_once: Sequence[tuple[str, Node]] = ()) -> None:
+        """Read the element ``Init``, and distances that a story orders at once."""
         blocks = init.all("Actions") if init else []
         for action in (one for block in blocks for one in block.all("GlobalAction")):
             self._take_global(action)
@@ -56,7 +57,7 @@ class Beginning:
         for one in private:
             for action in one.all("PrivateAction"):
                 self._take_private(action, one.get("entityRef"))
-        for name, action in self._distances:
+        for name, action in (*self._distances, *at_once):
             with action.refusing():
                 self.spots[name] = self._at_distance(action, name)
         absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
@@ -119,12 +120,15 @@ class Beginning:
     def _place(self, private: list[Node], added: Mapping[str, Node]) -> None:
         """Place vehicles where they are added, or put, at the beginning; those relative to another one last."""
         holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in self.vehicles]
+        wanted = {name: position for name, inside in holders for one in inside for position in one.all("Position")}
         for one in private:
             places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
-            # Who only follows a trajectory begins at its first vertex.
-            vertices = [vertex for vertex in one.walk() if vertex.tag == "Vertex"]
-            holders.append((one.get("entityRef"), places or vertices[:1]))
-        wanted = {name: position for name, inside in holders for one in inside for position in one.all("Position")}
+            wanted.update((one.get("entityRef"), position) for place in places for position in place.all("Position"))
+            # Who only follows a trajectory begins where it does.
+            follows = [] if places else [action for action in one.walk() if action.tag == "FollowTrajectoryAction"]
+            for action in follows[:1]:
+                with action.refusing():
+                    wanted[one.get("entityRef")] = self._first_of(action)
         refers_to = self.positions.refers_to
         while wanted:
             ready = [name for name, position in wanted.items() if refers_to(position) not in wanted] or list(wanted)
@@ -134,6 +138,15 @@ class Beginning:
                     continue
                 with next(iter(position.children), position).refusing():
                     self.spots[name] = self.positions.on_lanes(position)
+
+    def _first_of(self, action: Node) -> Node:
+        """Position at which a trajectory begins; ValueError if it has none."""
+        holder = action.one("TrajectoryRef") or action
+        trajectory = self.positions.catalogs.need(holder, "Trajectory")
+        if holder.one("CatalogReference"):
+            # The action reads a copy of its own.
+            trajectory.see()
+        return positions_of(shape_of(trajectory))[0]
 
     def _off_lanes(self, position: Node, vehicle: Vehicle) -> tuple[float, float, float] | None:
         """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one."""

@@ -32,6 +32,7 @@ class Effect:
     sets: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables
     once_there: dict[str, dict[str, Any]] = field(default_factory=dict)  # For vehicles that it brings onto the road
     is_at_start: bool = False
+    reached: dict[str, str] = field(default_factory=dict)  # When an actor keeps its speed again
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -61,6 +62,10 @@ class Effect:
         speeds = [one.get("speed", {}) for one in done]
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
+
+    def has_path(self, subject: str) -> bool:
+        """Whether a subject follows a trajectory."""
+        return "path" in self.do.get(subject, {}) and subject not in self.once_there
 
 
 @dataclass

@@ -26,6 +26,7 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
 }
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     **{one.__name__: one for one in (math.floor, math.ceil, math.sqrt, abs, math.pow, min, max)},
+    **{one.__name__: one for one in (math.sin, math.cos, math.tan, math.asin, math.acos, math.atan)},
     "round": lambda x: math.copysign(math.floor(abs(x) + 0.5), x),  # Halves away from 0
     "sign": lambda x: float((x > 0) - (x < 0)),
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.environment import Vehicle, Vehicles
 from fogsim.openscenario.parameters import Catalogs
+from fogsim.openscenario.shapes import positions_of, sampled, shape_of
 from fogsim.openscenario.xml_tree import REFUSED, Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
@@ -30,6 +31,7 @@ class Positions:
     moving: set[str] = field(default_factory=set)  # Vehicles that are elsewhere later
     rerouted: set[str] = field(default_factory=set)  # Vehicles that get another way
     paths: dict[str, list[tuple[float, float]]] = field(default_factory=dict)  # That vehicles follow from the start [m]
+    at_once: set[int] = field(default_factory=set)  # Identities of actions of a story that are done at the beginning
 
     def refers_to(self, position: Node) -> str | None:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
@@ -185,15 +187,16 @@ class Positions:
         return self._across(spot, ds, t + dt)
 
     def trajectory_position(self, node: Node) -> Point:
-        """So far (`s`) along a polyline, and `t` to its left."""
-        vertices = vertices_of(self.catalogs.need(node.need("TrajectoryRef"), "Trajectory"))
-        for one in vertices:
-            one.get("time")
-        points = [self.point(one.need("Position"))[:2] for one in vertices]
+        """So far (`s`) along a trajectory, and `t` to its left."""
+        shape = shape_of(self.catalogs.need(node.need("TrajectoryRef"), "Trajectory"))
+        points, _ = sampled(shape, [self.point(one) for one in positions_of(shape)], is_timed=False)
         left, t = node.number("s"), node.number("t", 0.0)
-        for (x, y), (to_x, to_y) in itertools.pairwise(points):
+        for (x, y, *here), (to_x, to_y, *there) in itertools.pairwise(points):
             length, heading = math.dist((x, y), (to_x, to_y)), math.atan2(to_y - y, to_x - x)
             if left <= length:
+                if shape.tag != "Polyline" and here and there:
+                    turn = math.remainder(there[0] - here[0], 360.0)
+                    heading = math.radians(here[0] + turn * left / (length or 1.0))
                 cosine, sine = math.cos(heading), math.sin(heading)
                 return x + left * cosine - t * sine, y + left * sine + t * cosine, heading
             left -= length
@@ -255,13 +258,6 @@ class Positions:
             return spot.shifted(offset)
         except ValueError:
             return replace(spot, offset=offset).world
-
-
-def vertices_of(trajectory: Node) -> list[Node]:
-    """Vertices of a ``Trajectory``; ValueError if it is closed or no polyline."""
-    if trajectory.flag("closed"):
-        raise ValueError("closed: write the first vertex again as the last one, and false")
-    return trajectory.need("Shape").need("Polyline").some("Vertex")
 
 
 def from_there_on(points: list[list[float]], distance: float) -> list[list[float]]:

@@ -20,7 +20,7 @@ from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers, timeline_entry
-from fogsim.openscenario.xml_tree import Node, read_xml, sumo_name
+from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.appearance import BODY_PARAMETER
 from fogsim.traffic.road.netconvert import map_net
 from fogsim.traffic.road.opendrive import is_opendrive
@@ -108,12 +108,12 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
     """Initial state, and the events; InputError without an ego on the road, along whose route positions count."""
     root, positions = story.root, story.actions.positions
     begin, vehicles = Beginning(story.actions), positions.vehicles
-    begin.read(storyboard.one("Init"))
+    begin.read(storyboard.one("Init"), story.places_at_once(storyboard))
     if vehicles.ego not in positions.spots:
         root.refuse(f"no vehicle that could be the ego has a place; there are {len(vehicles)}")
         root.findings.close(root.file)
     groups = [one for one in storyboard.walk() if one.tag == "Actors"]
-    actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
+    actors = {name for group in groups for name in vehicles.selected(group.all("EntityRef"))}
     positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.speed(name))}
     story.initial = begin.effect.sets
     story.find_events(storyboard)

@@ -3,8 +3,10 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 from fogsim.openscenario.actions import Actions
+from fogsim.openscenario.environment import Vehicle
 from fogsim.openscenario.lateral import MOTION, Effect
 from fogsim.openscenario.parameters import fits
 from fogsim.openscenario.triggers import (
@@ -22,8 +24,10 @@ from fogsim.openscenario.xml_tree import Node, NodeError
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
+_STRAIGHT, _SHORT = 1000.0, 0.01  # Lengths of paths [m]
 _ROOM = 600  # Most characters of conditions that are joined into one
 _REFERENCE = "CatalogReference"
+_GENTLE = ("parallel", "skip")  # Priorities that end nothing
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -69,16 +73,45 @@ class Storyboard:
         self._acts = [act for act in acts if not self._is_idle(act)]
         for group in (one for act in self._acts for one in act.all("ManeuverGroup")):
             actors, times = group.one("Actors"), _executions(group)
-            names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
+            names = self.actions.vehicles.selected(actors.all("EntityRef")) if actors else []
             if actors and actors.flag("selectTriggeringEntities", "false"):
                 actors.refuse("selectTriggeringEntities: name the actors")
-            self.actions.vehicles.known(actors.all("EntityRef") if actors else ())
             maneuvers = [one for holder in (group, *group.all(_REFERENCE)) for one in holder.all("Maneuver")]
             events = [one for maneuver in maneuvers for one in maneuver.all("Event") if not self._is_idle(one)]
             for event in events:
                 self._find(Entry(group, event, names), times)
             if times > 1 and len(events) > 1:
                 group.refuse(f"maximumExecutionCount: {len(events)} events are played once; write 1")
+
+    def places_at_once(self, storyboard: Node) -> list[tuple[str, Node]]:
+        """Actors and actions of distances that are there at the very beginning, as places in Init are."""
+        found = []
+        for group in (one for one in storyboard.walk() if one.tag == "ManeuverGroup"):
+            actors = group.all("Actors")
+            names = self.actions.vehicles.selected(one for block in actors for one in block.all("EntityRef"))
+            for event in (one for one in group.walk() if one.tag == "Event"):
+                actions = [one for one in event.walk() if one.tag == "LongitudinalDistanceAction"]
+                is_at_once = all(map(self._begins_at_once, (group.above, event)))
+                for action in actions if is_at_once else ():
+                    if action.one("DynamicConstraints") is None and not action.flag("continuous"):
+                        found += [(name, action) for name in names]
+                        self.actions.positions.at_once.add(id(action))
+        return found
+
+    def _begins_at_once(self, part: Node | None) -> bool:
+        """Whether an act or event begins with the run: it has no condition, or parameters have the values for it."""
+        start = part.one("StartTrigger") if part else None
+        groups = start.all("ConditionGroup") if start else []
+        return not groups or any(all(map(self._holds_at_once, group.all("Condition"))) for group in groups)
+
+    def _holds_at_once(self, condition: Node) -> bool:
+        by_value = condition.one("ByValueCondition")
+        one = by_value.one() if by_value else None
+        if one is None or condition.number("delay", 0.0) or condition.attributes.get("conditionEdge", "none") != "none":
+            return False
+        if one.tag == "SimulationTimeCondition":
+            return one.number("value") <= 0.0 and one.get("rule").startswith("greater")
+        return one.tag == "ParameterCondition" and bool(self._declared(one)) and self._is_fixed(one, holds=True)
 
     def _is_idle(self, part: Node) -> bool:
         """Whether an act or event waits for a parameter with another value that nothing sets; it is left out then."""
@@ -92,13 +125,16 @@ class Storyboard:
 
     def _fails(self, node: Node) -> bool:
         """Whether it is a condition that a parameter does not fit, which nothing sets."""
+        return node.tag == "ParameterCondition" and self._is_fixed(node, holds=False)
+
+    def _is_fixed(self, node: Node, holds: bool) -> bool:
+        """Whether a condition holds, or does not, by the declared value of a parameter that nothing sets."""
         name = node.attributes.get("parameterRef")
         sets = (one.tag == "ParameterAction" and one.attributes.get("parameterRef") == name for one in self.root.walk())
-        is_fixed = node.tag == "ParameterCondition" and not any(sets)
-        return is_fixed and not all(fits(value, node) for value in self._declared(node))
+        return not any(sets) and all(fits(value, node) for value in self._declared(node)) == holds
 
     def _find(self, entry: Entry, times: int) -> None:
-        entry.node.word("priority", ("override", "overwrite", "parallel"))
+        entry.node.word("priority", ("override", "overwrite", *_GENTLE))
         for _ in range(min(times * _executions(entry.node), _MOST_TIMES)):
             taken = {name for one in self.entries.values() for name in one.names}
             entry.names.append(_free_name(entry.node.get("name"), {*taken, *entry.names}))
@@ -122,6 +158,8 @@ class Storyboard:
             for entry in (one for one in self.entries.values() if one.group.above is act):
                 own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
                 entry.trigger = both(self._begins[id(act)], own)
+                if entry.node.get("priority") == "skip":
+                    entry.trigger = self._unless_another_runs(entry)
                 written += self._executed(entry, until)
         return written
 
@@ -138,24 +176,58 @@ class Storyboard:
             if effect.once_there:
                 happened = Trigger(f"happened({name})")
                 written.append(timeline_entry(node, f"{name}_once_there", happened, effect.once_there, until))
+            for actor, reached in effect.reached.items():
+                held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
+                when = Trigger(" and ".join([f"happened({name})", reached, *self._still_ordered(entry, name, actor)]))
+                written.append(timeline_entry(node, f"{name}_reached", when, held, until))
             written += self._end_others(entry, name, trigger, until)
         return written
 
+    def _still_ordered(self, entry: Entry, name: str, actor: str) -> list[str]:
+        """Conditions that no other event has ordered the speed of an actor since an entry began."""
+        others = [
+            one for one in self.entries.values() if one is not entry and MOTION & one.effect.do.get(actor, {}).keys()
+        ]
+        later = []
+        for other in (other for one in others for other in one.names):
+            before = self._mark(
+                entry.node, f"{name}_before_{other}", Trigger(f"happened({name}) and not happened({other})")
+            )
+            later.append(f"not ({before} and happened({other}))")
+        return later
+
+    def _unless_another_runs(self, entry: Entry) -> Trigger:
+        """Trigger of an event that is skipped while another of its maneuver runs, or begins in the same step."""
+        others, earlier = self._others(entry), True
+        if not entry.trigger.condition or not others:
+            return entry.trigger
+        running = []
+        for one in self.entries.values():
+            earlier &= one is not entry
+            if any(one is other for other in others):
+                running += [f"(happened({name}) and not ({self._played(one, name)}))" for name in one.names]
+                if earlier and one.trigger.condition:
+                    running.append(f"({_fires(one.trigger)} and not happened({one.names[0]}))")
+        return Trigger(f"{_fires(entry.trigger)} and not ({' or '.join(running)})")
+
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
-        """What an overriding event does to others of its maneuver that have begun: speeds stay as they are."""
-        actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & MOTION]
-        others = [one for one in self._others(entry) if any(map(one.effect.changes_speed, actors))]
-        if entry.node.get("priority") == "parallel" or not trigger.condition:
+        """What an overriding event does to others of its maneuver that run: speeds stay as they are, and paths end."""
+        if entry.node.get("priority") in _GENTLE or not trigger.condition:
             return []
-        known, first = self.actions.vehicles, trigger.condition
-        if trigger.delay:
-            first = f"({first}) delayed {trigger.delay:g} s"
-        held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors if one in known}
-        written = []
-        for number, running in enumerate(_joined((part for one in others for part in self._running(one)), " or ")):
-            when = Trigger(f"({first}) and not happened({name}) and ({running})")
-            called = f"{name}_ends_others" + (f"_{number + 1}" if number else "")
-            written.append(timeline_entry(entry.node, called, when, held, until))
+        known, orders = self.actions.vehicles, entry.effect.do
+        slow = [one for one in entry.actors if one in known and not orders.get(one, {}).keys() & MOTION]
+        held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in slow}
+        left = [one for one in entry.actors if one in known and "path" not in orders.get(one, {})]
+        ends = {one: {**held.get(one, {}), "path": _left(known[one])} for one in left}
+        others = self._others(entry)
+        fast = [one for one in others if any(map(one.effect.changes_speed, slow))]
+        on_paths = [one for one in others if any(map(one.effect.has_path, left))]
+        written: list[TimelineEntry] = []
+        for done, of in ((held, fast), (ends, on_paths)):
+            for running in _joined((part for one in of for part in self._running(one)), " or "):
+                when = Trigger(f"{_fires(trigger)} and not happened({name}) and ({running})")
+                called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
+                written.append(timeline_entry(entry.node, called, when, done, until))
         return written
 
     def _others(self, entry: Entry) -> list[Entry]:
@@ -171,9 +243,12 @@ class Storyboard:
 
     def _overridden(self, entry: Entry) -> list[str]:
         """Conditions that an event whose changes of speed would go on is ended by one that overrides it."""
-        if len(entry.names) > 1 or not (entry.effect.is_endless or entry.effect.changes_speed()):
+        effect = entry.effect
+        if len(entry.names) > 1 or not (
+            effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
+        ):
             return []
-        others = [one for one in self._others(entry) if one.node.get("priority") != "parallel"]
+        others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
         begun = (
             f"(happened({entry.names[0]}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
         )
@@ -300,6 +375,18 @@ class Storyboard:
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
+
+
+def _fires(trigger: Trigger) -> str:
+    """Condition of a trigger with its delay."""
+    return f"({trigger.condition})" + (f" delayed {trigger.delay:g} s" if trigger.delay else "")
+
+
+def _left(vehicle: Vehicle) -> dict[str, Any]:
+    """Path of one whose trajectory ends where it is: a vehicle's ends at once, and a body moves straight on."""
+    far = _STRAIGHT if vehicle.body else _SHORT
+    path = {"points": [[0.0, 0.0, 0.0], [far, 0.0, 0.0]], "ahead_m": vehicle.front, "origin": "vehicle"}
+    return path | ({"stays": True} if vehicle.body else {})
 
 
 def _executions(node: Node) -> int:

@@ -269,6 +269,7 @@ def is_single(node: Node) -> bool:
     while above and is_alone:
         is_alone = above.attributes.get("maximumExecutionCount", "1") == "1"
         is_alone &= above.tag != "ConditionGroup" or len(above.children) == 1
+        is_alone &= above.attributes.get("priority") != "skip"
         above = above.above
     return is_alone
 

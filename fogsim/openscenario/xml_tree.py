@@ -56,11 +56,9 @@ HARMLESS: Mapping[str, str] = _by_name(
 REFUSED: Mapping[str, str] = _by_name(
     {
         "OpenScenario": "the root is written OpenSCENARIO",
-        "ExternalObjectReference EntitySelection Members ScenarioObjectTemplate EntityDistribution "
-        "EntityDistributionEntry": "entities are vehicles, persons and things that the file describes one by one",
+        "ExternalObjectReference ScenarioObjectTemplate EntityDistribution EntityDistributionEntry": "entities are "
+        "vehicles, persons and things that the file describes one by one",
         "RandomRouteAction": "who has no route goes straight on",
-        "Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot": "trajectories are "
-        "polylines",
         "LateralDistanceAction": "where vehicles are in their lanes does not depend on others",
         "VisibilityAction SensorReferenceSet SensorReference": "everything can be seen that the fog does not hide",
         "AnimationAction AnimationType AnimationState AnimationFile ComponentAnimation VehicleComponent "

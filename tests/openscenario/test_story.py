@@ -305,7 +305,7 @@ DECLARED = (
 )
 KEEPS = (
     '<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="9" freespace="true" '
-    'continuous="false"/></LongitudinalAction></PrivateAction>'
+    'continuous="true" displacement="leadingReferencedEntity"/></LongitudinalAction></PrivateAction>'
 )
 """An action that FogSim cannot do in a story."""
 SETS = '<GlobalAction><ParameterAction parameterRef="brakes"><SetAction value="true"/></ParameterAction></GlobalAction>'
@@ -340,7 +340,7 @@ def test_what_waits_for_a_value_that_nothing_sets_is_left_out(
         assert data["expect"] == {"waits": {"happened": "waits"}}
         assert data["timeline"][-1]["when"] == "time < 0 s"
     elif action == KEEPS:
-        with pytest.raises(InputError, match=r"LongitudinalDistanceAction.*: continuous: while a vehicle drives"):
+        with pytest.raises(InputError, match=r"LongitudinalDistanceAction.*: displacement: while it drives"):
             read_openscenario(file)
     else:
         assert {*read_openscenario(file).data["expect"]} == {"idle", "waits"}

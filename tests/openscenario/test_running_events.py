@@ -1,0 +1,134 @@
+"""Distances that are reached once, trajectories that are overridden, events that are skipped, and selected actors."""
+
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.openscenario import read_openscenario
+from fogsim.values import Step
+
+from .test_shapes import ANN, TIMED, follows, world
+from .writing import CAR, after, begun, event, lane, motion_at, over, run, speed, write
+
+LIMITS = '<DynamicConstraints maxAcceleration="3" maxDeceleration="5" maxSpeed="40"/>'
+LAMPS = (
+    '<PrivateAction><AppearanceAction><LightStateAction transitionTime="0"><LightType><VehicleLight '
+    'vehicleLightType="lowBeam"/></LightType><LightState mode="on"/></LightStateAction></AppearanceAction>'
+    "</PrivateAction>"
+)
+
+
+def distance(attributes: str, inside: str = LIMITS) -> str:
+    return (
+        '<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="false" '
+        f"{attributes}>{inside}</LongitudinalDistanceAction></LongitudinalAction></PrivateAction>"
+    )
+
+
+def between(steps: list[Step], time: float) -> float:
+    """Gap from Next to the ego [m]."""
+    return motion_at(steps, time, "Ego")[0] - 4.6 - motion_at(steps, time, "Next")[0]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "gap"),
+    [('distance="12" freespace="true"', 12.0), ('timeGap="2" freespace="false"', 20.0 - 4.6)],
+)
+def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, gap: float) -> None:
+    events = event("near", distance(f'displacement="trailingReferencedEntity" {wanted}'), after(1.0))
+    faster = event("faster", speed(14), over("near"))
+    begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
+    story = {"Next": events, "Ego": faster}
+    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=after(40.0)))
+    then = begun(steps)["faster"]
+    assert between(steps, then) == pytest.approx(gap, abs=0.5)
+    assert motion_at(steps, then + 5.0, "Next")[2] == pytest.approx(10.0, abs=0.15)
+    assert between(steps, then + 5.0) > gap + 10.0
+
+
+def test_another_order_before_a_distance_is_reached_counts(tmp_path: Path) -> None:
+    # From 8 s on Next drives at 20 m/s for a second, and passes the distance while it brakes to the ego's 10 m/s.
+    events = event("near", distance('distance="12" freespace="true"'), after(1.0)).replace("override", "parallel")
+    begin = {"Ego": f"{lane(190)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
+    slow = (
+        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="20" '
+        'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="0"/></SpeedActionTarget>'
+        "</SpeedAction></LongitudinalAction></PrivateAction>"
+    )
+    events += event("slow", slow, after(3.0)).replace("override", "parallel")
+    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": events}, stop=after(24.0)))
+    assert motion_at(steps, 23.5, "Next")[2] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_distance_of_a_story_that_begins_at_once_is_a_place(tmp_path: Path) -> None:
+    place = distance('distance="30" freespace="true" displacement="leadingReferencedEntity"', "")
+    begin = {"Ego": f"{lane(60)}\n{speed(10)}", "Next": f"{lane(90)}\n{speed(10)}"}
+    story = {"Next": event("place", place, after(0)) + event("then", speed(5), over("place"))}
+    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=after(2.0)))
+    ego, ahead = (motion_at(steps, 0.0, name) for name in ("Ego", "Next"))
+    assert ahead[0] - 4.6 - ego[0] == pytest.approx(30.0, abs=0.1)
+    assert begun(steps)["then"] == pytest.approx(0.1, abs=0.11)
+    late = {"Next": event("place", place.replace("leading", "trailing"), after(1))}
+    with pytest.raises(InputError, match="without DynamicConstraints it is there at once"):
+        read_openscenario(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, late))
+
+
+@pytest.mark.parametrize("reference", ["<None/>", TIMED])
+def test_an_event_that_overrides_ends_a_trajectory(tmp_path: Path, reference: str) -> None:
+    # Both turn away by 2.9 degrees at 10 m/s; the car takes to its lane from 4 s on, and Ann goes straight on.
+    def line(x: float, y: float) -> str:
+        there = f"<Position>{world(x, y)}</Position>", f"<Position>{world(x + 100, y + 5)}</Position>"
+        vertices = "".join(f'<Vertex time="{10 * n}">{place}</Vertex>' for n, place in enumerate(there))
+        return follows(f"<Polyline>{vertices}</Polyline>", reference)
+
+    story = {
+        "Far": event("path", line(150, -1.75), after(1.0)) + event("lit", LAMPS, after(4.0)),
+        "Ann": event("walk", line(150, 30), after(1.0)) + event("stop", speed(2), after(4.0)),
+        "Ego": event("then", speed(9), over("path")),
+    }
+    begin = {"Ego": f"{lane(20)}\n{speed(10)}", "Far": f"{lane(140)}\n{speed(10)}"}
+    begin["Ann"] = f"<Position>{world(150, 30)}</Position>\n{speed(10)}"
+    steps = run(write(tmp_path, {"Ego": CAR, "Far": CAR, "Ann": ANN}, begin, story, stop=after(8.0)))
+    x, y, fast = motion_at(steps, 7.5, "Far")
+    assert (y, fast) == (pytest.approx(-1.75 + 1.75, abs=1.8), pytest.approx(10.0, abs=0.1))
+    assert y == pytest.approx(motion_at(steps, 6.0, "Far")[1], abs=0.01)
+    assert x == pytest.approx(motion_at(steps, 6.0, "Far")[0] + 15.0, abs=0.1)
+    walked = motion_at(steps, 7.5, "Ann")[0] - motion_at(steps, 5.0, "Ann")[0]
+    assert walked == pytest.approx(5.0, abs=0.1)
+    assert begun(steps)["then"] == pytest.approx(4.1, abs=0.15)
+
+
+def test_an_event_is_skipped_while_another_of_its_maneuver_runs(tmp_path: Path) -> None:
+    slow = (
+        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="3" '
+        'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget>'
+        "</SpeedAction></LongitudinalAction></PrivateAction>"
+    )
+    events = event("slow", slow, after(1.0))
+    events += event("waits", LAMPS, after(2.0)).replace("override", "skip")
+    events += event("same", LAMPS, after(1.0)).replace("override", "skip").replace('"none"', '"rising"')
+    events += event("free", LAMPS, after(0.5)).replace("override", "skip")
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(20)}\n{speed(10)}"}, {"Ego": events}, stop=after(6.0))
+    times = begun(run(file))
+    assert times["free"] == pytest.approx(0.5, abs=0.11)
+    assert times["slow"] == pytest.approx(1.0, abs=0.11)
+    assert times["waits"] == pytest.approx(4.0, abs=0.21)
+    # Its edge has passed.
+    assert "same" not in times
+
+
+def test_the_entities_of_a_selection_all_act(tmp_path: Path) -> None:
+    entities = {"Ego": CAR, "Far": CAR, "Next": CAR}
+    begin = {name: f"{lane(20 + 40 * n)}\n{speed(10)}" for n, name in enumerate(entities)}
+    file = write(tmp_path, entities, begin, {"both": event("fast", speed(13), after(1.0))}, stop=after(4.0))
+    text = file.read_text(encoding="utf-8")
+    chosen = '<EntitySelection name="both"><Members>{}</Members></EntitySelection></Entities>'
+    members = '<EntityRef entityRef="Far"/><EntityRef entityRef="Next"/>'
+    file.write_text(text.replace("</Entities>", chosen.format(members)), encoding="utf-8")
+    steps = run(file)
+    assert [motion_at(steps, 3.5, name)[2] for name in entities] == pytest.approx([10.0, 13.0, 13.0], abs=0.1)
+    kind = '<ByType objectType="vehicle"/>'
+    file.write_text(text.replace("</Entities>", chosen.format(kind)), encoding="utf-8")
+    with pytest.raises(InputError, match="expected EntityRef inside, got 'ByType'"):
+        read_openscenario(file)

@@ -33,7 +33,11 @@ def between(steps: list[Step], time: float) -> float:
 
 @pytest.mark.parametrize(
     ("wanted", "gap"),
-    [('distance="12" freespace="true"', 12.0), ('timeGap="2" freespace="false"', 20.0 - 4.6)],
+    [
+        ('distance="12" freespace="true"', 12.0),
+        ('distance="3" freespace="true"', 3.0),
+        ('timeGap="2" freespace="false"', 20.0 - 4.6),
+    ],
 )
 def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, gap: float) -> None:
     events = event("near", distance(f'displacement="trailingReferencedEntity" {wanted}'), after(1.0))

@@ -47,6 +47,7 @@ class _SpeedCourse:
     action: ChangeSpeed
     begun: float
     first: float
+    is_close: bool = False  # It keeps the speed at which it followed another vehicle
 
     def speed(self, motion: Motion) -> float | None:
         passed = motion.time + motion.step - self.begun
@@ -209,6 +210,11 @@ class Lamps:
         return replace(state, lamps=lamps.astype(np.int32))
 
 
+def _is_close(course: _Course | None) -> bool:
+    return isinstance(course, _FollowCourse) or (isinstance(course, _SpeedCourse) and course.is_close)
+
+
+_SAME = 1e-6  # Difference of speeds that is none [m/s]
 _USUAL_DURATION = 3.0
 """Time that a change of lane takes which says nothing of it [s]."""
 
@@ -229,14 +235,17 @@ class Playing:
 
     @property
     def following(self) -> frozenset[str]:
-        """Vehicles that keep a headway to another one."""
-        return frozenset(v for v, course in self._courses.items() if isinstance(course, _FollowCourse))
+        """Vehicles that keep a headway to another one, or the speed at which they did."""
+        return frozenset(v for v, course in self._courses.items() if _is_close(course))
 
     def begin(self, action: TrafficAction, motion: Motion) -> None:
         """Begin an action of a vehicle on the road; of several on a speed the last one counts."""
         match action:
             case ChangeSpeed():
-                self._courses[action.vehicle] = _SpeedCourse(action, motion.time, motion.speed(action.vehicle))
+                first = motion.speed(action.vehicle)
+                is_kept = action.duration <= 0.0 and not action.profile and abs(action.speed - first) < _SAME
+                is_close = is_kept and _is_close(self._courses.get(action.vehicle))
+                self._courses[action.vehicle] = _SpeedCourse(action, motion.time, first, is_close)
             case Follow():
                 self._courses[action.vehicle] = _FollowCourse(action, motion.time)
             case Arrive():

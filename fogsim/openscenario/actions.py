@@ -187,9 +187,10 @@ class Actions(LateralActions):
         if not is_kept:
             if effect.is_at_start:
                 raise ValueError("continuous: in Init a distance with DynamicConstraints is kept; write true")
-            if action.one("DynamicConstraints") is None:
+            if (limits := action.one("DynamicConstraints")) is None:
                 message = "without DynamicConstraints it is there at once, as in Init; write these, or continuous=true"
                 raise ValueError(f"continuous: while a vehicle drives, it comes to a distance in time; {message}")
+            limits.remark(HARMLESS[limits.tag], is_whole=True)
             pair = f"{own.called}, {other.called}"
             signal, wanted, near, unit = f"gap({pair})", distance - further, _AT_THE_GAP, "m"
             if headway:

@@ -63,9 +63,10 @@ class Effect:
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
-    def has_path(self, subject: str) -> bool:
-        """Whether a subject follows a trajectory."""
-        return "path" in self.do.get(subject, {}) and subject not in self.once_there
+    def has_path(self, subject: str, has_times: bool | None = None) -> bool:
+        """Whether a subject follows a trajectory: any, one with times, or one without."""
+        path = None if subject in self.once_there else self.do.get(subject, {}).get("path")
+        return path is not None and has_times in (None, "at_s" in path)
 
 
 @dataclass

@@ -218,13 +218,17 @@ class Storyboard:
         slow = [one for one in entry.actors if one in known and not orders.get(one, {}).keys() & MOTION]
         held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in slow}
         left = [one for one in entry.actors if one in known and "path" not in orders.get(one, {})]
-        ends = {one: {**held.get(one, {}), "path": _left(known[one])} for one in left}
+        ends = {one: {"path": _left(known[one])} for one in left}
+        # Whose trajectory has times has no other speed.
+        stays = {one: {**held.get(one, {}), **end} for one, end in ends.items()}
         others = self._others(entry)
         fast = [one for one in others if any(map(one.effect.changes_speed, slow))]
-        on_paths = [one for one in others if any(map(one.effect.has_path, left))]
+        timed, untimed = (
+            [one for one in others if any(one.effect.has_path(name, has) for name in left)] for has in (True, False)
+        )
         written: list[TimelineEntry] = []
-        for done, of in ((held, fast), (ends, on_paths)):
-            for running in _joined((part for one in of for part in self._running(one)), " or "):
+        for done, ended in ((held, fast), (stays, timed), (ends, untimed)):
+            for running in _joined((part for one in ended for part in self._running(one)), " or "):
                 when = Trigger(f"{_fires(trigger)} and not happened({name}) and ({running})")
                 called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
                 written.append(timeline_entry(entry.node, called, when, done, until))

@@ -283,6 +283,7 @@ def test_values_that_mean_something_else_are_refused(tmp_path: Path) -> None:
             _loaded(_changed(tmp_path, "chain_of_parameters", (old, new)))
 
 
+@pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
 def test_constraints_hold_for_the_values_that_a_catalog_is_given(tmp_path: Path) -> None:
     shutil.copytree(CASES.parent, tmp_path, dirs_exist_ok=True)
     catalog = tmp_path / "catalogs" / "vehicles.xosc"

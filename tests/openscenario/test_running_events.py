@@ -11,6 +11,8 @@ from fogsim.values import Step
 from .test_shapes import ANN, TIMED, follows, world
 from .writing import CAR, after, begun, event, lane, motion_at, over, run, speed, write
 
+pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
+
 LIMITS = '<DynamicConstraints maxAcceleration="3" maxDeceleration="5" maxSpeed="40"/>'
 LAMPS = (
     '<PrivateAction><AppearanceAction><LightStateAction transitionTime="0"><LightType><VehicleLight '

@@ -14,6 +14,7 @@ Polyline = tuple[list[list[float]], list[float]]
 
 _OFF = 0.001  # Greatest distance of a piece from its curve [m]
 _MOST = 5000  # Pieces of a trajectory
+_HIGHEST, _LIGHTEST = 10, 1e-6  # Order of NURBS, and weight
 _DEEPEST = 12  # Halvings of a piece
 _FIRST = 4  # Pieces between two knots before any is halved
 _NEAR = 1e-6  # Part of the way between two knots over which a tangent is measured
@@ -87,7 +88,8 @@ def _spiral(begin: Place, parts: Sequence[Sequence[float]], times: Sequence[floa
             raise ValueError(f"times: expected each later than the one before, got {over:g} s after {begun:g} s")
         heading += turn
         change = (last - first) / length
-        count = math.ceil(length * math.sqrt(max(abs(first), abs(last)) / (8.0 * _OFF))) or 1
+        pieces = length * math.sqrt(max(abs(first), abs(last)) / (8.0 * _OFF))
+        count = math.ceil(min(pieces, _MOST + 1.0)) or 1
         if len(points) + count > _MOST:
             raise ValueError(f"a trajectory has at most {_MOST} pieces of 1 mm off its curve")
 
@@ -111,8 +113,8 @@ def _spiral(begin: Place, parts: Sequence[Sequence[float]], times: Sequence[floa
 def _knots(shape: Node, points: int, order: int) -> list[float]:
     """Knots of NURBS that begin at their first control point; ValueError if they do not, or have corners."""
     knots = [one.number("value") for one in shape.all("Knot")]
-    if not 2 <= order <= points or len(knots) != points + order:
-        message = "an order of 2 … the number of points, and as many knots as points and order together"
+    if not 2 <= order <= min(points, _HIGHEST) or len(knots) != points + order:
+        message = f"an order of 2 … {_HIGHEST}, as many points or more, and as many knots as points and order together"
         raise ValueError(f"expected {message}; got order {order}, {points} points and {len(knots)} knots")
     first, inner, last = knots[:order], knots[order:-order], knots[-order:]
     if knots != sorted(knots) or len({*first}) > 1 or len({*last}) > 1 or first == last:
@@ -124,11 +126,13 @@ def _knots(shape: Node, points: int, order: int) -> list[float]:
 
 def _nurbs(shape: Node, places: Sequence[Place], is_timed: bool) -> Polyline:
     """NURBS, whose times are a third coordinate of the control points."""
-    controls, order = shape.all("ControlPoint"), int(shape.number("order"))
+    controls, order = shape.all("ControlPoint"), round(shape.number("order"))
     knots, weights = _knots(shape, len(controls), order), [one.number("weight", 1.0) for one in controls]
     times = _times(controls, "time", is_timed)
-    if min(weights) <= 0.0 or (is_timed and times != sorted({*times})):
-        raise ValueError("ControlPoint: expected weights above 0, and each time later than the one before")
+    if min(weights) < _LIGHTEST or max(weights) > 1.0 / _LIGHTEST or (is_timed and times != sorted({*times})):
+        raise ValueError(
+            f"ControlPoint: expected weights of {_LIGHTEST:g} … {1.0 / _LIGHTEST:g}, and later times one by one"
+        )
     rows = [[w * x, w * y, w * t, w] for (x, y, *_), t, w in zip(places, times, weights, strict=True)]
 
     def at(u: float) -> list[float]:
@@ -140,8 +144,8 @@ def _nurbs(shape: Node, places: Sequence[Place], is_timed: bool) -> Polyline:
         for n in range(_FIRST):
             a, b = (low + part / _FIRST * (high - low) for part in (n, n + 1))
             cuts += _halved(at, a, b, is_timed)
-    if len(cuts) > _MOST:
-        raise ValueError(f"a trajectory has at most {_MOST} pieces of 1 mm off its curve")
+            if len(cuts) > _MOST:
+                raise ValueError(f"a trajectory has at most {_MOST} pieces of 1 mm off its curve")
     points, near = [at(u) for u in cuts], _NEAR * (ends[-1] - ends[0])
     tangents = [(at(max(u - near, ends[0])), at(min(u + near, ends[-1]))) for u in cuts]
     turns = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in tangents]
@@ -168,8 +172,8 @@ def _halved(at: Callable[[float], list[float]], low: float, high: float, is_time
     chord = max(math.dist((x, y), (to_x, to_y)), _OFF)
     for u in (low + part * (high - low) for part in (0.25, 0.5, 0.75)):
         on_x, on_y, time = at(u)
-        along = ((on_x - x) * (to_x - x) + (on_y - y) * (to_y - y)) / chord**2
-        share = (time - begun) / (over - begun) if is_timed else along
+        along = ((on_x - x) * (to_x - x) + (on_y - y) * (to_y - y)) / (chord * chord)
+        share = (time - begun) / ((over - begun) or 1.0) if is_timed else along
         off = math.dist((on_x, on_y), (x + share * (to_x - x), y + share * (to_y - y)))
         if off > _OFF and depth < _DEEPEST:
             middle = 0.5 * (low + high)

@@ -132,12 +132,13 @@ def test_shapes_that_fit_no_curve_are_refused(tmp_path: Path) -> None:
     bad = {
         f'<Clothoid curvature="0" length="0">{position}</Clothoid>': "length: expected more than 0",
         f'<Clothoid curvature="0" length="5" startTime="1">{position}</Clothoid>': "startTime and stopTime, or neither",
+        f'<Clothoid curvature="0" curvaturePrime="1e300" length="1e300">{position}</Clothoid>': "at most 5000 pieces",
         f'<Clothoid curvature="9" length="500">{position}</Clothoid>': "at most 5000 pieces",
         f"<ClothoidSpline>{2 * (later + '</ClothoidSplineSegment>')}</ClothoidSpline>": "begins where the one before",
         nurbs(3, [(0, 1, 1, 1)] * 3, [0, 0, 1, 1, 1]): "got order 3, 3 points and 5 knots",
         nurbs(3, [(0, 1, 1, 1)] * 3, [0, 0, 0.2, 1, 1, 1]): "the first and the last 3 times",
         nurbs(3, [(0, 1, 1, 1)] * 5, [0, 0, 0, 1, 1, 2, 2, 2]): "a corner, or a gap",
-        nurbs(2, [(0, 0, 1, 1)] * 2, [0, 0, 1, 1]): "weights above 0",
+        nurbs(2, [(0, 0, 1, 1)] * 2, [0, 0, 1, 1]): "expected weights of 1e-06",
     }
     for shape, message in bad.items():
         with pytest.raises(InputError, match=message):

@@ -23,7 +23,7 @@ def takes_plain_data(environment: E) -> E:
 
 
 def _made(annotation: Any, value: Any) -> Any:
-    kinds = [one for one in get_args(annotation) or (annotation,) if dataclasses.is_dataclass(one)]
+    kinds: list[type] = [one for one in get_args(annotation) or (annotation,) if dataclasses.is_dataclass(one)]
     if not (isinstance(value, Mapping) and kinds):
         return value
     return kinds[0](**{name: tuple(one) if isinstance(one, list) else one for name, one in value.items()})

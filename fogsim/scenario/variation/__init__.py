@@ -9,11 +9,10 @@ from fogsim.scenario.variation.cases import (
     Verdict,
     chosen_cases,
     read_variation,
-    value_text,
     with_case,
 )
 from fogsim.scenario.variation.grid import MOST_RUNS, grid_mistake
-from fogsim.scenario.variation.levels import Draws, SeedLevels, Value, number_with_unit
+from fogsim.scenario.variation.levels import Draws, SeedLevels, Value, number_with_unit, value_text
 
 __all__ = [
     "KEYS",

@@ -130,9 +130,8 @@ def _nurbs(shape: Node, places: Sequence[Place], is_timed: bool) -> Polyline:
     knots, weights = _knots(shape, len(controls), order), [one.number("weight", 1.0) for one in controls]
     times = _times(controls, "time", is_timed)
     if min(weights) < _LIGHTEST or max(weights) > 1.0 / _LIGHTEST or (is_timed and times != sorted({*times})):
-        raise ValueError(
-            f"ControlPoint: expected weights of {_LIGHTEST:g} … {1.0 / _LIGHTEST:g}, and later times one by one"
-        )
+        message = f"weights of {_LIGHTEST:g} … {1.0 / _LIGHTEST:g}, and each time later than the one before"
+        raise ValueError(f"ControlPoint: expected {message}")
     rows = [[w * x, w * y, w * t, w] for (x, y, *_), t, w in zip(places, times, weights, strict=True)]
 
     def at(u: float) -> list[float]:

@@ -23,7 +23,8 @@ def takes_plain_data(environment: E) -> E:
 
 
 def _made(annotation: Any, value: Any) -> Any:
-    kinds: list[type] = [one for one in get_args(annotation) or (annotation,) if dataclasses.is_dataclass(one)]
+    among = get_args(annotation) or (annotation,)
+    kinds = [one for one in among if isinstance(one, type) and dataclasses.is_dataclass(one)]
     if not (isinstance(value, Mapping) and kinds):
         return value
     return kinds[0](**{name: tuple(one) if isinstance(one, list) else one for name, one in value.items()})

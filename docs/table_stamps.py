@@ -140,8 +140,8 @@ class Stamps:
                 for name in self._edited(one, where)
             ]
             if self._row(one, where, changed[one.name]) not in page:
-                many = changed[one.name]
-                files = ", ".join(many[:9] or ["no file"]) + (f" and {len(many) - 9} more" if len(many) > 9 else "")
+                many = changed[one.name] or ["no file"]
+                files = ", ".join(many[:9]) + (f" and {len(many) - 9} more" if len(many) > 9 else "")
                 found.append(
                     f"{PAGE} is not up to date on {one.name}: since it was measured, these have changed: {files}. "
                     f"{COMMAND} {one.name} measures it again, {COMMAND} --page lists the change in the page"

@@ -140,5 +140,5 @@ def test_a_person_is_no_ego(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_no_configuration_but_may_have_some() -> None:
-    with pytest.raises(InputError, match=r"there is a folder and no file 'grid' in .*; did you mean 'grid\.sumocfg'\?"):
+    with pytest.raises(InputError, match=r"grid is a folder; .*; in it: grid\.sumocfg$"):
         scenario_from_config(GRID.parent, "ego", ["fog.visibility_m=120"])

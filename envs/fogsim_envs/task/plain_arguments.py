@@ -6,6 +6,8 @@ import inspect
 from collections.abc import Mapping
 from typing import Any, TypeVar, get_args
 
+from fogsim.errors import InputError
+
 E = TypeVar("E", bound=type)
 
 
@@ -16,15 +18,19 @@ def takes_plain_data(environment: E) -> E:
     @functools.wraps(call)
     def checked(self: Any, *arguments: Any, **options: Any) -> None:
         known = inspect.signature(call).parameters
-        call(self, *arguments, **{k: _made(known[k].annotation, v) if k in known else v for k, v in options.items()})
+        made = {k: _made(k, known[k].annotation, v) if k in known else v for k, v in options.items()}
+        call(self, *arguments, **made)
 
     environment.__init__ = checked  # type: ignore[misc]
     return environment
 
 
-def _made(annotation: Any, value: Any) -> Any:
+def _made(name: str, annotation: Any, value: Any) -> Any:
     among = get_args(annotation) or (annotation,)
     kinds = [one for one in among if isinstance(one, type) and dataclasses.is_dataclass(one)]
     if not (isinstance(value, Mapping) and kinds):
         return value
-    return kinds[0](**{name: tuple(one) if isinstance(one, list) else one for name, one in value.items()})
+    try:
+        return kinds[0](**{key: tuple(one) if isinstance(one, list) else one for key, one in value.items()})
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error

@@ -1,5 +1,6 @@
 """Files that are whole or not there."""
 
+import errno
 import json
 import math
 import os
@@ -48,6 +49,22 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_part(tmp_path: Path, monk
         write_bytes(path, b"new")
     assert path.read_bytes() == b"old"
     assert not partial_path(path).exists()
+
+
+def test_a_full_disk_of_a_network_leaves_the_old_file_and_no_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_bytes(tmp_path / "a", b"old")
+    close = os.close
+
+    def full(descriptor: int) -> None:
+        close(descriptor)
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    quota = pytest.raises(OSError, match=r"quota exceeded.*a\.part")
+    with monkeypatch.context() as network, quota, whole_file(tmp_path / "a"):
+        network.setattr(os, "close", full)
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"old")]
 
 
 def test_an_error_in_the_block_leaves_the_old_file_and_no_part(tmp_path: Path) -> None:

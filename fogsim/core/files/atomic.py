@@ -93,6 +93,8 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         try:
             yield file
             file.flush()
+            # A network's file system reports a full disk when a descriptor is closed, and the lock stays until then.
+            os.close(os.dup(file.fileno()))
             publish(path)
         except BaseException:
             with contextlib.suppress(OSError):

@@ -39,16 +39,19 @@ class VideoWriter:
         self._out, self._rate_factor = out, rate_factor
         self._encoder: Encoder | None = None
         self._lock = contextlib.ExitStack()
-        self._leftover: Path | None = None
+        self._leftovers: tuple[Path, ...] = ()
 
     def write(self, frame: Pixels, time: float) -> None:
         """Add a frame (rows, cols, 3), red first, of the first frame's size, from a time on [s] later than the last."""
         rows, cols = frame.shape[:2]
         if self._encoder is None:
             part = partial_path(self._out)
-            # The encoder writes the same file, which stays locked.
-            self._lock.enter_context(opened_alone(part))
-            self._leftover = part
+            # Not the part itself: on SMB, only the descriptor that holds a lock can write.
+            lock = part.with_name(f"{part.name}.lock")
+            self._lock.enter_context(opened_alone(lock))
+            self._leftovers = part, lock
+            # The encoder could not replace what is write-protected, and would follow a link.
+            part.unlink(missing_ok=True)
             self._encoder = Encoder(encoding_command(part, ["-f", "ivf"], self._rate_factor))
             self._encoder.write(struct.pack("<4sHH4sHHIIQ", b"DKIF", 0, 32, b"RGBA", cols, rows, _TICKS, 1, 0))
         pixels = np.full((rows, cols, 4), 255, np.uint8)
@@ -69,10 +72,9 @@ class VideoWriter:
                     self._encoder.finish()
                     if kind is None:
                         publish(self._out)
-                        self._leftover = None
             finally:
-                if self._leftover is not None:
-                    self._leftover.unlink(missing_ok=True)
+                for leftover in self._leftovers:
+                    leftover.unlink(missing_ok=True)
 
 
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:

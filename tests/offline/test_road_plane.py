@@ -165,8 +165,12 @@ def test_a_video_that_is_left_or_refused_leaves_no_file(clear_video: Path, tmp_p
 
 def test_a_video_that_another_process_writes_is_left_alone(tmp_path: Path) -> None:
     out, frame = tmp_path / "out.mp4", np.zeros((32, 32, 3), np.uint8)
+    # A process that was killed left these.
+    (tmp_path / "out.mp4.part").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "out.mp4.part.lock").touch(0o444)
     with VideoWriter(out) as first:
         first.write(frame, 0.0)
+        assert (tmp_path / "out.mp4.part.lock").is_file(), "the encoder could not write a locked file on SMB"
         with pytest.raises(InputError, match="another process is writing it"), VideoWriter(out) as second:
             second.write(frame, 0.0)
         first.write(frame, 1.0)

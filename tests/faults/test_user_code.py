@@ -220,6 +220,16 @@ def test_a_method_that_changes_the_working_directory_changes_it_for_nobody_else(
     assert Path.cwd().samefile(folder)
 
 
+def test_a_working_directory_that_cannot_be_entered_again_fails_no_method(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "import os, pathlib\nclass Method:\n    def advise(self, *_):\n        pathlib.Path.cwd().rmdir()\n"
+    (folder / "leaving.py").write_text(text)
+    (folder / "here").mkdir()
+    monkeypatch.chdir(folder / "here")
+    ADVISERS.find("leaving:Method", folder)().advise(None, 30.0, 0.0, None)
+
+
 def test_a_call_that_takes_too_long_fails_the_run(folder: Path, command: Command) -> None:
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "'mine:Dawdles'"))
     done = command("run", "short.fog.yaml", "--out", "out", "--method-timeout", "0.2", cwd=folder)

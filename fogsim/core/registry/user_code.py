@@ -154,16 +154,16 @@ def _found_first(folder: Path) -> Iterator[None]:
 @contextlib.contextmanager
 def working_directory_kept() -> Iterator[None]:
     """Undo a change of the working directory by a user's code: relative paths of inputs and results start there."""
-    try:
+    before = None
+    with contextlib.suppress(FileNotFoundError):
         before = Path.cwd()
-    except FileNotFoundError:
-        yield
-        return
     try:
         yield
     finally:
-        # Always: the user's may be gone by now.
-        os.chdir(before)
+        if before is not None:
+            # Not every working directory can be entered again by its name, as below a folder of another user.
+            with contextlib.suppress(OSError):
+                os.chdir(before)
 
 
 def described(error: BaseException, file: Path | None, otherwise: str = "") -> str:

@@ -68,7 +68,7 @@ def _run_until_broken(
 
 def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Path) -> Future[str | None]:
     """Submit a run; BrokenProcessPool also if the fork server died, which the next pool starts again."""
-    # A signal while a process starts would leave it to itself, and it would complain.
+    # A signal while a process starts would leave it behind, and it would print a traceback.
     with Interruption():
         try:
             return pool.submit(work, run.scenario, run.seed, result)
@@ -108,9 +108,11 @@ def _prepare_worker() -> None:
 
 
 def _end() -> None:
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(0)
 
 
 def _end_with_parent() -> None:

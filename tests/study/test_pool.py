@@ -1,5 +1,7 @@
+import io
 import json
 import multiprocessing
+import os
 import signal
 import sys
 import time
@@ -12,7 +14,7 @@ import pytest
 from fogsim.scenario import load_scenario
 from fogsim.study import StudyRun
 from fogsim.study.execution import result_file
-from fogsim.study.pool import ProcessPool
+from fogsim.study.pool import ProcessPool, _end
 
 SCENARIO = load_scenario("motorway_fog_bank")
 WORK = """
@@ -59,7 +61,7 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
     def interrupt(run: StudyRun, _: str | None) -> None:
         raise KeyboardInterrupt
 
-    stranger = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600,))
+    stranger = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600,), daemon=True)
     stranger.start()
     with pytest.raises(KeyboardInterrupt):
         ProcessPool(2, __import__("slow_work").work).run(runs, tmp_path, interrupt)
@@ -94,6 +96,17 @@ def test_a_thread_that_a_method_leaves_keeps_no_process(tmp_path: Path, monkeypa
     run = StudyRun(0, {}, 0, SCENARIO, "k0")
     ProcessPool(1, __import__("lingering_work").work).run([run], tmp_path, lambda *_: None)
     assert not result_file(tmp_path, run).exists()
+
+
+def test_a_process_ends_even_if_its_output_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[int] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    closed = io.StringIO()
+    closed.close()
+    monkeypatch.setattr(sys, "stdout", closed)
+    with pytest.raises(ValueError, match="closed file"):
+        _end()
+    assert ended == [0]
 
 
 def test_the_death_of_the_server_of_processes_costs_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

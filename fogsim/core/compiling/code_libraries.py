@@ -31,7 +31,8 @@ class KeptCode(caching.IndexDataCacheFile):  # type: ignore[misc] # numba is unt
     def save(self, key: Any, data: Any) -> None:
         """Keep a kernel; where it cannot be written, as on a full disk, the next process compiles again.
 
-        Code comes before the index, in a file named after it: whatever ends or joins this, none gets another's code.
+        The code is written first, into a file named after its digest, so that no index points to other code, whenever
+        this process ends and whatever others write meanwhile.
         """
         with contextlib.suppress(OSError):
             overloads = self._load_index()

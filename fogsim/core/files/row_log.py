@@ -71,7 +71,7 @@ def row_batches(path: Path) -> Iterator[Any]:
             try:
                 with _noting_damage(path):
                     batch = reader.read_next_batch()
-                    # What reads damaged places would end the process.
+                    # Damaged offsets would crash the process when rows are read.
                     batch.validate(full=True)
             except (StopIteration, InputError):
                 # Unreadable data is the end of a log that was cut off.

@@ -101,7 +101,7 @@ def test_a_thread_that_a_method_leaves_keeps_no_process(tmp_path: Path, monkeypa
 def test_a_process_ends_even_if_its_output_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[int] = []
     monkeypatch.setattr(os, "_exit", ended.append)
-    closed = io.StringIO()
+    closed = io.TextIOWrapper(io.BytesIO())
     closed.close()
     monkeypatch.setattr(sys, "stdout", closed)
     with pytest.raises(ValueError, match="closed file"):

@@ -232,6 +232,7 @@ def test_code_of_an_earlier_source_is_never_taken_for_that_of_this_one(
         disk.setattr("fogsim.core.compiling.code_libraries.write_entry", nearly_full)
         assert used.use()[0] == 630.0
     assert used.use()[0] == 630.0
+    assert len([*tmp_path.rglob("*.nbc")]) == len([*tmp_path.rglob("*.nbi")])  # none of the earlier source is left
 
 
 def test_a_file_in_place_of_a_folder_of_roads_gives_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ that copy again in each caller of a caller. What is linked is simplified here, o
 """
 
 import contextlib
+import glob
 import hashlib
 import io
 import pickle
@@ -39,6 +40,11 @@ class KeptCode(caching.IndexDataCacheFile):  # type: ignore[misc] # numba is unt
             number = int.from_bytes(hashlib.sha256(self._dump(data)).digest()[:8])
             self._save_data(overloads.setdefault(key, self._data_name(number)), data)
             self._save_index(overloads)
+            # Code of earlier sources.
+            own, kept = self._index_name.removesuffix("nbi"), {*overloads.values()}
+            for file in Path(self._index_path).parent.glob(f"{glob.escape(own)}*.nbc"):
+                if file.name not in kept:
+                    file.unlink()
 
     def _load_index(self) -> Any:
         if read_entry(Path(self._index_path)) is None:

@@ -282,9 +282,6 @@ def add_glow_cores(
                 out[v, _THREE * u + _SECOND] += light * blue
 
 
-_SHINING = 500.0
-"""Luminance beyond which a surface shines by itself [cd/m²]: lamps do, and what reflects is darker when they count."""
-
 _SAME_PLACE = 1.0
 """Difference of distances up to which a pixel shows a lamp of the same vehicle [m]."""
 
@@ -297,18 +294,18 @@ def _luminance_at(luminance: NDArray[np.float32], v: int, u: int) -> float:
 
 @kernel
 def _drawn_about(
-    luminance: NDArray[np.float32], distance: NDArray[np.float32], u0: int, v0: int, far: float
+    luminance: NDArray[np.float32], distance: NDArray[np.float32], u0: int, v0: int, far: float, bright: float
 ) -> tuple[float, float]:
     """Luminance of the sixteen pixels about a place: sum beyond that of the darkest, and sum of those of lamps there.
 
-    Takes `far` [m].
+    Takes `far` [m], `bright` [cd/m²].
     """
     drawn, shining, least, count = 0.0, 0.0, math.inf, 0
     for v in range(max(0, v0 - 1), min(distance.shape[0], v0 + 3)):
         for u in range(max(0, u0 - 1), min(distance.shape[1], u0 + 3)):
             here = _luminance_at(luminance, v, u)
             drawn, least, count = drawn + here, min(least, here), count + 1
-            if here > _SHINING and abs(distance[v, u] - far) < _SAME_PLACE:
+            if here > bright and abs(distance[v, u] - far) < _SAME_PLACE:
                 shining += here
     return max(drawn - count * least, 0.0), shining
 
@@ -320,13 +317,17 @@ def _dim_about(
     u0: int,
     v0: int,
     far: float,
+    bright: float,
     share: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Take a share of what was drawn from those of the sixteen pixels about a place that show lamps (`far` [m])."""
+    """Take a share of what was drawn from those of the sixteen pixels about a place that show lamps.
+
+    Takes `far` [m], `bright` [cd/m²].
+    """
     for v in range(max(0, v0 - 1), min(distance.shape[0], v0 + 3)):
         for u in range(max(0, u0 - 1), min(distance.shape[1], u0 + 3)):
-            if _luminance_at(luminance, v, u) > _SHINING and abs(distance[v, u] - far) < _SAME_PLACE:
+            if _luminance_at(luminance, v, u) > bright and abs(distance[v, u] - far) < _SAME_PLACE:
                 for j in range(3 * u, 3 * u + 3):
                     out[v, j] = max(out[v, j] - np.float32(share) * luminance[v, j], _ZERO)
 
@@ -353,6 +354,7 @@ def add_direct_light(
     focal: float,
     largest: float,
     faintest: float,
+    bright: float,
     luminance: NDArray[np.float32],
     distance: NDArray[np.float32],
     out: NDArray[np.float32],
@@ -360,11 +362,12 @@ def add_direct_light(
     """Add what a renderer lost of small lamps, and take away what it drew too much of them.
 
     What of the luminance that a lamp should show without fog was drawn already about the lamp, shared with its
-    neighbours, is not added again; a lamp smaller than the pixel that shows it was drawn too bright. Of a lamp behind
-    something the part that is hidden is left out. The light goes to the four pixels about the place.
+    neighbours, is not added again; a lamp smaller than the pixel that shows it was drawn too bright. Pixels brighter
+    than `bright` show lamps. Of a lamp behind something the part that is hidden is left out. The light goes to the four
+    pixels about the place.
 
-    Takes `focal` [px], `largest` [px²], `faintest` [cd/m²], `luminance`, `out` (rows, cols · 3) [cd/m²], `distance`
-    (rows, cols) [m].
+    Takes `focal` [px], `largest` [px²], `faintest`, `bright` [cd/m²], `luminance`, `out` (rows, cols · 3) [cd/m²],
+    `distance` (rows, cols) [m].
     """
     rows, columns = distance.shape
     for i in range(lamps.shape[0]):
@@ -379,11 +382,11 @@ def add_direct_light(
         if expected * transmittance < faintest:
             continue
         u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
-        drawn, shining = _drawn_about(luminance, distance, u0, v0, lamp[RANGE])
+        drawn, shining = _drawn_about(luminance, distance, u0, v0, lamp[RANGE], bright)
         around, are_small = _expected_about(lamps, i, focal, largest)
         if are_small and shining > around:
             share = kept * expected * (1.0 / around - 1.0 / shining)
-            _dim_about(luminance, distance, u0, v0, lamp[RANGE], share, out)
+            _dim_about(luminance, distance, u0, v0, lamp[RANGE], bright, share, out)
             continue
         missing = expected * max(0.0, 1.0 - drawn / around) * transmittance
         right, below = lamp[PLACE_U] - u0, lamp[PLACE_V] - v0

@@ -127,6 +127,9 @@ _SMALL = 2.25
 _FAINTEST = 1e-5
 """What is fainter than this share of the image's mean is not drawn: a hundredth of what 8 bits and noise can show."""
 
+_SHINING, _STANDS_OUT = 500.0, 4.0
+"""Least luminance of a lamp [cd/m²], also as a multiple of the image's mean [-]: by day, white paint is bright too."""
+
 _SOFT_CELLS = 1.4
 _REACH_CELLS = 4.0
 _SAME_CORE = 1.0  # lamps nearer to each other are drawn as one [px]
@@ -189,13 +192,14 @@ class Halos:
             return
         rows, columns = distance.shape
         image = luminance.reshape(rows, 3 * columns)
-        faintest = _FAINTEST * mean_luminance(image, 16)
+        mean = mean_luminance(image, 16)
+        faintest, bright = _FAINTEST * mean, max(_SHINING, _STANDS_OUT * mean)
         if np.any(lamps[:, DEPTH] > 0):
             light = self._lobes.light(lamps, chosen, np.array(pose.position, dtype=np.float64), sources)
             above = np.ascontiguousarray(camera_axes(camera, pose)[:, 2])
             self._add_glow(image, distance, camera, above, lamps, light, faintest)
         drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
-        add_direct_light(lamps, camera.focal_length, _SMALL, faintest, drawn, distance, image)
+        add_direct_light(lamps, camera.focal_length, _SMALL, faintest, bright, drawn, distance, image)
 
     def _add_glow(
         self,

@@ -102,6 +102,15 @@ def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity():
         assert flux(out, place) == pytest.approx(shown * 100.0 / 200.0**2, rel=0.01)
 
 
+def test_a_lamp_in_daylight_does_not_darken_the_white_paint_around_it():
+    view = empty_view(CAMERA, 200.0)
+    view.radiance[:] = 1000.0
+    view.radiance[230:250, 310:330] = 2000.0
+    out = view.radiance.copy()
+    Halos().add(out, view, CAMERA, POSE, fog(math.inf), lamps((200.0, 0.0, 1.5)))
+    assert (out >= view.radiance).all()
+
+
 def test_two_lamps_close_together_share_what_was_drawn():
     left, right = (200.0, 0.2, 1.5), (200.0, -0.2, 1.5)
     view = empty_view(CAMERA)

@@ -246,14 +246,14 @@ class GridFilter:
         """Follow the common deviation of estimates, by their precisions; better images stay known for some seconds."""
         if not measured:
             return
-        deviations = [one.standard_deviation / max(one.extinction, float(self._extinction[0])) for one in measured]
-        precisions = [min(max(one, self._relative_floor), 1e6) ** -2 for one in deviations]
+        relative = [one.standard_deviation / max(one.extinction, float(self._extinction[0])) for one in measured]
+        precisions = [min(max(deviation, self._relative_floor), 1e6) ** -2 for deviation in relative]
         common = sum(p * one.common_deviation for p, one in zip(precisions, measured, strict=True)) / sum(precisions)
         worse = min(max(common - self._common, 0.0), _MOST_COMMON)
         self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
 
     def _with_common_errors(self) -> Floats:
-        """The probability, spread by what all images of the best method in use have wrong in common."""
+        """The probability, spread by what all images of the methods in use have wrong in common."""
         if self._common == 0.0:
             return self._probability.copy()
         return _folded(convolution(self._probability, self._walk(self._common)))

@@ -133,7 +133,7 @@ class DatedFusion:
         else:
             belief = cast("Fusion", self._fusion).update(estimates, time)
         belief = checked_belief(self._name, belief)
-        # Reports say something to who knows of places alone.
+        # Reports inform only a fusion that knows of places.
         if (reports and belief.profile is not None) or any(one.valid or one.bounds is not None for one in estimates):
             self._last = time
         return replace(belief, age=time - self._last)

@@ -131,7 +131,7 @@ def _plain_number(path: KeyPath, value: object) -> str:
     _, _, suffix = str(path[-1] if path else "").rpartition("_")
     unit = UNIT_OF_SUFFIX.get(suffix)
     written = split_quantity(value) if isinstance(value, str) and unit else None
-    return f"; write a number alone, which is in {unit}, such as {written[0]:g}" if written and written[1] else ""
+    return f"; write the number alone, in {unit}, such as {written[0]:g}" if written and written[1] else ""
 
 
 def _message(detail: ErrorDetails) -> str:

@@ -164,7 +164,7 @@ def test_unknown_scenarios() -> None:
 
 
 def test_a_number_with_a_unit_under_a_key_with_its_own() -> None:
-    with pytest.raises(InputError, match=r"got '80m'; write a number alone, which is in m, such as 80$"):
+    with pytest.raises(InputError, match=r"got '80m'; write the number alone, in m, such as 80$"):
         load_scenario("motorway_fog_bank", ["fog.visibility_m=80m"])
 
 

@@ -261,7 +261,7 @@ _BRIGHTEST = 0.92
 """Share of bins that are no brighter than the light that priors are relative to [-]."""
 
 _LEAST_LEVEL = 1e-4
-"""Least of that light, over full scale: less than any pixel value above black stands for [-]."""
+"""Least of that light, over full scale: no daylight is so dark [-]."""
 
 _BONNETS = (0.45, 0.3, 0.15, 0.05)
 """Shares of the rows below the horizon that a bonnet or a dashboard may cover [-]."""

@@ -150,7 +150,7 @@ class Zhu2015:
         self._state = None
 
     def update(self, observation: Observation) -> Estimate:
-        """Estimate the fog from one image and the two before it.
+        """Estimate the fog from one image and the two before it, as far as they are at most 2 s old.
 
         Parameters
         ----------

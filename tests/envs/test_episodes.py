@@ -1,13 +1,15 @@
 """Episodes that are drawn: repeated, and of splits."""
 
+import copy
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, load_scenario
-from fogsim_envs.task import FogDistribution, ScenarioDistribution
+from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
 
@@ -44,3 +46,16 @@ def test_splits_share_no_seed() -> None:
     assert not drawn["train"] & drawn["test"]
     with pytest.raises(InputError, match="unknown split"):
         EpisodeSource(None, None, None, (), "validation")
+
+
+def test_distributions_survive_the_json_of_a_specification() -> None:
+    given = {
+        "fog_distribution": FogDistribution(clear_share=0.5),
+        "scenario_distribution": ScenarioDistribution(lanes=(2,)),
+        "reward_weights": TaskWeights(),
+    }
+    spec = copy.copy(gymnasium.spec("fogsim/FogAdvisoryFast-v1"))  # the registry's own is that of all tests
+    spec.kwargs = given
+    read = type(spec).from_json(spec.to_json())
+    source = gymnasium.make(read).unwrapped._source
+    assert (source._given_fog, source._scenes) == (given["fog_distribution"], given["scenario_distribution"])

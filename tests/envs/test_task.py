@@ -444,16 +444,3 @@ def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, An
     assert isinstance(picture, np.ndarray)
     assert picture.shape == (480, 1024, 3)
     assert picture.std() > 5.0
-
-
-def test_distributions_survive_the_json_of_a_specification() -> None:
-    given = {
-        "fog_distribution": FogDistribution(clear_share=0.5),
-        "scenario_distribution": ScenarioDistribution(lanes=(2,)),
-        "reward_weights": TaskWeights(),
-    }
-    spec = gymnasium.spec("fogsim/FogAdvisoryFast-v1")
-    spec.kwargs = given
-    read = type(spec).from_json(spec.to_json())
-    source = gymnasium.make(read).unwrapped._source
-    assert (source._given_fog, source._scenes) == (given["fog_distribution"], given["scenario_distribution"])

@@ -26,7 +26,7 @@ class Beginning:
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
-    aims: dict[str, float] = field(default_factory=dict)  # Speeds that the ego comes to in the beginning [m/s]
+    aims: dict[str, float] = field(default_factory=dict)  # Speeds that vehicles come to in the beginning [m/s]
     _distances: list[tuple[str, Node]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -42,6 +42,11 @@ class Beginning:
             return float(order["to_kmh"]) / KMH_PER_MPS
         other = self.speed(self._of_name(order["like"]), *asked, vehicle)
         return max(other * float(order.get("factor", 1.0)) + float(order.get("plus_kmh", 0.0)) / KMH_PER_MPS, 0.0)
+
+    def moves(self, vehicle: str) -> bool:
+        """Whether a vehicle drives in the beginning, or comes to a speed."""
+        comes = "speed" in self.effect.do.get(vehicle, {})
+        return bool(self.speed(vehicle) or (comes and self.aims.get(vehicle, 1.0)))
 
     def _of_name(self, named: str) -> str:
         return self.vehicles.ego if named == "ego" else named
@@ -88,7 +93,7 @@ class Beginning:
         """Let one begin off the lanes, or turned on one; without a path it moves on, a vehicle along its lane."""
         x, y, heading = self.positions.off_lanes.setdefault(vehicle.name, (math.inf, 0.0, 0.0))
         speed, degrees = self.speed(vehicle.name), math.degrees(heading)
-        far = _STRAIGHT if speed or vehicle.body else 0.0
+        far = _STRAIGHT if self.moves(vehicle.name) or vehicle.body else 0.0
         ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
         lane = None if vehicle.body else self.lanes.nearest(x, y)
         path = {"points": self.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
@@ -192,14 +197,16 @@ class Beginning:
             self.effect.add(name, **done)
 
     def _come_to(self, name: str, speed: dict[str, Any], lasts: float) -> None:
-        """Let a vehicle come to a speed from standstill, or an earlier order; the ego's driver drives on from there."""
+        """Let a vehicle come to a speed from standstill, or an earlier order; unless it stops, the ego drives on."""
         first = speed.get("profile", [(1.0, 0.0)])[0]
         if first[0] == 0.0:
             self.orders[name] = {"to_kmh": first[1]}
         final = speed["profile"][-1][1] if "profile" in speed else speed.get("to_kmh")
-        if name == self.vehicles.ego and final is not None:
+        if final is not None:
             self.aims[name] = final / KMH_PER_MPS
-            lasts = lasts or abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
+        if final and name == self.vehicles.ego:
+            if "rate_mps2" in speed:
+                lasts = abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
             speed = {**speed, "for_s": max(lasts, 0.1)}
         self.effect.add(name, speed=speed)
 

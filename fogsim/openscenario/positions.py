@@ -77,11 +77,10 @@ class Positions:
             dx, dy = to_x - from_x, to_y - from_y
             length = math.hypot(dx, dy) or 1.0
             along = min(max(((x - from_x) * dx + (y - from_y) * dy) / length, 0.0), length)
-            feet.append(
-                (math.dist((x, y), (from_x + along * dx / length, from_y + along * dy / length)), so_far + along)
-            )
+            foot = from_x + along * dx / length, from_y + along * dy / length
+            feet.append((math.dist((x, y), foot), so_far + along))
             so_far += math.hypot(dx, dy)
-        away, place = min(feet)
+        away, place = min(feet, default=(math.inf, 0.0))
         if away > _ON_PATH:
             raise ValueError(f"{position.tag}: it is {away:.1f} m from the trajectory of {vehicle}")
         return place
@@ -190,10 +189,11 @@ class Positions:
         """So far (`s`) along a trajectory, and `t` to its left."""
         shape = shape_of(self.catalogs.need(node.need("TrajectoryRef"), "Trajectory"))
         points, _ = sampled(shape, [self.point(one) for one in positions_of(shape)], is_timed=False)
-        left, t = node.number("s"), node.number("t", 0.0)
-        for (x, y, *here), (to_x, to_y, *there) in itertools.pairwise(points):
+        left, t, last = node.number("s"), node.number("t", 0.0), len(points) - 2
+        for n, ((x, y, *here), (to_x, to_y, *there)) in enumerate(itertools.pairwise(points)):
             length, heading = math.dist((x, y), (to_x, to_y)), math.atan2(to_y - y, to_x - x)
-            if left <= length:
+            # Chords are shorter than the curve.
+            if left <= length + (_ON_PATH if n == last else 0.0):
                 if shape.tag != "Polyline" and here and there:
                     turn = math.remainder(there[0] - here[0], 360.0)
                     heading = math.radians(here[0] + turn * left / (length or 1.0))
@@ -218,15 +218,12 @@ class Positions:
         spot, lane = self.lanes.along(first, inner.number("pathS"), edges), inner.get("laneId")
         if inner.tag == "FromRoadCoordinates":
             return self._across(spot, 0.0, inner.number("t"))
-        lanes = {
-            o.rpartition("_")[2]: one for one in self.lanes.lanes if one.edge == spot.lane.edge for o in one.origins
-        }
+        here = [one for one in self.lanes.lanes if one.edge == spot.lane.edge]
+        lanes = {origin.rpartition("_")[2]: one for one in here for origin in one.origins}
         turned = lane.removeprefix("-") if lane.startswith("-") else f"-{lane}"
         found = lanes.get(lane) or lanes.get(turned)
         if found is None:
-            raise ValueError(
-                f"there is no lane {lane!r} to drive on there; lanes along the route are {', '.join(lanes)}"
-            )
+            raise ValueError(f"there is no lane {lane!r} to drive on there; the route has {', '.join(lanes)}")
         there = Spot(found, spot.position * found.length / spot.lane.length)
         if lane in lanes:
             return self._shifted(there, inner, "laneOffset")

@@ -114,7 +114,7 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
         root.findings.close(root.file)
     groups = [one for one in storyboard.walk() if one.tag == "Actors"]
     actors = {name for group in groups for name in vehicles.selected(group.all("EntityRef"))}
-    positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.speed(name))}
+    positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.moves(name))}
     story.initial = begin.effect.sets
     story.find_events(storyboard)
     return begin

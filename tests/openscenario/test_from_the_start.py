@@ -56,6 +56,27 @@ def test_a_speed_that_is_ordered_in_init_over_a_time_is_reached_then(tmp_path: P
         assert found == pytest.approx(speeds, abs=0.4)
 
 
+@pytest.mark.parametrize(("begins", "fast"), [(_accelerates(0, 1), 0.0), (_profile((0, 8)), 8.0)])
+def test_the_ego_keeps_the_speed_to_which_it_comes_in_init(tmp_path: Path, begins: str, fast: float) -> None:
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{begins}"}, stop=after(4.0)))
+    assert motion_at(steps, 3.9, "Ego")[2] == pytest.approx(fast, abs=0.05)
+
+
+def test_who_comes_to_a_speed_in_init_is_elsewhere_later(tmp_path: Path) -> None:
+    place = '<Position><RelativeWorldPosition entityRef="Lead" dx="5" dy="0"/></Position>'
+    begin = {"Ego": EGO, "Lead": f"{lane(300)}\n{_accelerates(8, 4)}"}
+    stop = _condition(f'<ReachPositionCondition tolerance="1">{place}</ReachPositionCondition>')
+    with pytest.raises(InputError, match="where Lead is by then is not known"):
+        read_openscenario(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, stop=stop))
+
+
+def test_a_car_off_the_lanes_comes_to_a_speed_in_init(tmp_path: Path) -> None:
+    begin = {"Ego": EGO, "Far": f'<Position><WorldPosition x="150" y="-30" h="0"/></Position>\n{_accelerates(8, 2)}'}
+    steps = run(write(tmp_path, {"Ego": CAR, "Far": CAR}, begin, stop=after(4.0)))
+    assert motion_at(steps, 3.9, "Far")[2] == pytest.approx(8.0, abs=0.1)
+    assert motion_at(steps, 3.9, "Far")[0] > 150.0 + 3.7 + 15.0
+
+
 def test_a_distance_driven_counts_on_any_road(tmp_path: Path) -> None:
     begin = {"Ego": EGO, "Other": f"{lane(420, 1)}\n{speed(10)}"}
     stop = _condition('<TraveledDistanceCondition value="30"/>', "Other")
@@ -84,6 +105,22 @@ def test_a_position_is_reached_between_two_steps_but_not_beside_it(
     reach = _condition(f'<ReachPositionCondition tolerance="{tolerance}">{place}</ReachPositionCondition>')
     steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach + after(5.0)))
     assert steps[-1].time == pytest.approx(time, abs=0.11)
+
+
+def test_a_person_who_crosses_reaches_a_position_in_a_lane(tmp_path: Path) -> None:
+    line = "".join(
+        f'<Vertex time="{time}"><Position><WorldPosition x="120" y="{y}"/></Position></Vertex>'
+        for time, y in ((0, -6), (4, 2))
+    )
+    crosses = (
+        '<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="t" closed="false">'
+        f"<Shape><Polyline>{line}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>"
+        '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/></TimeReference><TrajectoryFollowingMode '
+        'followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
+    )
+    reach = _condition(f'<ReachPositionCondition tolerance="0.2">{lane(120)}</ReachPositionCondition>', "Ann")
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, {"Ego": EGO, "Ann": crosses}, stop=reach + after(5.0)))
+    assert steps[-1].time == pytest.approx(2.1, abs=0.21)
 
 
 def test_a_trajectory_is_followed_from_an_offset_on(tmp_path: Path) -> None:

@@ -125,6 +125,16 @@ def test_a_car_follows_a_clothoid_from_its_position_on(tmp_path: Path) -> None:
     )
 
 
+def test_a_position_may_be_at_the_end_of_a_curve(tmp_path: Path) -> None:
+    arc = f'<Clothoid curvature="0.05" length="30"><Position>{world(100, 20)}</Position></Clothoid>'
+    trajectory = f'<TrajectoryRef><Trajectory name="t" closed="false"><Shape>{arc}</Shape></Trajectory></TrajectoryRef>'
+    file = written(tmp_path, speed(1))
+    there = f'<TrajectoryPosition s="30">{trajectory}</TrajectoryPosition>'
+    file.write_text(file.read_text(encoding="utf-8").replace(world(100, 20), there, 1), encoding="utf-8")
+    begins = entry(read_openscenario(file).data, "Init_off_the_lanes")["do"]["Ann"]["path"]["points"][0]
+    assert begins[:2] == pytest.approx((100 + 20 * math.sin(1.5), 40 - 20 * math.cos(1.5)), abs=0.01)
+
+
 def test_shapes_that_fit_no_curve_are_refused(tmp_path: Path) -> None:
     position = f"<Position>{world(100, 20)}</Position>"
     segment = '<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="5">'

@@ -142,13 +142,15 @@ def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path
     (old / "more").mkdir()
     (old / "a.add.xml").write_text('<additional><include href="more/b.add.xml"/></additional>')
     (old / "more" / "b.add.xml").write_text(
-        '<additional><variableSpeedSign id="v" lanes="A0B0_0" file="v.xml"/></additional>'
+        '<additional><variableSpeedSign id="v" lanes="A0B0_0" file="v.xml"/>'
+        '<calibrator id="c" edge="A0B0" pos="0" file="c.xml"/></additional>'
     )
     (old / "more" / "v.xml").write_text('<vss><step time="0" speed="9"/></vss>')
+    (old / "more" / "c.xml").write_text('<calibrator><flow begin="0" end="9" vehsPerHour="9"/></calibrator>')
     text = "name: old\nduration_s: 5\ntraffic: {config: grid.sumocfg, ego: veh5}\nfog: {visibility_m: 100}\n"
     (old / "scenario.yaml").write_text(text)
     begin_scenario("new", str(old), tmp_path)
-    for name in ("view.xml", "a.add.xml", "more/b.add.xml", "more/v.xml"):
+    for name in ("view.xml", "a.add.xml", "more/b.add.xml", "more/v.xml", "more/c.xml"):
         assert (tmp_path / "new" / name).read_text() == (old / name).read_text()
     (old / "more" / "v.xml").unlink()
     with pytest.raises(InputError, match=r"'more/v\.xml' is no file in the scenario's folder"):

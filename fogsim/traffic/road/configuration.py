@@ -36,7 +36,7 @@ _SELDOM = (
     *("astar.all-distances", "astar.landmark-distances"),
 )
 """Files that do not decide a run; SUMO does not start if some of them are missing."""
-_READ_BY = frozenset(("rerouter", "variableSpeedSign"))
+_READ_BY = frozenset(("calibrator", "rerouter", "variableSpeedSign"))
 """Elements whose attribute ``file`` is one that SUMO reads."""
 _MOST_BYTES = 50_000_000  # of a file that may name others
 _OPENING = ("load-state", "scale")

@@ -57,7 +57,6 @@ def clearance(one: Body, other: Body) -> float:
 EGO = "ego"
 """Name of the ego in conditions, whatever its id."""
 
-
 Point = tuple[float, float]
 
 _FARTHEST_STEP = 50.0  # Farthest that vehicles come in a step [m]; positions along a closed route jump farther
@@ -67,13 +66,12 @@ _FARTHEST_STEP = 50.0  # Farthest that vehicles come in a step [m]; positions al
 class _Memory:
     """What moments have of earlier ones."""
 
-    driven: dict[str, tuple[float, float, float]] = field(
-        default_factory=dict
-    )  # x, y [m] and way so far [m] by vehicle
+    # x, y [m] and distance so far [m], by vehicle
+    driven: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     # Time of the latest step [s], and distances in it and in the one before [m], by pair of points
     signed: dict[tuple[str, ...], tuple[float, float, float]] = field(default_factory=dict)
     # Time of the latest step [s], and places in it and in the one before [m], by point of a vehicle
-    points: dict[tuple[str, float], tuple[float, "Point", "Point"]] = field(default_factory=dict)
+    points: dict[tuple[str, float], tuple[float, Point, Point]] = field(default_factory=dict)
 
 
 class Moment:
@@ -86,7 +84,7 @@ class Moment:
         begun: set[str],
         ended: set[str],
         route: Route | None,
-        memory: "_Memory",
+        memory: _Memory,
     ) -> None:
         self.step, self.collisions, self.begun, self.ended = step, collisions, begun, ended
         self._route, self._memory = route, memory
@@ -123,7 +121,7 @@ class Moment:
         return None if place is None else place.front
 
     def driven(self, vehicle: str) -> float | None:
-        """Distance that a vehicle has driven since the first moment that was asked [m]; None if it is not there."""
+        """Distance that a vehicle has driven since it was first asked for [m]; None off the road."""
         row = self.row(vehicle)
         if row is None:
             return None
@@ -134,7 +132,7 @@ class Moment:
         return so_far
 
     def nearest(self, pair: tuple[str, ...], signed: float) -> float:
-        """Least distance [m] since the step before, from the present one, which has another sign on the other side."""
+        """Least distance since the step before [m]: the present one without its sign, or 0 if the sign has changed."""
         time, now, before = self._memory.signed.get(pair, (-math.inf, signed, signed))
         before = before if time == self.step.time else now
         self._memory.signed[pair] = self.step.time, signed, before
@@ -142,7 +140,7 @@ class Moment:
         return 0.0 if is_passed else abs(signed)
 
     def nearest_to(self, vehicle: str, behind: float, place: Point) -> float | None:
-        """Least distance of a point of a vehicle from a place since the step before [m]; None if it is not there."""
+        """Least distance of a vehicle's point from a place since the step before [m]; None if it is not on the road."""
         row = self.row(vehicle)
         if row is None:
             return None

@@ -205,7 +205,7 @@ OF_VEHICLES = {
         places=(*_PAIR_AND_LENGTH, Place.LENGTH),
     ),
     "distance_along(X, Y, LENGTH, LENGTH)": length_signal(
-        "the same along the route, whatever the lane: 0 also when they have passed since the step before",
+        "the distance between these points along the route, in any lanes; 0 if they have passed since the step before",
         _distance_along,
         places=(*_PAIR_AND_LENGTH, Place.LENGTH),
         needs=_ROUTE,
@@ -216,7 +216,7 @@ OF_VEHICLES = {
         places=(Place.VEHICLE, *[Place.LENGTH] * 3),
     ),
     "nearest_to(X, LENGTH, LENGTH, LENGTH)": length_signal(
-        "the same, the least since the step before",
+        "the least such distance since the step before",
         _nearest_to,
         places=(Place.VEHICLE, *[Place.LENGTH] * 3),
     ),

@@ -26,7 +26,7 @@ LAMPS = {  # Of each type of light
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
 _AT_THE_GAP, _AT_THE_HEADWAY, _AT_THE_SPEED = 0.1, 0.02, 0.1
-"""Differences at which a distance [m], or a time gap [s], is reached and kept by both speeds [m/s]."""
+"""Differences from a distance [m], a time gap [s] and another's speed [m/s] up to which these count as reached."""
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")  # By the one at a distance
 
 

@@ -190,9 +190,8 @@ class Storyboard:
         ]
         later = []
         for other in (other for one in others for other in one.names):
-            before = self._mark(
-                entry.node, f"{name}_before_{other}", Trigger(f"happened({name}) and not happened({other})")
-            )
+            is_first = Trigger(f"happened({name}) and not happened({other})")
+            before = self._mark(entry.node, f"{name}_before_{other}", is_first)
             later.append(f"not ({before} and happened({other}))")
         return later
 
@@ -248,9 +247,8 @@ class Storyboard:
     def _overridden(self, entry: Entry) -> list[str]:
         """Conditions that an event whose changes of speed would go on is ended by one that overrides it."""
         effect = entry.effect
-        if len(entry.names) > 1 or not (
-            effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
-        ):
+        goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
+        if len(entry.names) > 1 or not goes_on:
             return []
         others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
         begun = (

@@ -101,6 +101,10 @@ def _speed_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str 
     """A speed above the one with which a vehicle begins, which is its type's maximum then."""
     if not isinstance(doing, VehicleActions):
         return None
+    wanted = [] if doing.speed is None else [doing.speed.to_kmh or 0.0, *(speed for _, speed in doing.speed.profile)]
+    wanted += [] if doing.arrive is None or doing.arrive.factor else [doing.arrive.to_kmh or 0.0]
+    if not any(wanted):
+        return None
     named = scenario.traffic.ego if subject == EGO else subject
     actor = scenario.actors.get(named)
     begins = [actor.speed_kmh] if actor is not None else []
@@ -108,10 +112,8 @@ def _speed_mistake(subject: str, doing: Doing, scenario: "ScenarioFile") -> str 
         for name, other in operations(entry):
             if name == subject and isinstance(other, VehicleActions) and other.depart and other.depart.like is None:
                 begins.append(other.depart.speed_kmh)
-    wanted = [] if doing.speed is None else [doing.speed.to_kmh or 0.0, *(speed for _, speed in doing.speed.profile)]
-    wanted += [] if doing.arrive is None or doing.arrive.factor else [doing.arrive.to_kmh or 0.0]
     most = max((speed or math.inf for speed in begins), default=math.inf)
-    if max(wanted, default=0.0) <= most:
+    if max(wanted) <= most:
         return None
     return (
         f"{subject} begins with speed_kmh: {most:g} and never drives faster, so it does not come to {max(wanted):g}; "

@@ -147,10 +147,10 @@ class ArriveAction(Section):
     """Factor on the other one's speed, to which `to_kmh` is added."""
 
     steady_m: Distance = 0.0
-    """Way before the place from which on it has that speed."""
+    """Distance before that place over which it already has that speed."""
 
     steady_s: Time = 0.0
-    """Or the time."""
+    """Or the time before its arrival for which it already has it."""
 
     @model_validator(mode="after")
     def _with_a_speed(self) -> Self:

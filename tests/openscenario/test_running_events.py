@@ -54,17 +54,18 @@ def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, ga
 
 
 def test_another_order_before_a_distance_is_reached_counts(tmp_path: Path) -> None:
-    # From 8 s on Next drives at 20 m/s for a second, and passes the distance while it brakes to the ego's 10 m/s.
-    events = event("near", distance('distance="12" freespace="true"'), after(1.0)).replace("override", "parallel")
-    begin = {"Ego": f"{lane(190)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
+    # Next speeds up to 15 m/s, brakes from 3 s on, and is as fast as the ego at 16.3 s, 20 m behind it.
+    events = event("near", distance('distance="20" freespace="true"'), after(1.0)).replace("override", "parallel")
+    begin = {"Ego": f"{lane(122.95)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
     slow = (
-        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="20" '
+        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="40" '
         'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="0"/></SpeedActionTarget>'
         "</SpeedAction></LongitudinalAction></PrivateAction>"
     )
     events += event("slow", slow, after(3.0)).replace("override", "parallel")
-    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": events}, stop=after(24.0)))
-    assert motion_at(steps, 23.5, "Next")[2] == pytest.approx(0.0, abs=0.05)
+    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": events}, stop=after(18.0)))
+    assert between(steps, 16.3) == pytest.approx(20.0, abs=0.05)
+    assert motion_at(steps, 17.5, "Next")[2] < 9.7
 
 
 def test_a_distance_of_a_story_that_begins_at_once_is_a_place(tmp_path: Path) -> None:

@@ -217,8 +217,9 @@ class Triggers:
         """`nearest_to` a position; with a small tolerance, of one that drives along there, `X.position` in its lane."""
         around, near = node.number("tolerance"), self._distance_to(node, one).replace("distance_to", "nearest_to")
         place, ways = self.positions.along_ego(node.need("Position")), self.positions.ways
-        drives_along = not {*ways[self.positions.vehicles.ego]}.isdisjoint(ways.get(one.name, ()))
-        if place is None or not drives_along or around >= _BESIDE:
+        shared = {*ways[self.positions.vehicles.ego]} & {*ways.get(one.name, ())}
+        # Persons may cross.
+        if place is None or one.body or not shared or around >= _BESIDE:
             return near, "<=", f"{around:.9g} m"
         # Vehicles drive in the middle of their lane, where the position need not be.
         return (f"{one.called}.position >= {place + one.front - around:.3f} m and {near} <= {_BESIDE} m",)

@@ -107,7 +107,8 @@ def test_a_position_is_reached_between_two_steps_but_not_beside_it(
     assert steps[-1].time == pytest.approx(time, abs=0.11)
 
 
-def test_a_person_who_crosses_reaches_a_position_in_a_lane(tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", ["", f"{lane(118)}\n"])
+def test_a_person_who_crosses_reaches_a_position_in_a_lane(tmp_path: Path, place: str) -> None:
     line = "".join(
         f'<Vertex time="{time}"><Position><WorldPosition x="120" y="{y}"/></Position></Vertex>'
         for time, y in ((0, -6), (4, 2))
@@ -119,7 +120,9 @@ def test_a_person_who_crosses_reaches_a_position_in_a_lane(tmp_path: Path) -> No
         'followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
     )
     reach = _condition(f'<ReachPositionCondition tolerance="0.2">{lane(120)}</ReachPositionCondition>', "Ann")
-    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, {"Ego": EGO, "Ann": crosses}, stop=reach + after(5.0)))
+    steps = run(
+        write(tmp_path, {"Ego": CAR, "Ann": PERSON}, {"Ego": EGO, "Ann": place + crosses}, stop=reach + after(5.0))
+    )
     assert steps[-1].time == pytest.approx(2.1, abs=0.21)
 
 

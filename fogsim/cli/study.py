@@ -47,7 +47,7 @@ def study_command(
     from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario.wording.sentences import empty_start
     from fogsim.study import RayCluster, load_study, run_study
-    from fogsim.study.plan import counted, grid_text
+    from fogsim.study.plan import grid_text
 
     if address is not None and engine is EngineName.POOL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
@@ -56,7 +56,7 @@ def study_command(
     may_import = import_nothing if check else CodeNotice()
     with counting_bar(stderr, "checking the scenario of each cell") as watch:
         loaded = load_study(study, with_timeout(None, method_timeout), may_import, watch)
-    stdout.print(escape(f"{loaded.name}: {grid_text(loaded)} = {counted(len(loaded.runs), 'run')}"))
+    stdout.print(escape(f"{loaded.name}: {grid_text(loaded)}"))
     cells = loaded.cells()
     if (warning := next(filter(None, map(empty_start, cells.values())), None)) is not None:
         stderr.print(f"[yellow]{escape(warning)}[/]", soft_wrap=True)

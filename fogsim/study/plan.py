@@ -343,14 +343,6 @@ def needs_camera(scenario: Scenario) -> bool:
 
 
 def grid_text(study: Study) -> str:
-    """Size of a study's grid: ``2 policies × 3 seeds``."""
-    sizes = [counted(len(levels), name) for name, levels in study.factors.items()]
-    return " × ".join([*sizes, counted(len({run.seed for run in study.runs}), "seed")])
-
-
-def counted(number: int, name: str) -> str:
-    """A number of things, whose name is in the singular: ``2 policies``, ``1 fog``."""
-    if number == 1 or name.endswith("s"):
-        return f"{number} {name}"
-    is_y = name.endswith("y") and name[-2:-1] not in "aeiou"
-    return f"{number} {name[:-1]}ies" if is_y else f"{number} {name}s"
+    """Size of a study's grid: ``policy (2) × seed (3) = 6 runs``."""
+    sizes = {**{name: len(levels) for name, levels in study.factors.items()}, "seed": len({r.seed for r in study.runs})}
+    return " × ".join(f"{name} ({number})" for name, number in sizes.items()) + f" = {len(study.runs)} runs"

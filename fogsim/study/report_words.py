@@ -9,7 +9,7 @@ from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
 from fogsim.study.main_metrics import MetricWords, metric_words, short_number, signed
-from fogsim.study.plan import Study, counted, grid_text
+from fogsim.study.plan import Study, grid_text
 from fogsim.study.table import Row, rows_of_cells
 
 _EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
@@ -192,7 +192,7 @@ def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Diffe
 def _compared(study: Study, rows: Sequence[Row]) -> str:
     done = sum(row["status"] == "complete" for row in rows)
     return (
-        f"{grid_text(study)} = {counted(len(rows), 'run')}, {'all' if done == len(rows) else done} complete. "
+        f"{grid_text(study)}, {'all' if done == len(rows) else done} complete. "
         f"Policies are compared to {' · '.join(study.baseline.values())} with the same seed."
     )
 

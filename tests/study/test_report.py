@@ -122,7 +122,7 @@ def test_the_report_says_what_is_shown_and_no_more(study: Study, folder: Path) -
     assert parser.open == []
     assert all(source.startswith(("data:image/svg+xml;base64,", "figures/")) for source in parser.sources)
     summary = page[page.index("<h2>Summary") : page.index("<h2>Main metrics")]
-    assert "2 policies × 2 fogs × 8 seeds = 32 runs, all complete" in summary
+    assert "policy (2) × fog (2) × seed (8) = 32 runs, all complete" in summary
     assert "slow &lt;1&gt;" in summary
     better = r"Overdriven \[m/veh·km in fog\]: better with slow &lt;1&gt; \(−(8|9)\d(\.\d+)?\)"
     assert len(re.findall(better, summary)) == 2

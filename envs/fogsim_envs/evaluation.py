@@ -269,7 +269,15 @@ def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
 def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
     """A policy for one of several episodes or agents at once, which has a memory of its own."""
     one = _policy(policy, action_space)
-    return copy.deepcopy(one) if one is policy else one
+    if one is not policy:
+        return one
+    try:
+        return copy.deepcopy(one)
+    except Exception as error:
+        raise InputError(
+            f"policy: several episodes at once need a copy each, and {type(one).__name__} cannot be copied: {error}; "
+            "give one without reset(), which all share, or an agent with predict()"
+        ) from error
 
 
 class _Sums:

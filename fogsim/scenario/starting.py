@@ -43,15 +43,15 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     if folder.exists():
         raise InputError(f"{folder} already exists; give another name")
     traffic = old.traffic
-    beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
-    outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
+    needed = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
+    outside = [path for path in needed if path.is_absolute() or ".." in path.parts]
     further: tuple[Path, ...] = ()
     if traffic.config is not None and traffic.config not in outside:
         config = old.directory / traffic.config
-        beside += _in_folder(old.directory, input_files(config), config)
+        needed += _in_folder(old.directory, input_files(config), config)
         further = seldom_files(config)
-    included = included_files(old.directory / path for path in beside if path not in outside)
-    beside += _in_folder(old.directory, (*included, *further), scenario_file(source))
+    included = included_files(old.directory / path for path in needed if path not in outside)
+    needed += _in_folder(old.directory, (*included, *further), scenario_file(source))
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
     foreign = read_document(scenario_file(source)).data.get("scenario")
@@ -61,7 +61,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     made = [folder / SCENARIO_FILE]
     folder.mkdir(parents=True)
     try:
-        for path in beside:
+        for path in needed:
             if path not in outside:
                 (folder / path).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(old.directory / path, folder / path)

@@ -1,5 +1,6 @@
 """Evaluation of policies, whatever the shape of ``info``, and what it refuses."""
 
+import threading
 from typing import Any
 
 import gymnasium
@@ -46,3 +47,16 @@ class Sign:
 
 def test_a_collision_counts_whatever_its_weight() -> None:
     assert fogsim_envs.evaluate("none", Sign(), [0]).struck == 1.0
+
+
+def test_a_policy_with_a_memory_that_cannot_be_copied_is_refused_in_a_batch() -> None:
+    class Locked:
+        def __init__(self) -> None:
+            self.lock = threading.Lock()
+
+        def reset(self, seed: int) -> None: ...
+
+        def __call__(self, observation: Any, info: Any) -> Any: ...
+
+    with pytest.raises(InputError, match=r"policy: .* Locked cannot be copied: "):
+        fogsim_envs.evaluate(Locked(), "fogsim/FogAdvisoryBatch-v2", seeds=[0, 1])

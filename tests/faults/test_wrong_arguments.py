@@ -55,7 +55,7 @@ def test_arguments_of_environments() -> None:
     for argument, values in [
         ("overrides", ["fog.visibility_m=80", 5, [5], {"fog.visibility_m": 80}]),
         ("image_size", ["a", (1,), (0, 0), (-1, 5), (1.5, 2), (10**9, 10**9), (160, 120, 3), 160]),
-        ("reward_weights", [[1], {"progress": "x"}, {"a": "b"}, math.nan, 5]),
+        ("reward_weights", [[1], {"progress": "x"}, {"a": "b"}, {1: 2}, math.nan, 5]),
         ("continuous", ["yes", 1, None]),
         ("render_mode", ["x"]),
         ("scenario", [5, [5], math.nan]),

@@ -53,9 +53,9 @@ def test_what_was_done_counts_when_resumed_and_only_then(tmp_path: Path) -> None
     resumed = MadeUpEngine(planned)
     (outcome,) = run_tests([test], tmp_path, resumed, resume=True)
     assert (resumed.ran, len(outcome.results)) == (["c"], 3)
-    anew = MadeUpEngine(planned)
-    run_tests([test], tmp_path, anew)
-    assert anew.ran == ["a", "b", "c"]
+    again = MadeUpEngine(planned)
+    run_tests([test], tmp_path, again)
+    assert again.ran == ["a", "b", "c"]
 
 
 def test_results_of_other_versions_do_not_count(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ def takes_plain_data(environment: E) -> E:
 def _made(name: str, annotation: Any, value: Any) -> Any:
     among = get_args(annotation) or (annotation,)
     kinds = [one for one in among if isinstance(one, type) and dataclasses.is_dataclass(one)]
-    if not (isinstance(value, Mapping) and kinds):
+    if not (kinds and isinstance(value, Mapping) and all(isinstance(key, str) for key in value)):
         return value
     try:
         return kinds[0](**{key: tuple(one) if isinstance(one, list) else one for key, one in value.items()})

@@ -20,7 +20,10 @@ _BLOCKS = 80
 """Groups of columns that are judged, across the image."""
 
 _ABOVE = 5
-"""Rows above the horizon that are looked at [px]: at the height of the camera's eye, where no crown overhangs."""
+"""Rows above the horizon that are looked at [px]: what shows there is as high as the camera."""
+
+_BELOW_CROWNS = 2.5
+"""Mounting height up to which that stands on the ground [m]: above, crowns overhang what is seen below them."""
 
 _SKY_HEIGHT, _BRIGHTEST = 0.5, 0.9
 """Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
@@ -60,7 +63,8 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     first, last = math.floor(horizon.row - margin) - _ABOVE, math.floor(horizon.row - margin)
     ground = math.ceil(horizon.row + margin)
     top = max(math.floor(last - _SKY_HEIGHT * camera.height), 0)
-    if first < 0 or last <= top or ground + _LEAST_ROWS >= camera.height or not extinction > 0.0:
+    is_seen = first >= 0 and last > top and ground + _LEAST_ROWS < camera.height and extinction > 0.0
+    if not is_seen or camera.mount_height > _BELOW_CROWNS:
         return 0.0
     light = linear_luminance(level[top:], camera.response, camera.bits, camera.black_level)
     per_block = max(light.shape[1] // _BLOCKS, 1)

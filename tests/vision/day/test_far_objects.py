@@ -1,6 +1,7 @@
 """Things at the horizon, drawn by hand: a wood far away, and a hedge close by, before a sky of unit light."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,13 +15,17 @@ CAMERA = Camera(320, 240, 300.0, (159.5, 100.0), 1.4, bits=12)
 HORIZON = Horizon(100.0, 0.5)
 
 
-def picture(visibility: float, foot: float, light: float = 0.03) -> np.ndarray:
-    """A wall of a light, 40 m high and `foot` metres away, on ground of 0.2, in fog of a visibility."""
-    rows = np.arange(CAMERA.height)[:, None] * np.ones(CAMERA.width)
+MAST = replace(CAMERA, mount_height=6.0)
+
+
+def picture(visibility: float, foot: float, light: float = 0.03, camera: Camera = CAMERA, open_to=0.0) -> np.ndarray:
+    """A wall of a light, 40 m high, open below a height [m] and `foot` metres away, on ground of 0.2, in fog."""
+    rows = np.arange(camera.height)[:, None] * np.ones(camera.width)
     below = rows - HORIZON.row
-    distance = np.where(below > 0, CAMERA.row_distance / np.maximum(below, 1e-6), math.inf)
+    distance = np.where(below > 0, camera.row_distance / np.maximum(below, 1e-6), math.inf)
     scene = np.where(below > 0, 0.2, 1.0)
-    wall = (distance > foot) & (below > -(40.0 - CAMERA.mount_height) * CAMERA.focal_length / foot)
+    height = camera.mount_height - below * foot / camera.focal_length
+    wall = (distance > foot) & (height < 40.0) & (height >= open_to)
     scene, distance = np.where(wall, light, scene), np.where(wall, foot, distance)
     clear = np.exp(-extinction_from_visibility(visibility) * distance) if visibility < math.inf else 1.0
     return np.rint(3000.0 * (scene * clear + 1.0 - clear)).astype(np.uint16)
@@ -38,6 +43,12 @@ def test_fog_hides_what_stands_in_it_as_far_as_it_does(visibility, foot):
 def test_a_wood_in_clear_air_contradicts_fog(claimed):
     image = picture(math.inf, 400.0)
     assert share_of_far_objects(image, CAMERA, HORIZON, extinction_from_visibility(claimed)) == 1.0
+
+
+def test_crowns_that_overhang_the_ground_below_them_say_nothing_to_a_camera_on_a_mast():
+    extinction = extinction_from_visibility(100.0)
+    image = picture(100.0, 40.0, camera=MAST, open_to=5.0)
+    assert share_of_far_objects(image, MAST, HORIZON, extinction) == 0.0
 
 
 def test_a_hedge_close_by_does_not():

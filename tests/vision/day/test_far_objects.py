@@ -46,8 +46,8 @@ def test_a_wood_in_clear_air_contradicts_fog(claimed):
 
 
 def test_crowns_that_overhang_the_ground_below_them_say_nothing_to_a_camera_on_a_mast():
-    extinction = extinction_from_visibility(100.0)
-    image = picture(100.0, 40.0, camera=MAST, open_to=5.0)
+    extinction = extinction_from_visibility(400.0)
+    image = picture(400.0, 120.0, camera=MAST, open_to=5.0)
     assert share_of_far_objects(image, MAST, HORIZON, extinction) == 0.0
 
 

@@ -142,7 +142,8 @@ def potential_collision_speed(
     ndarray
         Speed of the impact [m/s], 0 where there is none.
     """
-    closing, standing = np.subtract(speed, leader_speed), np.divide(leader_speed, deceleration)
+    gap, closing = np.maximum(gap, 0.0), np.subtract(speed, leader_speed)
+    standing = np.divide(leader_speed, deceleration)
     growing = np.minimum(standing, reaction_time)
     constant = np.maximum(closing + deceleration * growing, 0.0)
     hit_growing = np.subtract(gap, (closing + 0.5 * deceleration * growing) * growing)

@@ -13,6 +13,7 @@ from fogsim.core.files.writer_lock import LOCK_NAME
 from fogsim.errors import InputError, shown
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import result_file
+from fogsim.study.main_metrics import OF_THE_BELIEF, OF_WARNINGS
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.profiles import Profiles
 from fogsim.study.run_file import STUDY_RUN, CompleteRun, FailedRun, Value, read_run
@@ -42,19 +43,21 @@ class StudyDirectory:
         self.path, self.results = path, path / "runs"
         refuse_unwritable_folder(path)
         described = {"study": study.name, **study.description()}
-        manifest = path / "study.json"
+        manifest, of_software = path / "study.json", versions()
         if manifest.exists():
-            self._check_same(manifest, described)
+            of_software = self._check_same(manifest, described)
         else:
             # A process that was killed there, or a full disk, may have left this much.
             begun = {partial_path(manifest), path / LOCK_NAME}
             if path.exists() and set(path.iterdir()) - begun:
                 raise InputError(f"--out {path} holds something else than a study; choose another directory")
             path.mkdir(parents=True, exist_ok=True)
-            write_json(manifest, {**described, "versions": versions()})
+        # The baseline and the number of seeds may have changed.
+        write_json(manifest, {**described, "versions": of_software})
         self.results.mkdir(exist_ok=True)
 
-    def _check_same(self, manifest: Path, described: dict[str, Any]) -> None:
+    def _check_same(self, manifest: Path, described: dict[str, Any]) -> dict[str, str | None]:
+        """Versions of software with which the study was begun; InputError if it is another study."""
         try:
             there = _Manifest.model_validate(read_json(manifest)).model_dump()
         except (InputError, ValidationError) as error:
@@ -62,7 +65,6 @@ class StudyDirectory:
                 f"{manifest}: not the description of a study; choose another directory with --out, or remove the file "
                 "and the results next to it"
             ) from error
-        # The baseline and the number of seeds may change: completed runs stay valid.
         now = {**described, "versions": _deciding_versions(versions())}
         before = {**there, "versions": _deciding_versions(there["versions"])}
         kinds = ("versions", "files", "cells", "own_methods")
@@ -73,6 +75,8 @@ class StudyDirectory:
                 f"--out {self.path} holds another study, whose results would be mixed with these: "
                 f"{'; '.join(changed[:_MOST_LISTED])}{more}. Choose another directory, or undo the change"
             )
+        of_software: dict[str, str | None] = there["versions"]
+        return of_software
 
     def missing(self) -> list[StudyRun]:
         """Runs without a complete result; failed ones are tried again."""
@@ -97,7 +101,8 @@ class StudyDirectory:
         metrics = found.metrics if isinstance(found, CompleteRun) else {}
         if not run.scenario.estimators:
             # Without a camera the belief stays at its prior: there is no error to compare.
-            metrics = {key: None if key.startswith("belief_") else value for key, value in metrics.items()}
+            unknown = OF_THE_BELIEF if run.scenario.controller else OF_THE_BELIEF | OF_WARNINGS
+            metrics = {key: None if key in unknown else value for key, value in metrics.items()}
         about = {
             "seed": run.seed,
             "status": "missing" if found is None else found.status,

@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple
 
 from fogsim.errors import suggest
 from fogsim.metrics import Definition, metric_definitions
+from fogsim.metrics.metric import definitions_of
 
 METHODS_KEY = "estimators"
 """Key of the estimators' own metrics, ``estimators.METHOD.KEY``."""
@@ -44,6 +45,15 @@ DELAY_METRICS = (
 """Their horizontal axes, chosen in the same way."""
 
 
+OF_THE_BELIEF = frozenset(
+    key for metric in ("belief", "belief_ahead", "dense_fog_known") for key in definitions_of(metric)
+)
+"""Metrics of what is believed of the fog; without a camera, they are those of its prior."""
+
+OF_WARNINGS = frozenset(definitions_of("fog_warnings"))
+"""Metrics of the driver's warnings, which without a camera only a controller gives."""
+
+
 class MetricWords(NamedTuple):
     """A metric as a report names it; `scale` converts the metric's own unit to `unit`."""
 
@@ -78,6 +88,11 @@ def main_metrics(chosen: Iterable[str], known: Iterable[str]) -> list[str]:
     """Metrics that the report shows first: those that the study file chose, or the default ones that exist."""
     there = set(known)
     return [name for name in tuple(chosen) or MAIN_METRICS if name in there]
+
+
+def percent(share: float) -> str:
+    """A share in percent, with all of its digits."""
+    return f"{100.0 * share:g}%"
 
 
 def short_number(value: float, digits: int = 3, sign: str = "-") -> str:

@@ -1,5 +1,6 @@
 """A study file: a scenario, its variations, the number of seeds, and the baseline."""
 
+import contextlib
 import functools
 import hashlib
 import itertools
@@ -27,12 +28,14 @@ from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.scenario.variation import grid_mistake
 from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
-from fogsim.study.main_metrics import unknown_metrics
+from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
 from fogsim.study.table import column_mistake
 from fogsim.traffic.road.configuration import input_files
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
+
+_MOST_EQUAL = 5
 
 
 class StudyFile(Section):
@@ -63,7 +66,7 @@ class StudyFile(Section):
     """Confidence of the intervals."""
 
     frames: Literal["where_needed", "always"] = "where_needed"
-    """Whether runs draw frames in which neither advice nor lamps go by what the camera sees."""
+    """Whether runs draw frames in which nothing goes by what the camera sees."""
 
     metrics: tuple[Text, ...] = ()
     """Metrics of the comparison and the report; by default all, the main ones first."""
@@ -328,18 +331,38 @@ def _scenario(
         settings += written.factors[factor][level]
     try:
         scenario = load(settings)
-        if written.frames == "where_needed" and not needs_camera(scenario):
-            scenario = load([*settings, f"renderer={NO_RENDERER}", "estimators=[]"])
+        if written.frames == "where_needed" and not needs_camera(scenario, written.metrics):
+            # What else needs frames, such as a condition on the belief, refuses to go without.
+            with contextlib.suppress(InputError):
+                scenario = load([*settings, f"renderer={NO_RENDERER}", "estimators=[]"])
     except InputError as error:
         raise InputError(f"{document.path}: {_label(levels)}: {error}") from error
     return scenario
 
 
-def needs_camera(scenario: Scenario) -> bool:
-    """Whether advice or lamps depend on the camera."""
+def needs_camera(scenario: Scenario, metrics: Iterable[str] = ()) -> bool:
+    """Whether advice, lamps, a controller or the chosen metrics depend on the camera."""
+    if scenario.controller is not None or any(_is_of_camera(metric) for metric in metrics):
+        return True
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))
+
+
+def _is_of_camera(metric: str) -> bool:
+    return metric in OF_THE_BELIEF | OF_WARNINGS or metric.startswith(f"{METHODS_KEY}.")
+
+
+def equal_cells(study: Study) -> list[str]:
+    """Sentences on cells that have the same scenario: what distinguishes them has no effect."""
+    cells: dict[str, dict[str, None]] = {}
+    for run in study.runs:
+        if run.seed == study.runs[0].seed:
+            cells.setdefault(run.key, {})[" · ".join(run.levels.values())] = None
+    equal = [" and ".join(labels) for labels in cells.values() if len(labels) > 1]
+    more = f"; and {len(equal) - _MOST_EQUAL} more" if len(equal) > _MOST_EQUAL else ""
+    said = f"The same scenario, so that no run can differ: {'; '.join(equal[:_MOST_EQUAL])}{more}."
+    return [said] if equal else []
 
 
 def grid_text(study: Study) -> str:

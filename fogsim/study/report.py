@@ -26,7 +26,7 @@ from fogsim.study.comparison import (
     uninformative,
 )
 from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, svg_of
-from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics, metric_words
+from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics, metric_words, percent
 from fogsim.study.plan import Study, file_digests
 from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
 from fogsim.study.profiles import Cell, PooledProfiles
@@ -174,9 +174,10 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
         axes.set_ylim(-0.6, len(compared) - 0.4)
         axes.grid(visible=False, axis="y")
         axes.locator_params(axis="x", nbins=4)
-    figure.supxlabel(f"{words.axis}, difference to {grid.baseline}", fontsize=8.5)
+    baseline = " · ".join(study.baseline.values())
+    figure.supxlabel(f"{words.axis}, difference to {baseline}", fontsize=8.5)
     caption = (
-        f"{words.label}: difference to {grid.baseline} of runs with the same seed, mean and {study.confidence:.0%} "
+        f"{words.label}: difference to {baseline} of runs with the same seed, mean and {percent(study.confidence)} "
         "interval. Filled: a difference is shown; open: none could be shown."
     )
     if any(one.untested for one in differences):
@@ -220,7 +221,7 @@ def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: st
     name = f"trade_off_{upwards}"
     caption = (
         f"{metric_words(upwards).label} against {metric_words(across).label}: mean of all seeds; bars are its "
-        f"{study.confidence:.0%} bootstrap intervals. The panels' axes differ."
+        f"{percent(study.confidence)} bootstrap intervals. The panels' axes differ."
     )
     ends = [f"{metric}{end}" for metric in (across, upwards) for end in ("", "_low", "_high")]
     return StudyFigure(name, caption, svg_of(figure, name), [*study.factors, *ends], table)
@@ -240,7 +241,8 @@ def _errors(mean: float | None, ends: Sequence[float | None], scale: float) -> l
     low, high = ends
     if mean is None or low is None or high is None:
         return None
-    return [[scale * (mean - low)], [scale * (high - mean)]]
+    # An end that is the mean itself may miss it by a rounding.
+    return [[scale * max(mean - low, 0.0)], [scale * max(high - mean, 0.0)]]
 
 
 _MOST_FAILURES = 50

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
-from fogsim.study.main_metrics import MetricWords, metric_words, short_number, signed
-from fogsim.study.plan import Study, grid_text
+from fogsim.study.main_metrics import MetricWords, metric_words, percent, short_number, signed
+from fogsim.study.plan import Study, equal_cells, grid_text
 from fogsim.study.table import Row, rows_of_cells
 
 _EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
@@ -99,9 +99,11 @@ def event_count(metric: str, rows: Sequence[Row]) -> int | None:
 def events_of_both(
     study: Study, cells: Mapping[tuple[str, ...], Sequence[Row]], one: Difference
 ) -> tuple[int | None, int | None]:
-    """Events under the baseline and in the cell that is compared to it; None if the metric counts none."""
-    of_baseline, here = tuple({**one.levels, **study.baseline}.values()), tuple(one.levels.values())
-    return event_count(one.metric, cells[of_baseline]), event_count(one.metric, cells[here])
+    """Events under the baseline and in the cell compared to it, of their common seeds; None if it counts none."""
+    both = [cells[tuple(levels.values())] for levels in ({**one.levels, **study.baseline}, one.levels)]
+    common = {row["seed"] for row in both[0]} & {row["seed"] for row in both[1]}
+    of_baseline, here = (event_count(one.metric, [row for row in rows if row["seed"] in common]) for rows in both)
+    return of_baseline, here
 
 
 def _events(count: int | None) -> list[str]:
@@ -113,8 +115,8 @@ def comparison_table(
 ) -> Table:
     """Every comparison with its interval, p-values, events and required seeds, in the metric's own unit."""
     cells = rows_of_cells(study.factors, rows)
-    numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
-    head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
+    numbers = ("baseline", "mean", "difference", f"{percent(study.confidence)} interval", "p", "p adjusted", "seeds")
+    head = ["metric", *study.factors, *numbers, f"seeds for ± {percent(study.wanted_interval)}"]
     body: list[list[str | TableCell]] = []
     for one in differences:
         unknown = one.untested or remarks.get(one.metric, "–")
@@ -160,7 +162,7 @@ def _warnings(study: Study, rows: Sequence[Row], differences: Sequence[Differenc
     """Reasons for which the study may show nothing, or something else than it seems."""
     done = [row for row in rows if row["status"] == "complete"]
     empty = dict.fromkeys(filter(None, map(empty_start, study.cells().values())))
-    return [*empty, *scarce_events(study, done, differences)]
+    return [*equal_cells(study), *empty, *scarce_events(study, done, differences)]
 
 
 def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
@@ -250,9 +252,10 @@ def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
     shown = sum(one.is_shown(study.confidence) for one in tested)
     kept = sum(one.is_shown(study.confidence) and (one.adjusted_p_value or 1.0) <= level for one in tested)
     said = [
-        f"A difference counts as shown where its {study.confidence:.0%} interval excludes 0 and the paired permutation "
-        f"test has p ≤ {level:.2g}: {shown} of {len(tested)} comparisons that vary. If no policy did anything, about "
-        f"{level * len(tested):.0f} would by chance; adjusted to their number (Benjamini & Hochberg 1995), {kept} are."
+        f"A difference counts as shown where its {percent(study.confidence)} interval excludes 0 and the paired "
+        f"permutation test has p ≤ {level:.2g}: {shown} of {len(tested)} comparisons that vary. If no policy did "
+        f"anything, about {level * len(tested):.0f} would by chance; adjusted to their number (Benjamini & Hochberg "
+        f"1995), {kept} are."
     ]
     pairs = max(one.pairs for one in tested)
     if 2.0 ** (1 - pairs) > level:
@@ -262,7 +265,7 @@ def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
     needed = _seeds_needed(tested)
     if needed:
         said.append(
-            f"Seeds for intervals of ± {study.wanted_interval:.0%} of the baseline's mean everywhere: {needed}."
+            f"Seeds for intervals of ± {percent(study.wanted_interval)} of the baseline's mean everywhere: {needed}."
         )
     return said
 

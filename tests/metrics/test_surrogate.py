@@ -104,6 +104,8 @@ def test_potential_collision_speed_is_that_of_a_simulation() -> None:
 
 
 def test_an_obstacle_within_the_reaction_distance_is_hit_at_full_speed_and_one_without_end_never() -> None:
+    # Bodies that overlap have no gap left.
+    assert potential_collision_speed(-0.3, 12.0, 10.0) == potential_collision_speed(0.0, 12.0, 10.0) == 2.0
     found = potential_collision_speed(np.array([19.0, np.inf]), np.array([20.0, 20.0]), np.zeros(2))
     assert found.tolist() == [20.0, 0.0]
 

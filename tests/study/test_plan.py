@@ -12,7 +12,7 @@ from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import catalogue
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
-from fogsim.study.plan import shipped_studies, study_file
+from fogsim.study.plan import equal_cells, shipped_studies, study_file
 from fogsim.study.table import FIXED_COLUMNS, check_factors, column_mistake
 
 STUDY = """
@@ -179,6 +179,35 @@ def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:
     # Lamps that go by the camera's fog need it, too.
     lamps = load_study(written(tmp_path, text.replace("low_beam", "fog_lamp_rules")))
     assert {run.scenario.renderer for run in lamps.runs} == {"auto"}
+
+
+@pytest.mark.parametrize(
+    "needs_frames",
+    [
+        "controller=sight_limiter",
+        "'sensors.faults=[{sensor: camera, fault: dirty_lens}]'",
+        "'timeline=[{when: belief.visibility < 100 m, do: {fog: {visibility_m: 50}}}]'",
+    ],
+)
+def test_what_goes_by_the_camera_has_its_frames(tmp_path: Path, needs_frames: str) -> None:
+    text = STUDY.replace("duration_s=2]", "lighting=low_beam]").replace(
+        "[advice=none]", f"[advice=none, {needs_frames}]"
+    )
+    assert {run.scenario.renderer for run in load_study(written(tmp_path, text)).runs} == {"auto"}
+
+
+def test_metrics_of_the_camera_have_its_frames(tmp_path: Path) -> None:
+    text = STUDY.replace("duration_s=2]", "lighting=low_beam]")
+    for metric in ("belief_coverage_share", "estimators.joint_road.coverage_share"):
+        runs = load_study(written(tmp_path, text + f"metrics: [{metric}]\n")).runs
+        assert {run.scenario.renderer for run in runs} == {"auto"}
+
+
+def test_cells_that_nothing_distinguishes_are_named(tmp_path: Path) -> None:
+    assert not equal_cells(load_study(written(tmp_path)))
+    text = STUDY.replace("  visibility:", "  unused: {low: [], high: []}\n  visibility:")
+    (said,) = equal_cells(load_study(written(tmp_path, text)))
+    assert said.startswith("The same scenario, so that no run can differ: none · low · ")
 
 
 def test_a_study_that_comes_with_fogsim_is_known_by_its_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

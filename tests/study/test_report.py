@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from fogsim.scenario import load_scenario
+from fogsim.study.comparison import compare_to_baseline, mean_interval
 from fogsim.study.main_metrics import MAIN_METRICS, short_number, signed
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.profile_figures import collisions_figure, speed_figure
 from fogsim.study.profiles import CLASSES, PooledProfiles, pool_profiles
-from fogsim.study.report import trade_off_figure, write_report
+from fogsim.study.report import differences_figure, trade_off_figure, write_report
+from fogsim.study.report_words import events_of_both
+from fogsim.study.table import rows_of_cells
 
 FACTORS = {"policy": ("none", "slow <1>"), "fog": ("thin", "thick")}
 SEEDS = 8
@@ -178,7 +181,9 @@ def test_figures_are_there_as_svg_and_csv(study: Study, folder: Path) -> None:
 
 
 def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
-    chosen = dataclasses.replace(study, metrics=("distance_m", "max_drac_mps2"), wanted_interval=0.025)
+    chosen = dataclasses.replace(
+        study, metrics=("distance_m", "max_drac_mps2"), wanted_interval=0.025, confidence=0.999
+    )
     rows = rows_of(study)
     rows[3] = {**{k: rows[3][k] for k in ("run", "policy", "fog", "seed")}, "status": "failed", "message": "a < b"}
     written(study, rows_of(study), tmp_path)
@@ -194,6 +199,32 @@ def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
     comparison = table(tmp_path / "comparison.csv")
     assert {row["metric"] for row in comparison} == {"distance_m"}
     assert "seeds_for_2.5_percent" in comparison[0]
+    assert "seeds for ± 2.5%" in page
+    assert "99.9% interval" in page
+    assert "100% interval" not in page
+
+
+def test_events_are_of_the_compared_seeds(study: Study) -> None:
+    """Without the baseline's fourth run, the fourth run of the other policy is compared to nothing."""
+    rows = [{"run": 0, **run.levels, "seed": run.seed, "collisions": 2} for run in study.runs]
+    (one, _) = compare_to_baseline(study, [*rows[:3], *rows[4:]], ["collisions"])
+    cells = rows_of_cells(study.factors, [*rows[:3], *rows[4:]])
+    assert (one.pairs, events_of_both(study, cells, one)) == (7, (14, 14))
+
+
+def test_figures_name_all_levels_of_the_baseline(study: Study) -> None:
+    both = dataclasses.replace(study, baseline={"policy": "none", "fog": "thin"})
+    figure = differences_figure(both, "collisions", compare_to_baseline(both, rows_of(study), ["collisions"]))
+    assert "difference to none · thin of runs" in figure.caption
+    assert "difference to none · thin<" in figure.svg or "difference to none · thin -->" in figure.svg
+
+
+def test_an_end_of_an_interval_that_is_the_mean_but_for_a_rounding_is_drawn(study: Study) -> None:
+    values = 0.01779087, 17.31807262
+    assert mean_interval(np.array(values), 0.5)[1] < np.mean(values)
+    rows = [{**run.levels, "seed": run.seed, "mean_speed_mps": values[run.seed % 2]} for run in study.runs]
+    rows = [{**row, "collisions": row["mean_speed_mps"]} for row in rows if row["seed"] < 2]
+    trade_off_figure(dataclasses.replace(study, confidence=0.5), rows, "mean_speed_mps", "collisions")
 
 
 def test_a_rare_event_that_one_policy_causes_is_found(study: Study, tmp_path: Path) -> None:

@@ -260,11 +260,25 @@ def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", "duration_s=1, lighting=low_beam")))
     assert not study.runs[0].scenario.estimators
     directory = StudyDirectory(tmp_path / "out", study)
-    metrics = {"belief_median_error_percent": 691.0, "mean_speed_mps": 20.0}
+    believed = {
+        "belief_median_error_percent": 691.0,
+        "dense_fog_known_before_m": -300.0,
+        "fog_banks_without_warning": 1,
+    }
+    metrics = {**believed, "mean_speed_mps": 20.0}
     result = complete(metrics)
     (tmp_path / "out" / "runs" / f"{study.runs[0].key}.json").write_text(json.dumps(result), encoding="utf-8")
     row = directory.rows()[0]
-    assert (row["belief_median_error_percent"], row["mean_speed_mps"]) == (None, 20.0)
+    assert {key: row[key] for key in metrics} == {**dict.fromkeys(believed), "mean_speed_mps": 20.0}
+
+
+def test_the_description_of_a_study_follows_its_seeds_and_baseline(tmp_path: Path) -> None:
+    StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path)))
+    before = json.loads((tmp_path / "out" / "study.json").read_text(encoding="utf-8"))
+    text = STUDY.replace("seeds: 2", "seeds: 3\nbaseline: {policy: fixed}")
+    StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
+    now = json.loads((tmp_path / "out" / "study.json").read_text(encoding="utf-8"))
+    assert now == {**before, "seeds": [0, 1, 2], "baseline": {"policy": "fixed"}}
 
 
 def test_a_policy_that_returns_no_speed_is_reported_with_its_name(

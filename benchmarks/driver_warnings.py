@@ -2,12 +2,12 @@
 
 Leads are those of the demo's motorway by day with a camera of 320×240 and clear air (20 km) outside the bank, one drive
 for each seed. False warnings are counted on a motorway of 22 km with a bend and traffic, in clear air, haze and even
-fog, 10 min to a drive. There the camera takes one frame a second, so that ten hours take about 20 min on one core;
+fog, 10 min to a drive. There the camera takes one frame a second, so that five hours take about 4 min on one core;
 denser fog is then announced by two successive frames in place of most of eleven. Leads and false warnings are those of
 the metrics `fog_warning_lead_m` and `false_fog_warnings`. The constants of `fogsim.advice.warning` were chosen on other
 seeds (101 to 106, and 301 to 308 of even fog).
 
-    python benchmarks/driver_warnings.py [--json] [--docs] [--seeds 20] [--drives 6] [--keep FILE]
+    python benchmarks/driver_warnings.py [--json] [--docs] [--seeds 10] [--drives 3] [--keep FILE]
 
 `--keep FILE` writes what is measured to a file as it comes; a later call goes on from there.
 """
@@ -30,7 +30,7 @@ FOGS = (20_000, 5000, 3000, 1500, 400, 300, 200, 150, 100, 60)
 ROAD = """
 name: long_road
 duration: 10 min
-clocks: {traffic_step: 0.5 s, camera_period: 1 s, decision_period: 1 s}
+clocks: {traffic_step: 1 s, camera_period: 1 s, decision_period: 1 s}
 road: {template: motorway, length: 22 km, limit: 130 km/h, curve_at: 1500 m, curve_radius: 1500 m, curve_turn: 30 deg}
 demand: {same_way: 900 veh/h, oncoming: 900 veh/h, mix: {truck: 15 %, van: 10 %}}
 actors:
@@ -146,8 +146,8 @@ def main() -> None:
     given = parse_options(
         __doc__,
         docs=("explanation/belief.md", "warnings"),
-        seeds=(20, "drives into the bank"),
-        drives=(6, "drives of 10 min in each even fog"),
+        seeds=(10, "drives into the bank"),
+        drives=(3, "drives of 10 min in each even fog"),
         keep=(Path, "file in which to keep what is measured, and from which to go on"),
     )
     found = list(records(rows(given)))

@@ -113,6 +113,7 @@ def drives_to_choose_from() -> Iterator[list[Step]]:
         for visibility in visibilities:
             lighting = "lighting={method: gallen2014, informed_by: truth}"
             overrides = [*settings(scenario, visibility), "timeline=[]", f"duration_s={CHOICE_SECONDS}", lighting]
+            overrides.append("estimators=[joint_road]")  # a quick one: the drives depend on none
             yield list(fogsim.run(fogsim.load_scenario(scenario, overrides), seed=CHOICE_SEED))[::3]
 
 
@@ -141,13 +142,14 @@ def choice_row(drives: list[list[Step]]) -> Row:
 def choices() -> list[Row]:
     """A record of each value of each constant."""
     drives, rows = list(drives_to_choose_from()), []
+    as_chosen = choice_row(drives)
     for module, name, values in CHOICES:
         chosen = getattr(module, name)
         for value in progress(values, name):
             setattr(module, name, value)
             shown = value[True] if isinstance(value, dict) else value
             head = {"constant": name, "value": f"{shown}{' (chosen)' if value == chosen else ''}"}
-            rows.append({**head, **choice_row(drives)})
+            rows.append({**head, **(as_chosen if value == chosen else choice_row(drives))})
         setattr(module, name, chosen)
     return rows
 

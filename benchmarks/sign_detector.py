@@ -110,9 +110,13 @@ def measured(
     shots: Shots, kind: str, visibility: float, distances: Sequence[float], draws: int, rng: np.random.Generator
 ) -> tuple[float, list[Look], list[Look]]:
     """Operating range [m], looks at half of it, and looks where no sign stands."""
-    looks_by_distance = [[looked(shot, rng) for shot in shots(kind, [d] * draws, visibility)] for d in distances]
-    shares = np.array([np.mean([one.detected for one in each]) for each in looks_by_distance])
-    reach = operating_range(distances, shares)
+    shares: list[float] = []
+    for distance in distances:
+        detected = [looked(shot, rng).detected for shot in shots(kind, [distance] * draws, visibility)]
+        shares.append(float(np.mean(detected)))
+        if len(shares) > 1 and not any(shares[-2:]):
+            break  # farther signs are no easier to detect
+    reach = operating_range(distances, np.array(shares))
     half = rng.uniform(0.4, 0.5, 2 * draws) * max(reach, 20.0)
     near = [looked(shot, rng) for shot in shots(kind, half.tolist(), visibility)]
     anywhere = rng.uniform(10.0, max(reach, 20.0), draws)

@@ -68,12 +68,14 @@ def fogsim_shots(
     scene = build_scene(straight_road(), SignMap((post,) if standing else ()), np.random.default_rng(rng.integers(99)))
     renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
     try:
+        drawn_at = math.nan
         for distance in distances:
-            back = (post.position[0] - distance - SETBACK, 0.0, CAMERA.mount_height)
-            pose = CameraPose(back, heading=0.0)
-            radiance = foggy_radiance(
-                renderer.render((), CAMERA, pose), pose, CAMERA, extinction_from_visibility(visibility)
-            )
+            if distance != drawn_at:
+                back = (post.position[0] - distance - SETBACK, 0.0, CAMERA.mount_height)
+                pose = CameraPose(back, heading=0.0)
+                view = renderer.render((), CAMERA, pose)
+                radiance = foggy_radiance(view, pose, CAMERA, extinction_from_visibility(visibility))
+                drawn_at = distance
             sensor = Sensor(AIRLIGHT * 255.0 / float(rng.choice((120.0, 200.0, 255.0))))
             image = expose(radiance, sensor, CAMERA.response, rng).astype(np.uint8)
             u, v, scale = place(CAMERA, distance)
@@ -173,7 +175,7 @@ class Look:
     def __call__(self, light: Floats, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Picture of light relative to that of the fog."""
         seen = cv2.GaussianBlur(light, (0, 0), self.blur) * (self.level / 255.0)
-        noise = rng.normal(size=seen.shape).astype(np.float32) * np.sqrt(np.maximum(seen, 0.02)) * (self.noise / 255.0)
+        noise = rng.standard_normal(seen.shape, np.float32) * np.sqrt(np.maximum(seen, 0.02)) * (self.noise / 255.0)
         grey = 255.0 * respond(np.clip(seen + noise, 0.0, 1.0).astype(np.float64), Response.SRGB)
         if self.sharpening:
             grey += self.sharpening * (grey - cv2.GaussianBlur(grey, (0, 0), 1.2))

@@ -37,12 +37,11 @@ def benchmark(
     *,
     times: str = "",
     more: str = "",
-    cores: int = 1,
 ) -> Measurement:
     """A script of benchmarks/ that writes its own tables with ``--docs``."""
     command = f"python benchmarks/{name}.py --docs{options}"
     commands = (command, more) if more else (command,)
-    return Measurement(name, commands, minutes, (f"benchmarks/{name}.py",), tables, times, cores)
+    return Measurement(name, commands, minutes, (f"benchmarks/{name}.py",), tables, times)
 
 
 def study(name: str, minutes: float, tables: tuple[str, ...] = ()) -> Measurement:
@@ -108,7 +107,7 @@ MEASUREMENTS = (
     Measurement(
         "night_choices",
         ("python benchmarks/night_lamps.py --choose --docs",),
-        4,
+        2,
         ("benchmarks/night_lamps.py",),
         ("night choices",),
     ),
@@ -129,8 +128,8 @@ MEASUREMENTS = (
     benchmark("sign_detector", 5, ("sign detector",)),
     benchmark("sensor_faults", 6, ("sensor faults",)),
     benchmark("roadside_cameras", 3, ("roadside cameras",)),
-    benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
-    benchmark("driver_warnings", 30, ("warnings",), WARNINGS_KEPT),
+    benchmark("broken_devices", 6, ("broken devices",)),
+    benchmark("driver_warnings", 6, ("warnings",), WARNINGS_KEPT),
     benchmark("grades", 6),
     benchmark("uneven_fog", 30, ("uneven fog",)),
     benchmark("lead_accuracy", 4, ("lead accuracy",), times="ms"),
@@ -151,7 +150,7 @@ MEASUREMENTS = (
     Measurement(
         "drivers",
         ("python docs/make_measured_tables.py drivers",),
-        8,
+        6,
         ("fogsim/reproduce/drivers/__init__.py",),
         ("drivers-published", "drivers-traffic"),
     ),

@@ -135,7 +135,7 @@ def test_the_report_says_what_is_shown_and_no_more(study: Study, folder: Path) -
     assert "4 of 6 comparisons that vary" in summary
     moved = "Vehicle-km in fog: 8.8 veh·km with slow &lt;1&gt; · thin, 10 veh·km under the baseline (−12 %)."
     assert moved in page
-    assert "No camera is simulated, since neither advice nor lamps depend on it." in page
+    assert "No camera is simulated, since nothing in the run depends on it." in page
     assert "advice=&lt;slow&gt;" in page
     assert "fogsim study study.yaml --out" in page
     comparison = table(folder / "comparison.csv")

@@ -159,7 +159,7 @@ def _sensor_words(scenario: ScenarioFile) -> str:
         text = f"Estimators {', '.join(methods)}{_cited(ESTIMATORS, methods)} read the ego's camera ({image}); "
         text += f"{scenario.fusion.method} fuses their estimates."
     elif scenario.traffic.has_ego:
-        text = "No camera is simulated, since neither advice nor lamps depend on it."
+        text = "No camera is simulated, since nothing in the run depends on it."
     elif drivers.advised in DISPLAYS:
         text = "Each advised section of road has its own visibility meter."
     else:

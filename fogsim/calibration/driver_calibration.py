@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from fogsim.core.files.readers import number_in_text, read_text, refuse_other_length
+from fogsim.core.files.readers import column_names, number_in_text, read_text, refuse_other_length
 from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.errors import InputError, shown
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE, Surroundings
@@ -33,14 +33,17 @@ FOLLOWING_BELOW = 4.0
 """Headway up to which a vehicle follows the one ahead; above, its speed is the driver's own choice [s]."""
 
 LEAST = 30
-"""Fewest vehicles in fog, and in clear air, that a fit needs."""
+"""Fewest vehicles in fog, and in clear air, that a fit needs; and in fog those who drive at the limit that a constant
+describes, by the fit: over fewer, intervals do not hold."""
 
 _LEAST_SESSIONS = 10
 """Fewest sessions with fog whose spread gives intervals: over fewer, the sandwich tends to zero."""
 
 _SPEEDS = {"speed_mps": 1.0, "speed_kmh": KMH_PER_MPS}
-_FITTED = ("slowest_share", "overdriving", "speed_spread")
+FITTED = ("slowest_share", "overdriving", "speed_spread")
 _NORMAL_90 = 1.6448536
+_LEAST_DEVIATION = 0.005
+"""Smallest standard deviation of the logarithm of speeds in clear air; below, they are classes or limits [-]."""
 _STEP = 1e-4
 """Step of numerical derivatives, in logarithms [-]."""
 
@@ -74,21 +77,22 @@ class Passages:
 class FittedDrivers:
     """Constants of drivers, each with its 90 % interval, and the number of vehicles behind them."""
 
-    constants: Mapping[str, Interval]  # By name
+    constants: Mapping[str, Interval]  # By name; without those that too few vehicles show
     following: Mapping[str, Interval]  # Shares of kinds with intervals; empty without headways
     clear: int
     fog: int
 
     def as_yaml(self, source: str) -> str:
         """The block ``drivers`` of a scenario."""
-        share, ratio, spread = (self.constants[name][0] for name in _FITTED)
+        values = {name: f"{name}: {found.value:.3f}" for name, found in self.constants.items()}
+        spread = values.pop("speed_spread", "")
         lines = [
             f"# fogsim calibrate drivers {source}: {self.fog} vehicles in fog, {self.clear} in clear air",
             "drivers:",
             "  speed_choice:",
             "    method: observed",
-            f"    parameters: {{slowest_share: {share:.3f}, overdriving: {ratio:.3f}}}",
-            f"  speed_spread: {spread:.3f}",
+            f"    parameters: {{{', '.join(values.values())}}}",
+            *([f"  {spread}"] if spread else []),
         ]
         if self.following:
             *first, last = ((name, round(value, 3)) for name, (value, _, _) in self.following.items())
@@ -102,7 +106,7 @@ def read_passages(path: Path) -> Passages:
     rows = csv.DictReader(io.StringIO(read_text(path), newline=""))
     values, sessions = [], []
     try:
-        names = rows.fieldnames or ()
+        names = column_names(path, rows.fieldnames)
         speeds = [name for name in _SPEEDS if name in names]
         if "visibility_m" not in names or len(speeds) != 1:
             raise InputError(
@@ -141,6 +145,8 @@ def fit_drivers(passages: Passages) -> FittedDrivers:
                 f"expected at least {LEAST} vehicles {words} (visibility below or above {UNAFFECTED_ABOVE:g} m) that "
                 f"do not follow another within {FOLLOWING_BELOW:g} s, got {np.count_nonzero(chosen)}"
             )
+    if np.log(passages.speed[~fog & ~follows]).std() < _LEAST_DEVIATION:
+        raise InputError("expected vehicles of different speeds in clear air, got nearly the same speed for all")
     clear_headways = passages.headway[~fog & follows]
     enough = min(int(np.count_nonzero(fog & follows)), len(clear_headways)) >= LEAST
     for chosen in (fog & ~follows, fog & follows) if enough else (fog & ~follows,):
@@ -176,6 +182,15 @@ class _SpeedModel:
 
     def losses(self, parameters: Floats) -> Floats:
         """Negative logarithm of each vehicle's likelihood (n,)."""
+        return np.asarray(-np.logaddexp(*self._by_limit(parameters)))
+
+    def seen(self, parameters: Floats) -> Floats:
+        """Probability that sight limits each vehicle's speed (n,) [-]."""
+        by_own, by_sight = self._by_limit(parameters)
+        return np.asarray(np.exp(by_sight - np.logaddexp(by_own, by_sight)))
+
+    def _by_limit(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Logarithms of each vehicle's likelihood with its own wish, and with sight, as the smaller limit."""
         centre, log_deviation, logit, log_ratio, log_spread = parameters
         share = 1.0 - self._density / (1.0 + math.exp(-logit))
         own = (self._log_speed - centre - np.log(share)) / math.exp(log_deviation)
@@ -183,10 +198,11 @@ class _SpeedModel:
         seen = (self._log_speed - limit) / math.exp(log_spread)
         by_own = stats.norm.logpdf(own) - log_deviation + stats.norm.logsf(seen)
         by_sight = stats.norm.logpdf(seen) - log_spread + stats.norm.logsf(own)
-        return np.asarray(-np.logaddexp(by_own, by_sight))
+        return by_own, by_sight
 
 
-_BOUNDS = ((None, None), (-6.0, 2.0), (-8.0, 3.0), (-1.0, 2.3), (-5.0, 1.0))
+_BOUNDS = ((None, None), (-6.0, 2.0), (-8.0, math.log(9.0)), (math.log(0.5), math.log(10.0)), (-5.0, 0.0))
+"""Of the parameters; a scenario accepts all constants between them."""
 
 
 def _fitted_speeds(passages: Passages, free: NDArray[np.bool_]) -> dict[str, Interval]:
@@ -197,7 +213,10 @@ def _fitted_speeds(passages: Passages, free: NDArray[np.bool_]) -> dict[str, Int
     low, high = found - reach, found + reach
     kept = 1.0 / (1.0 + np.exp([found[2], high[2], low[2]]))
     ratio, spread = (np.exp([found[i], low[i], high[i]]) for i in (3, 4))
-    return {name: Interval(*map(float, value)) for name, value in zip(_FITTED, (kept, ratio, spread), strict=True)}
+    seen = model.seen(found)[passages.visibility[free] < UNAFFECTED_ABOVE]
+    by_sight = float(seen.sum())
+    values = zip(FITTED, (kept, ratio, spread), (len(seen) - by_sight, by_sight, by_sight), strict=True)
+    return {name: Interval(*map(float, value)) for name, value, count in values if count >= LEAST}
 
 
 def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) -> Floats:

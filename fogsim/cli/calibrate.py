@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.printing import INTERRUPTED, escape, print_remarks, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.core.interruption import interruptible
 from fogsim.errors import InputError, printable
@@ -127,7 +127,7 @@ def calibrate_drivers_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the constants as JSON instead of a table.")] = False,
 ) -> None:
     """Fit drivers to your own measurements of speed and headway in fog (docs/how_to/own_drivers.md)."""
-    from fogsim.calibration.driver_calibration import fit_drivers, read_passages
+    from fogsim.calibration.driver_calibration import FITTED, LEAST, fit_drivers, read_passages
     from fogsim.core.files.atomic import write_text
     from fogsim.core.files.output_targets import refuse_unwritable
 
@@ -142,6 +142,9 @@ def calibrate_drivers_command(
         stderr.print("interrupted; nothing is written")
         raise typer.Exit(INTERRUPTED) from None
     write_text(out, fitted.as_yaml(printable(data.name, in_one_line=True)))
+    if lacking := [name for name in FITTED if name not in fitted.constants]:
+        reason = f"fewer than {LEAST} vehicles in fog show it at these visibilities; the default stays"
+        print_remarks("not fitted", (f"{', '.join(lacking)}: {reason}",))
     found = {**fitted.constants, **{f"following.{kind}": share for kind, share in fitted.following.items()}}
     if as_json:
         typer.echo(json.dumps({name: one._asdict() for name, one in found.items()}))

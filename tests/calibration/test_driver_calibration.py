@@ -20,10 +20,12 @@ TRUE = {"slowest_share": 0.75, "overdriving": 1.7, "speed_spread": 0.15}
 KINDS = {"in_sight": 0.3, "unaffected": 0.4, "careful": 0.15, "out_of_sight": 0.15}
 
 
-def passages(count: int, seed: int, kinds: Mapping[str, float] | None = None) -> Passages:
+def passages(
+    count: int, seed: int, kinds: Mapping[str, float] | None = None, reach: tuple[float, float] = (25.0, 200.0)
+) -> Passages:
     """Vehicles whose drivers are as `TRUE` says; with kinds of drivers, half of them follow another."""
     rng, choice = np.random.default_rng(seed), ObservedSpeed(slowest_share=0.75, overdriving=1.7)
-    in_fog = np.exp(rng.uniform(math.log(25.0), math.log(200.0), count))
+    in_fog = np.exp(rng.uniform(math.log(reach[0]), math.log(reach[1]), count))
     visibility = np.where(rng.random(count) < 0.4, 2000.0, in_fog)
     own, factor = np.exp(rng.normal(math.log(31.0), 0.1, count)), np.exp(rng.normal(0.0, 0.15, count))
     rows = zip(factor, own, visibility, strict=True)
@@ -60,6 +62,31 @@ def test_shares_of_kinds_come_back() -> None:
     for kind in ("in_sight", "unaffected"):
         assert found[kind].low <= KINDS[kind] <= found[kind].high
     assert found["careful"].value == pytest.approx(KINDS["careful"], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("reach", "fitted"),
+    [((25.0, 45.0), ["overdriving", "speed_spread"]), ((150.0, 200.0), ["slowest_share"])],
+)
+def test_constants_that_no_vehicle_shows_are_left_out(reach: tuple[float, float], fitted: list[str]) -> None:
+    found = fit_drivers(passages(500, 1, reach=reach))
+    assert list(found.constants) == fitted
+    drivers = found.as_yaml("data.csv").partition("drivers:\n")[2]
+    assert [name for name in TRUE if name in drivers] == fitted
+
+
+def test_equal_speeds_in_clear_air_are_refused() -> None:
+    made = passages(400, 1)
+    limited = np.where(made.visibility > 1000.0, 20.0, made.speed)
+    with pytest.raises(InputError, match="different speeds in clear air"):
+        fit_drivers(Passages(made.visibility, limited, made.headway, made.session))
+
+
+def test_fits_stay_within_what_a_scenario_accepts() -> None:
+    made = passages(400, 1)
+    slow = np.where(made.visibility < 1000.0, 0.2 * made.speed, made.speed)
+    text = fit_drivers(Passages(made.visibility, slow, made.headway, made.session)).as_yaml("data.csv")
+    load_scenario("motorway_fog_bank", [f"drivers={{{_flow(text.partition('drivers:')[2][1:])}}}"])
 
 
 def test_vehicles_of_a_session_count_together() -> None:
@@ -100,8 +127,8 @@ def test_what_is_written_is_a_scenarios(tmp_path: Path, command: Callable[..., t
 
 def _flow(block: str) -> str:
     """A block of YAML in one line."""
-    method, parameters, spread = (line.strip() for line in block.splitlines()[1:4])
-    return f"speed_choice: {{{method}, {parameters}}}, {spread}"
+    method, parameters, *spread = (line.strip() for line in block.splitlines()[1:4])
+    return ", ".join([f"speed_choice: {{{method}, {parameters}}}", *spread])
 
 
 def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
@@ -112,6 +139,7 @@ def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
         ("visibility_m,speed_kmh,headway\n60,80,2\n", "data.csv:1: column 'headway': did you mean 'headway_s'"),
         ("visibility_m,speed_kmh,session\n120,5,63,2,a\n", "data.csv:2: more cells than columns.* commas"),
         ("visibility_m,speed_kmh,headway_s\n120,63\n", "data.csv:2: fewer cells than columns"),
+        ("visibility_m,speed_kmh,visibility_m\n60,80,2000\n", "data.csv:1: two columns are named 'visibility_m'"),
         ("visibility_m,speed_kmh\n60,80\n", "at least 30 vehicles in fog .* got 1"),
     ]:
         (tmp_path / "data.csv").write_text(text)

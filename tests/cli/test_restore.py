@@ -1,13 +1,19 @@
 """``fogsim restore``."""
 
+import weakref
+from collections.abc import Generator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+import typer
 from flat_road import Road, photograph, scan
 
+from fogsim.cli.images.restore import restore_command
 from fogsim.offline.camera_file import load_calibration
+from fogsim.offline.restoration import Restored
+from fogsim.offline.source import Picture
 from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
 from tests.helpers.command import Command
@@ -75,6 +81,23 @@ def test_an_image_without_road_is_named_and_not_written(folder: Path, command: C
     assert done.returncode == 2
     assert "dark.png: no visibility: too dark above the horizon" in done.stderr
     assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
+
+
+def test_images_that_are_not_restored_are_not_kept_in_memory(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    alive = []
+
+    def lacking(*_: object, **__: object) -> Generator[Restored]:
+        made = list[weakref.ref[np.ndarray]]()
+        for number in range(8):
+            image = np.zeros((4, 4, 3), np.uint8)
+            made.append(weakref.ref(image))
+            yield Restored(Picture(f"{number}.png", 0.0, image), None, reason="no visibility")
+            alive.append(sum(one() is not None for one in made))
+
+    monkeypatch.setattr("fogsim.offline.restoration.restore_files", lacking)
+    with pytest.raises(typer.Exit):
+        restore_command([str(folder / "fog.png")], folder / "camera.yaml", folder / "out.png")
+    assert max(alive) <= 2
 
 
 def put_video(path: Path, frames: list[np.ndarray]) -> None:

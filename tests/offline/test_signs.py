@@ -245,6 +245,7 @@ def test_tracks_that_are_refused(tmp_path: Path) -> None:
         ("a.csv", "time_s,lat,lon\n0,1,2\n", "expected two positions"),
         ("a.csv", "time_s,lat,lon\n0,1,2\n1,x,2\n", "line 3: latitude must be a number within .*, got 'x'"),
         ("a.csv", "time_s,lat,lon\n0,48,1,11,5\n", "line 2: more cells than columns"),
+        ("a.csv", "time_s,lat,lon,lat\n0,48,11,49\n", "two columns are named 'lat'"),
         ("a.csv", "time,lat,lon\nnoon,1,2\n", "expected a time as 2026"),
         ("a.csv", "time_s,lat,lon\n0,91,2\n", "within ±90°"),
         ("a.csv", "time_s,lat,lon\n0,1,2\n2,1,2\n1,1,2\n", "time goes back after position 2 of 3"),

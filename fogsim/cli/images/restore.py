@@ -56,21 +56,23 @@ def restore_command(
     print_remarks("assumed", calibration.remarks)
     given = find_source(images)
     source, pinhole = straightened(given, calibration)
-    restore = restore_files if isinstance(given, ImageFiles) else restore_video
-    lacking, counts = list["Restored"](), Counter[str]()
+    is_files, lacking, counts = isinstance(given, ImageFiles), list[str](), Counter[str]()
+    restore = restore_files if is_files else restore_video
     with (
         progress_bar(stderr) as progress,
         contextlib.closing(restore(source, pinhole, wish, out, overwrite=overwrite)) as results,
     ):
         task = progress.add_task(source.description, total=source.count)
         for one in results:
-            lacking += [one] if one.image is None else []
+            if one.image is None:  # its text alone: a drive's images would fill the memory
+                named = is_files and not one.picture.error
+                lacking.append(f"{one.picture.name}: {one.reason}" if named else one.reason)
             counts["restored" if one.image is not None else "lacking"] += 1
             counts["held"] += one.held
             last = one
             progress.advance(task)
     _print_counts(out, wish, counts, last)
-    _report_missing(lacking, isinstance(given, ImageFiles))
+    _report_missing(lacking, is_files)
 
 
 def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", last: "Restored") -> None:
@@ -88,16 +90,15 @@ def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", la
         print_remarks("held", (f"in {counts['held']} images had no estimate; the last one was used",))
 
 
-def _report_missing(lacking: "list[Restored]", files: bool) -> None:
-    """Report which images were not restored; frames of a video are left unchanged."""
+def _report_missing(lacking: list[str], files: bool) -> None:
+    """Report why images were not restored; frames of a video are left unchanged."""
     if not lacking:
         return
     if not files:
-        text = f"{len(lacking)} frames before the first estimate are as they were: {lacking[0].reason}"
+        text = f"{len(lacking)} frames before the first estimate are as they were: {lacking[0]}"
         print_remarks("not restored", (text,))
         return
     print_error(f"{len(lacking)} of the images could not be restored (--visibility does without an estimate):")
-    for one in lacking:
-        named = one.reason if one.picture.error else f"{one.picture.name}: {one.reason}"
-        stderr.print(f"  {escape(named, in_one_line=True)}", soft_wrap=True)
+    for reason in lacking:
+        stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
     raise typer.Exit(BAD_INPUT)

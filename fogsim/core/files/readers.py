@@ -5,7 +5,7 @@ import json
 import math
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, NoReturn
@@ -127,6 +127,15 @@ def read_json(path: Path, most: int = _MOST_BYTES) -> Any:
         raise InputError(f"{path}: not valid JSON: nested too deeply") from error
     except ValueError as error:
         raise InputError(f"{path}: not valid JSON: {error}") from error
+
+
+def column_names(path: Path, names: Sequence[str] | None) -> Sequence[str]:
+    """Columns of a CSV; InputError if two have one name, since `csv.DictReader` would keep the last."""
+    found = names or ()
+    twice = next((name for name in found if name and found.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}:1: two columns are named {shown(twice)}")
+    return found
 
 
 def refuse_other_length(where: str, row: Mapping[Any, Any]) -> None:

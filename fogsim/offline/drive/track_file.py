@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.files.readers import number_in_text, read_text, refuse_other_length
+from fogsim.core.files.readers import column_names, number_in_text, read_text, refuse_other_length
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError, shown
 
@@ -129,7 +129,7 @@ def _gpx_points(path: Path) -> Iterator[Point]:
 def _csv_points(path: Path) -> Iterator[Point]:
     rows = csv.DictReader(io.StringIO(read_text(path), newline=""))
     try:
-        names = rows.fieldnames or ()
+        names = column_names(path, rows.fieldnames)
         column = {meant: _column(path, names, known) for meant, known in COLUMNS.items()}
         counted, start = column["time"] == "time_s", None
         for row in rows:

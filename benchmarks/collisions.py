@@ -10,7 +10,7 @@ as they enter, and complies without delay). Protocols:
 - ``full_road``: the scenario's own demand. The road has filled for 180 s when the ego comes and advice begins, for all
   on it and for all who enter; after 160 s the run ends.
 
-    python benchmarks/collisions.py [--json] [--docs] [--seeds 10] [--visibility 20 40 60]
+    python benchmarks/collisions.py [--json] [--docs] [--seeds 8] [--visibility 20 40 60]
                                     [--protocol from_the_beginning full_road] [--speed-choice observed unaffected]
 
 Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the mean over seeds.
@@ -139,7 +139,7 @@ def main() -> None:
     given = parse_options(
         __doc__,
         docs=("explanation/drivers.md", "collisions"),
-        seeds=(10, "seeds for each visibility and policy"),
+        seeds=(8, "seeds for each visibility and policy"),
         visibility=([20.0, 40.0, 60.0], "visibilities [m]"),
         protocol=(list(SECONDS), "when advice begins", SECONDS),
         speed_choice=(["observed", "unaffected"], "how fast drivers drive in fog by themselves"),

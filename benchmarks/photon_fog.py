@@ -12,6 +12,7 @@ Constants were chosen on pool 0, whose drives are others; pool 1 is what is repo
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile
@@ -27,7 +28,8 @@ ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.8)
 ALL_ALBEDOS = f"{ALBEDOS[0]:g} … {ALBEDOS[-1]:g}"
 VISIBILITIES = (50.0, 100.0, 150.0, 200.0, 300.0)
 HEIGHTS = (1.3, 2.5)
-METHODS = (EVEN_AIRLIGHT, "joint_road", *CHASE_METHODS)
+ALONE = (EVEN_AIRLIGHT, "joint_road")
+METHODS = (*ALONE, *CHASE_METHODS)
 KINDS = ("moderate_radiation", "heavy_radiation", "heavy_advection")
 Found = dict[tuple[Case, str], list[Estimate]]
 
@@ -47,15 +49,14 @@ def measure(pool: int, drives: int, droplets: tuple[str, ...]) -> Found:
     todo = [
         (height, kind, 1000 * (pool + 1) + n)
         for height in HEIGHTS
-        for kind in (drive_alone, follow)
+        for kind in (partial(drive_alone, methods=ALONE), follow)
         for n in range(drives)
     ]
     fogs = tuple(cases(droplets))
     with road_renderer() as renderer:
         for height, kind, number in progress(todo, "drives"):
             for case, method, estimate in kind(renderer, replace(CAMERA, mount_height=height), fogs, number):
-                if method in METHODS:
-                    found.setdefault((case, method), []).append(estimate)
+                found.setdefault((case, method), []).append(estimate)
     return found
 
 

@@ -131,7 +131,7 @@ MEASUREMENTS = (
     benchmark("broken_devices", 6, ("broken devices",)),
     benchmark("driver_warnings", 6, ("warnings",), WARNINGS_KEPT),
     benchmark("grades", 6),
-    benchmark("uneven_fog", 30, ("uneven fog",)),
+    benchmark("uneven_fog", 7, ("uneven fog",)),
     benchmark("lead_accuracy", 4, ("lead accuracy",), times="ms"),
     benchmark("estimator_targets", 3, ("targets",), TARGETS_KEPT),
     benchmark(
@@ -155,7 +155,7 @@ MEASUREMENTS = (
         ("drivers-published", "drivers-traffic"),
     ),
     benchmark("junctions", 6),
-    benchmark("collisions", 15),
+    benchmark("collisions", 8),
     Measurement(
         "airlight",
         (
@@ -166,7 +166,7 @@ MEASUREMENTS = (
         (AIRLIGHT, "docs/make_airlight_tables.py"),
         ("lands", "conditions", "car", "lorry"),
     ),
-    benchmark("photon_fog", 14, ("mended",), " --drives 2"),
+    benchmark("photon_fog", 6, ("mended",), " --drives 2"),
     Measurement(
         "surroundings", ("python docs/make_airlight_tables.py",), 0.1, (PHOTONS, "docs/make_airlight_tables.py")
     ),

@@ -110,7 +110,7 @@ def reproduce(
 
 
 def drive_alone(
-    renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
+    renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int, methods: Sequence[str] = ROAD_METHODS
 ) -> Iterator[tuple[Case, str, Estimate]]:
     """Drive along the road alone: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([21, number])
@@ -120,7 +120,7 @@ def drive_alone(
             Observation(Frame(_PERIOD * number, _image(one.view, one.pose, camera, case, rng), camera), SPEED)
             for number, one in enumerate(moments)
         ]
-        for method in ROAD_METHODS:
+        for method in methods:
             estimator = (
                 make("joint_road", camera, even_airlight=True) if method == EVEN_AIRLIGHT else make(method, camera)
             )
@@ -150,8 +150,8 @@ def follow(
 def _image(view: View, pose: CameraPose, camera: Camera, case: Case, rng: np.random.Generator) -> NDArray[np.uint8]:
     k = extinction_from_visibility(case.visibility)
     radiance = foggy_radiance(view, pose, camera, k, case.albedo, case.droplets)
-    luminance = (radiance * np.array(LUMINANCE_WEIGHTS)).sum(axis=-1)
-    sensor = Sensor(saturation_luminance=float(np.percentile(luminance, _BRIGHTEST)) / _EXPOSED)
+    red, green, blue = (share * radiance[..., i].astype(float) for i, share in enumerate(LUMINANCE_WEIGHTS))
+    sensor = Sensor(saturation_luminance=float(np.percentile(red + green + blue, _BRIGHTEST)) / _EXPOSED)
     return expose(radiance, sensor, camera.response, rng).astype(np.uint8)
 
 

@@ -344,7 +344,8 @@ def needs_camera(scenario: Scenario, metrics: Iterable[str] = ()) -> bool:
     """Whether advice, lamps, a controller or the chosen metrics depend on the camera."""
     if scenario.controller is not None or any(_is_of_camera(metric) for metric in metrics):
         return True
-    deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
+    unmoved = "low_beam", "always_low", "always_high"
+    deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method in unmoved
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))
 

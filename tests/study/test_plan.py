@@ -176,7 +176,10 @@ def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:
     assert drawn == {"none": "none", "ssd": "auto", "meter": "none"}
     always = load_study(written(tmp_path, text + "frames: always\n"))
     assert {run.scenario.renderer for run in always.runs} == {"auto"}
-    # Lamps that go by the camera's fog need it, too.
+    # Lamps that go by the camera's fog need it, too; those that are always the same do not.
+    for same in ("always_low", "always_high"):
+        runs = load_study(written(tmp_path, text.replace("low_beam", same))).runs
+        assert {run.levels["policy"]: run.scenario.renderer for run in runs} == drawn
     lamps = load_study(written(tmp_path, text.replace("low_beam", "fog_lamp_rules")))
     assert {run.scenario.renderer for run in lamps.runs} == {"auto"}
 

@@ -93,11 +93,13 @@ def log_likelihoods(
     variance: Floats,
     weight: Floats,
     best: Fit,
+    sets: int,
 ) -> Floats:
-    """Logarithm of the likelihood (draws, extinctions), largest over amplitudes, summed over ratios.
+    """Logarithm of the likelihood (sets, draws, extinctions), largest over amplitudes, summed over ratios.
 
     Lamps light `veil` and `road` (draws, extinctions, cells), which is `depth` (draws, cells) away [m]. `variance` and
-    `weight` are those of cells, and `best` is written to.
+    `weight` are those of cells, and `best` is written to. In one set draws have the shapes of others' glow in turn; in
+    as many as there are shapes, each has its own.
     """
     draws, count, cells = veil.shape
     independent, shapes, total = measured.independent, len(measured.others), weight.sum()
@@ -110,27 +112,29 @@ def log_likelihoods(
     known, used = np.zeros((2, _TERMS)), np.zeros(_TERMS)
     # By which terms but the lamplight are free
     solved = np.zeros((1 << (_TERMS - 1), _TERMS, _TERMS + 3))
-    found, highest = np.empty((draws, count)), -np.inf
+    found, highest = np.empty((sets, draws, count)), -np.inf
     for place in range(count):
         for draw in range(draws):
             if is_day or draw == 0:
                 _sums_of_light(weighed, depth[draw], extinction[place], measured.even, kept, gram)
             _sums_of_lamps(weighed, veil[draw, place], road[draw, place], kept, gram)
-            if shapes > 0:
-                _sums_of_others(weighed, draw % shapes, veil[draw, place], road[draw, place], kept, gram)
-                known[1, _OTHERS] = 1.0 / min(1.0, _GLOW_CLEAR + _GLOW_REACH * extinction[place]) ** 2
-            if is_day:
-                _set_daylight(measured, gram, known, solved, terms, used)
-            solved[:, 0, 0] = np.nan
-            likelihood = 0.0
-            for i, ratio in enumerate(_RATIOS):
-                square = max(power + _set_amplitudes(gram, known, solved, terms, factors[i], used), 0.0) / total
-                value = -0.5 * (independent * math.log(_SOFTNESS + square) + (ratio / _RATIO_DEVIATION) ** 2)
-                likelihood += math.exp(value)
-                if value > highest:
-                    highest, best.summary[0] = value, square
-                    _model(used, factors[i], veil[draw, place], road[draw, place], kept, measured, draw, best)
-            found[draw, place] = math.log(max(likelihood, 1e-300))
+            for number in range(sets):
+                shape = number if sets > 1 else draw % max(shapes, 1)
+                if shapes > 0:
+                    _sums_of_others(weighed, shape, veil[draw, place], road[draw, place], kept, gram)
+                    known[1, _OTHERS] = 1.0 / min(1.0, _GLOW_CLEAR + _GLOW_REACH * extinction[place]) ** 2
+                if is_day:
+                    _set_daylight(measured, gram, known, solved, terms, used)
+                solved[:, 0, 0] = np.nan
+                likelihood = 0.0
+                for i, ratio in enumerate(_RATIOS):
+                    square = max(power + _set_amplitudes(gram, known, solved, terms, factors[i], used), 0.0) / total
+                    value = -0.5 * (independent * math.log(_SOFTNESS + square) + (ratio / _RATIO_DEVIATION) ** 2)
+                    likelihood += math.exp(value)
+                    if value > highest:
+                        highest, best.summary[0] = value, square
+                        _model(used, factors[i], veil[draw, place], road[draw, place], kept, measured, shape, best)
+                found[number, draw, place] = math.log(max(likelihood, 1e-300))
     return found
 
 
@@ -156,7 +160,7 @@ def _model(
     road: Templates,
     kept: Floats,
     measured: Measured,
-    draw: int,
+    shape: int,
     best: Fit,
 ) -> None:
     """Set what amplitudes make of the cells."""
@@ -166,7 +170,7 @@ def _model(
         rest = used[_PEDESTAL] + used[_AIRLIGHT] * (1.0 - kept[cell]) + used[_DAY_ROAD] * kept[cell]
         rest += used[_SLOPE] * _SLOPE_AT_TOP * measured.up[cell]
         if len(measured.others) > 0:
-            rest += used[_OTHERS] * measured.others[draw % len(measured.others), cell]
+            rest += used[_OTHERS] * measured.others[shape, cell]
         best.luminance[cell] = lit + rest
         by_lamps += lit
         total += lit + rest
@@ -290,32 +294,38 @@ def _solve_but_for_lamps(gram: Floats, known: Floats, terms: int, a: Floats) -> 
     """
     form = 0.0
     for i in range(1, _TERMS):
-        is_free, right = (terms >> i) & 1, gram[1 + i, -1] + known[1, i] * known[0, i]
-        for j in range(i, _TERMS):
-            a[i, j] = gram[1 + i, 1 + j] if is_free and (terms >> j) & 1 else 0.0
-        a[i, i] = a[i, i] + known[1, i] if is_free else 1.0
-        a[i, -3], a[i, -2], a[i, -1] = is_free * right, is_free * gram[0, 1 + i], is_free * gram[1, 1 + i]
+        right = gram[1 + i, -1] + known[1, i] * known[0, i]
         form += known[1, i] * known[0, i] ** 2
-    _eliminate(a)
+        if not (terms >> i) & 1:
+            a[i, -3:] = 0.0
+            continue
+        for j in range(i, _TERMS):
+            a[i, j] = gram[1 + i, 1 + j] if (terms >> j) & 1 else 0.0
+        a[i, i] += known[1, i]
+        a[i, -3], a[i, -2], a[i, -1] = right, gram[0, 1 + i], gram[1, 1 + i]
+    _eliminate(a, terms)
     for i in range(1, _TERMS):
         form -= (gram[1 + i, -1] + known[1, i] * known[0, i]) * a[i, -3]
     a[0, 0] = form
 
 
 @kernel
-def _eliminate(a: Floats) -> None:
-    """Solve positive definite equations in place, whose right sides are columns; the first row is none of them."""
+def _eliminate(a: Floats, terms: int) -> None:
+    """Solve positive definite equations of some terms in place, whose right sides are columns."""
     for i in range(1, _TERMS):
-        scale = 1.0 / a[i, i]
-        for k in range(i + 1, _TERMS):
-            share = a[i, k] * scale
-            for j in range(k, a.shape[1]):
-                a[k, j] -= share * a[i, j]
+        if (terms >> i) & 1:
+            scale = 1.0 / a[i, i]
+            for k in range(i + 1, _TERMS):
+                if (terms >> k) & 1:
+                    share = a[i, k] * scale
+                    for j in range(k, a.shape[1]):
+                        a[k, j] -= share * a[i, j]
     for i in range(_TERMS - 1, 0, -1):
-        for side in range(_TERMS, a.shape[1]):
-            for j in range(i + 1, _TERMS):
-                a[i, side] -= a[i, j] * a[j, side]
-            a[i, side] /= a[i, i]
+        if (terms >> i) & 1:
+            for side in range(_TERMS, a.shape[1]):
+                for j in range(i + 1, _TERMS):
+                    a[i, side] -= a[i, j] * a[j, side]
+                a[i, side] /= a[i, i]
 
 
 @kernel

@@ -284,14 +284,14 @@ class NightRoad:
         if len(measured.others) > _GLOWS_KEPT:
             measured = _with_likely_glows(measured, _sample(own, extinction, *_GLOW_SAMPLE), variance)
         for _ in range(_ROUNDS):
-            log_likelihoods(measured, *sample, variance, weight, best)
+            log_likelihoods(measured, *sample, variance, weight, best, 1)
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
             if np.abs(weight - earlier).max() < _SETTLED:
                 break
-        found = log_likelihoods(measured, extinction, own.veil, own.road, own.depth, variance, weight, best)
+        found = log_likelihoods(measured, extinction, own.veil, own.road, own.depth, variance, weight, best, 1)
         misfit, lamplight = best.summary.tolist()
         power, doubt = _BY_DAYLIGHT if lamplight < _MOSTLY_DAYLIGHT else (1.0, 1.0)
-        likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
+        likelihood = np.exp(power * (found[0] - found.max())).mean(axis=0) ** (doubt / power)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
         diagnostics: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": misfit}
@@ -341,9 +341,9 @@ def _sample(own: OwnLight, extinction: Floats, *every: int) -> _Sample:
 def _with_likely_glows(measured: Measured, sample: _Sample, variance: Floats) -> Measured:
     """The image with the shapes of others' glow that are most like it: too few draws would have each of all."""
     weight, unused = np.ones(len(variance)), Fit(np.empty(len(variance)), np.empty(2))
-    alone = (measured._replace(others=one[None]) for one in measured.others)
-    found = [np.exp(log_likelihoods(one, *sample, variance, weight, unused)).mean() for one in alone]
-    return measured._replace(others=measured.others[np.argsort(found)[-_GLOWS_KEPT:]])
+    found = log_likelihoods(measured, *sample, variance, weight, unused, len(measured.others))
+    likeliest = np.argsort([np.exp(of_shape).mean() for of_shape in found])
+    return measured._replace(others=measured.others[likeliest[-_GLOWS_KEPT:]])
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:

@@ -214,11 +214,24 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
         known = Measured(shown, np.zeros(30), others, 0.0, 0.0, 6e-4, 16.0)
         best = Fit(np.empty(30), np.empty(2))
         templates = veil, road, depth
-        found = log_likelihoods(known, 3.0 / VISIBILITIES, *templates, (0.05 * shown) ** 2, np.ones(30), best)
-        assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
+        found = log_likelihoods(known, 3.0 / VISIBILITIES, *templates, (0.05 * shown) ** 2, np.ones(30), best, 1)
+        assert np.unravel_index(np.argmax(found), found.shape) == (0, 1, 20)
         assert np.allclose(best.luminance, shown, rtol=2e-3)
         assert best.summary[0] < 1e-2
         assert best.summary[1] == pytest.approx(seen.sum() / shown.sum(), abs=0.01)
+
+
+def test_shapes_of_glow_together_are_as_likely_as_each_alone() -> None:
+    rng = np.random.default_rng(3)
+    veil, road = (np.exp(rng.standard_normal((4, 5, 30))).astype(np.float32) for _ in range(2))
+    depth = np.tile(np.where(np.arange(30) < 12, 1e9, np.geomspace(5.0, 100.0, 30)), (4, 1)).astype(np.float32)
+    glows, shown = np.exp(rng.standard_normal((3, 30))), np.exp(rng.standard_normal(30))
+    for scales in ((0.0, 0.0), (0.2, 0.0), (0.0, 0.1)):
+        known = Measured(shown, np.linspace(1.0, 0.0, 30), glows, *scales, 6e-4, 16.0)
+        rest = np.geomspace(0.003, 0.1, 5), veil, road, depth, (0.1 * shown) ** 2, np.ones(30)
+        best = Fit(np.empty(30), np.empty(2))
+        alone = [log_likelihoods(known._replace(others=one[None]), *rest, best, 1)[0] for one in glows]
+        assert np.array_equal(log_likelihoods(known, *rest, best, 3), alone)
 
 
 def test_amplitudes_are_those_of_least_squares() -> None:
@@ -244,7 +257,7 @@ def test_amplitudes_are_those_of_least_squares() -> None:
         measured, best = Measured(shown, up, glow[None], scale, 0.0, 0.01, 20.0), Fit(np.empty(cells), np.empty(2))
         spread, templates = np.full(cells, 0.01**2), (one[None, None] for one in (veil, road))
         found = log_likelihoods(
-            measured, np.array([0.03]), *templates, depth[None].astype(np.float32), spread, np.ones(cells), best
+            measured, np.array([0.03]), *templates, depth[None].astype(np.float32), spread, np.ones(cells), best, 1
         )
         total = 0.0
         for ratio in np.linspace(-1.8, 1.8, 7):
@@ -255,7 +268,7 @@ def test_amplitudes_are_those_of_least_squares() -> None:
             solved = lsq_linear(rows, wanted, (lowest, np.inf), tol=1e-14)
             square = 2.0 * solved.cost / cells
             total += (0.25 + square) ** -10.0 * math.exp(-0.5 * (ratio / 0.7) ** 2)
-        assert found[0, 0] == pytest.approx(math.log(total), abs=1e-4)
+        assert found[0, 0, 0] == pytest.approx(math.log(total), abs=1e-4)
 
 
 def test_noise_that_is_cut_off_at_the_dark_is_allowed_for() -> None:

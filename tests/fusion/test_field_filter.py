@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.fusion import DatedFusion, LocatedFusion, make
+from fogsim.fusion import make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import DenserFog, Estimate, FogReport, OpticalDepths
 from fogsim.values.estimate import ExtinctionBounds
@@ -209,13 +209,6 @@ def test_reset_forgets_and_places_must_be_numbers():
         fusion.update_at([], 1.0, math.nan)
 
 
-def test_either_kind_of_fusion_can_be_asked():
-    assert isinstance(make("field_filter"), LocatedFusion)
-    assert not isinstance(make("none"), LocatedFusion)
-    assert DatedFusion(make("grid_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is None
-    assert DatedFusion(make("field_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is not None
-
-
 def test_who_drives_on_blindly_knows_less_and_less_of_the_road_ahead():
     fusion = make("field_filter")
     driven(fusion, [seen(150.0, reach=150.0)], 10.0)
@@ -246,14 +239,6 @@ def test_who_stands_for_an_hour_and_sees_the_fog_knows_it_here():
     for second in range(0, 3600, 2):
         belief = fusion.update_at([seen(250.0, 0.15)], float(second), 500.0)
     assert belief.profile.known_visibility(0.0, 0.5) == pytest.approx(250.0, rel=0.2)
-
-
-def test_reports_do_not_date_a_belief_that_knows_no_places():
-    heard = {name: DatedFusion(make(name)) for name in ("grid_filter", "field_filter")}
-    for fusion in heard.values():
-        fusion.update_at([seen(100.0)], 0.0, 0.0)
-    ages = [fusion.update_at([], 70.0, 0.0, [report(100.0, 50.0, 70.0)]).age for fusion in heard.values()]
-    assert ages == [70.0, 0.0]
 
 
 def test_methods_that_disagree_leave_the_interval_wide_enough_for_either():

@@ -11,9 +11,12 @@ from fogsim.values import Estimate
 from fogsim.values.estimate import ExtinctionBounds
 
 
+def k_of(visibility):
+    return OPTICAL_DEPTH_AT_VISIBILITY / visibility
+
+
 def measured(visibility, relative=0.1):
-    k = OPTICAL_DEPTH_AT_VISIBILITY / visibility
-    return Estimate("test", k, relative * k)
+    return Estimate("test", k_of(visibility), relative * k_of(visibility))
 
 
 def feed(fusion, estimates, start=0.0, period=0.1):
@@ -22,16 +25,12 @@ def feed(fusion, estimates, start=0.0, period=0.1):
     return belief
 
 
-def test_before_any_estimate_every_visibility_is_equally_likely():
-    belief = make("grid_filter").update([], 0.0)
+def test_before_any_estimate_every_visibility_is_and_stays_equally_likely():
+    fusion = make("grid_filter")
+    belief = fusion.update([], 0.0)
     assert belief.probability == pytest.approx(np.full(240, 1 / 240))
-    assert belief.visibility == pytest.approx(math.sqrt(10 * 10_000), rel=1e-6)
-
-
-def test_grid_spans_ten_metres_to_ten_kilometres():
-    belief = make("grid_filter").update([], 0.0)
-    ends = OPTICAL_DEPTH_AT_VISIBILITY / np.exp(belief.log_extinction[[0, -1]])
-    assert ends == pytest.approx([10_000, 10])
+    assert np.exp(belief.log_extinction[[0, -1]]) == pytest.approx([k_of(10_000), k_of(10)])
+    assert fusion.update([], 50.0).probability == pytest.approx(np.full(240, 1 / 240), rel=1e-9)
 
 
 def test_converges_to_a_steady_measurement():
@@ -48,10 +47,6 @@ def test_one_good_estimate_is_the_posterior_of_bayes():
     assert belief.probability == pytest.approx(expected / expected.sum(), abs=1e-6)
 
 
-def k_of(visibility):
-    return OPTICAL_DEPTH_AT_VISIBILITY / visibility
-
-
 def test_abstention_widens_and_does_not_move():
     fusion = make("grid_filter")
     before = feed(fusion, [measured(100.0)] * 30)
@@ -61,12 +56,6 @@ def test_abstention_widens_and_does_not_move():
         spreads.append(belief.log_standard_deviation)
     assert np.all(np.diff(spreads) > 0)
     assert belief.visibility == pytest.approx(before.visibility, rel=0.05)
-
-
-def test_ignorance_is_stationary():
-    fusion = make("grid_filter")
-    fusion.update([], 0.0)
-    assert fusion.update([], 50.0).probability == pytest.approx(np.full(240, 1 / 240), rel=1e-9)
 
 
 def test_diffusion_does_not_depend_on_how_time_is_cut():
@@ -187,21 +176,19 @@ def test_beliefs_are_not_shared():
     assert np.array_equal(first.probability, kept)
 
 
-@pytest.mark.parametrize("instant", [math.nan, math.inf, 1.0])
-def test_time_must_be_finite_and_not_go_back(instant):
+def test_time_must_be_finite_and_not_go_back():
     fusion = make("grid_filter")
     fusion.update([], 2.0)
-    with pytest.raises(InputError, match="time"):
-        fusion.update([], instant)
+    for instant in (math.nan, math.inf, 1.0):
+        with pytest.raises(InputError, match="time"):
+            fusion.update([], instant)
 
 
 def test_names_and_parameters_are_checked():
     assert list(FUSIONS) == ["field_filter", "grid_filter", "mixture_filter", "none"]
     with pytest.raises(UnknownNameError, match="grid_filter"):
         make("grid_filtre")
-    with pytest.raises(InputError, match="drift"):
-        make("grid_filter", drifft=0.1)
-    for name, value in {"drift": 0.0, "leap_rate": -1.0, "outlier_share": 1.0, "correlation_time": math.nan}.items():
+    for name, value in {"drift": 0.0, "leap_rate": -1.0, "outlier_share": 1.0}.items():
         with pytest.raises(InputError, match=name):
             make("grid_filter", **{name: value})
 
@@ -213,19 +200,13 @@ def test_no_fusion_believes_everything_equally_likely_whatever_is_estimated():
 
 
 def test_bounds_of_an_estimate_that_is_not_valid_move_the_belief_to_their_side():
-    def told(bounds):
+    def share_below(visibility, bounds):
         estimate = dataclasses.replace(Estimate.invalid("test", "only a bound"), bounds=bounds)
-        return make("grid_filter").update([estimate], 0.0)
+        belief = make("grid_filter").update([estimate], 0.0)
+        return belief.probability[np.exp(belief.log_extinction) > k_of(visibility)].sum()
 
-    far = told(ExtinctionBounds(most=k_of(250.0)))
-    assert 1.0 - share_below(far, 200.0) > 0.85
-    near = told(ExtinctionBounds(least=k_of(60.0)))
-    assert share_below(near, 80.0) > 0.6
-    assert told(None).probability == pytest.approx(np.full(240, 1 / 240))
-
-
-def share_below(belief, visibility):
-    return float(belief.probability[np.exp(belief.log_extinction) > k_of(visibility)].sum())
+    assert share_below(200.0, ExtinctionBounds(most=k_of(250.0))) < 0.15
+    assert share_below(80.0, ExtinctionBounds(least=k_of(60.0))) > 0.6
 
 
 def test_a_wrong_bound_does_not_outweigh_good_estimates():

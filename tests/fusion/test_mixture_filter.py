@@ -5,21 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.core.linear_algebra import majority
 from fogsim.errors import InputError
 from fogsim.fusion import make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
 
 
-def seen(visibility: float, method: str = "test") -> Estimate:
+def seen(visibility: float) -> Estimate:
     k = OPTICAL_DEPTH_AT_VISIBILITY / visibility
-    return Estimate(method, k, 0.1 * k)
-
-
-def test_one_cluster_takes_in_all():
-    assert majority([40.0, 100.0, 101.0, 99.0, 102.0, 400.0], [1.0] * 6, 1).all()
-    assert majority([40.0, 100.0, 101.0, 99.0, 102.0, 400.0], [1.0] * 6, 3).tolist() == [False, *[True] * 4, False]
+    return Estimate("test", k, 0.1 * k)
 
 
 def test_outliers_are_set_aside_by_three_clusters_and_not_by_one():

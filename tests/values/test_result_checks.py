@@ -86,26 +86,20 @@ def test_advice() -> None:
 
 
 def test_advice_to_others() -> None:
+    def one(*place: object, **shown: object) -> Command:
+        return Command(stretches=(StretchAdvice(20.0, *place, **shown),))  # type: ignore[arg-type]  # wrong on purpose
+
     for command, message in [
         (Command(advice_reach=math.nan), r"advice_reach must be at least 0 \[m\], got nan"),
         (Command(stretches=[StretchAdvice(20.0)]), "stretches must be a tuple of StretchAdvice; got"),
         (Command(stretches=(20.0,)), r"stretches\[0\] must be of type fogsim\.values\.StretchAdvice, got 20"),
         (Command(stretches=(StretchAdvice(20.0), StretchAdvice(-1.0))), r"stretches\[1\]: speed must be at least 0"),
-        (
-            Command(stretches=(StretchAdvice(20.0, "road"),)),
-            r"stretch must be of type fogsim\.values\.Stretch, got 'ro",
-        ),
-        (
-            Command(stretches=(StretchAdvice(20.0, display="sign"),)),
-            r"display must be a fogsim\.values\.Display; got 's",
-        ),
-        (Command(stretches=(StretchAdvice(20.0, Stretch(-1.0)),)), r"stretch\.start must be .* at least 0 .*, got -1"),
-        (Command(stretches=(StretchAdvice(20.0, Stretch(5.0, 5.0)),)), r"stretch\.end must lie behind its start at 5"),
-        (Command(stretches=(StretchAdvice(20.0, Stretch(edges="e1")),)), r"stretch\.edges must be a tuple .*got 'e1'"),
-        (
-            Command(stretches=(StretchAdvice(20.0, Stretch(edges=(1,))),)),
-            r"stretch\.edges must be .* ids of edges; got 1",
-        ),
+        (one("road"), r"stretch must be of type fogsim\.values\.Stretch, got 'ro"),
+        (one(display="sign"), r"display must be a fogsim\.values\.Display; got 's"),
+        (one(Stretch(-1.0)), r"stretch\.start must be .* at least 0 .*, got -1"),
+        (one(Stretch(5.0, 5.0)), r"stretch\.end must lie behind its start at 5"),
+        (one(Stretch(edges="e1")), r"stretch\.edges must be a tuple .*got 'e1'"),
+        (one(Stretch(edges=(1,))), r"stretch\.edges must be .* ids of edges; got 1"),
     ]:
         with pytest.raises(InputError, match=f"^the command.*{message}"):
             checked_command(command)

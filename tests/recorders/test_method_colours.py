@@ -69,7 +69,7 @@ def test_more_methods_than_colours_take_colours_of_no_named_one() -> None:
 
 
 def test_the_panel_writes_a_method_in_its_colour_wherever_it_stands() -> None:
-    for method in sorted(ESTIMATORS):
+    for method in ("joint_road", "negru2013"):
         told = (estimate(method, 100.0), estimate("mine", 90.0))
         for estimates in (told, told[::-1]):
             step = dataclasses.replace(make_step(), estimates=estimates)

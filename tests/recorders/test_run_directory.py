@@ -7,27 +7,6 @@ from fogsim.errors import InputError
 from fogsim.recorders import RunDirectory, recover_run, write_json
 
 
-def test_it_makes_the_directory_and_its_parents(tmp_path: Path) -> None:
-    with RunDirectory(tmp_path / "a" / "b") as directory:
-        directory.begin({})
-        assert directory.table == tmp_path / "a" / "b" / "unfinished" / "steps.parquet"
-        assert directory.table.parent.is_dir()
-        assert directory.files() == []
-
-
-def test_one_in_which_nothing_was_begun_is_taken_away(tmp_path: Path) -> None:
-    with RunDirectory(tmp_path / "a" / "b"):
-        pass
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_directory_with_other_files_is_fine(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    with RunDirectory(tmp_path) as directory:
-        assert directory.files() == []
-    assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
-
-
 @pytest.mark.parametrize("name", ["manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"])
 @pytest.mark.parametrize("suffix", ["", ".part"])
 def test_results_are_not_overwritten_unasked(tmp_path: Path, name: str, suffix: str) -> None:

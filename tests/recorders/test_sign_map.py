@@ -38,8 +38,3 @@ def test_longitude_and_latitude_where_they_are_known(tmp_path: Path) -> None:
     (limit,) = content["features"]
     assert limit["geometry"]["coordinates"] == pytest.approx([8.01, 49.995])
     assert (limit["properties"]["x_m"], limit["properties"]["y_m"]) == (10.0, -5.0)
-
-
-def test_a_map_without_signs(tmp_path: Path) -> None:
-    write_sign_map(tmp_path / "a.geojson", SignMap(), "empty")
-    assert written(tmp_path / "a.geojson")["features"] == []

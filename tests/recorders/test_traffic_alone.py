@@ -28,7 +28,7 @@ def some_steps() -> list[TrafficStep]:
     ]
 
 
-def nobody(step: TrafficStep) -> TrafficStep:
+def emptied(step: TrafficStep) -> TrafficStep:
     """The same without any vehicle."""
     state = step.traffic
     kept = {"time", "signals", "persons", "pieces"}
@@ -37,19 +37,19 @@ def nobody(step: TrafficStep) -> TrafficStep:
     return dataclasses.replace(step, traffic=dataclasses.replace(state, **empty), truth=truth)
 
 
-NO_ROAD = np.zeros((0, 4))
+ROAD = np.array([[25.0, 30.0, 0.0, 5.0], [75.0, 28.0, 0.05, 4.0], [175.0, 20.0, 0.04, 4.0]])
 
 
 def recorded(
-    folder: Path, steps: list[TrafficStep], complete: bool = True, road: NDArray[np.float64] = NO_ROAD
-) -> Path:
+    folder: Path, steps: list[TrafficStep], complete: bool = True, road: NDArray[np.float64] = ROAD[:0]
+) -> Page:
     metrics = TrafficRunMetrics()
     with RunDirectory(folder) as directory:
         directory.begin({})
         meanings = metrics.summary().meanings
         summary = metrics.summary
         information = RunInformation(
-            directory, "Everybody", "", 5, (), 0.5, lambda: summary().to_json(), meanings, lambda: road
+            directory, "All", "", 5, (), 0.5, lambda: summary().to_json(), meanings, lambda: road
         )
         recorders = [make(information) for make in TRAFFIC_RECORDERS.values()]
         for step in steps:
@@ -59,11 +59,12 @@ def recorded(
         for recorder in recorders:
             recorder.close(complete)
         directory.finish({})
-    return folder
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
-def test_a_row_of_the_table_is_of_everybody(tmp_path: Path) -> None:
-    table = parquet.read_table(recorded(tmp_path, some_steps()) / "steps.parquet")
+def test_table_and_report_are_of_all_vehicles(tmp_path: Path) -> None:
+    page = recorded(tmp_path, some_steps(), road=ROAD)
+    table = parquet.read_table(tmp_path / "steps.parquet")
     columns = table.to_pydict()
     assert columns["time_s"] == [0.0, 0.5, 1.0]
     assert columns["n_vehicles"] == [2, 2, 2]
@@ -76,31 +77,22 @@ def test_a_row_of_the_table_is_of_everybody(tmp_path: Path) -> None:
     assert columns["least_visibility_m"] == pytest.approx([50.0, None, 100.0])
     assert not {"route_position_m", "believed_visibility_m", "leader_gap_m", "lamps"} & set(columns)
     assert table.schema.metadata[b"fogsim.complete"] == b"true"
-
-
-def test_a_network_without_vehicles_has_rows_and_figures_too(tmp_path: Path) -> None:
-    steps = [nobody(step) for step in some_steps()]
-    row = parquet.read_table(recorded(tmp_path, steps) / "steps.parquet").to_pylist()[0]
-    assert (row["n_vehicles"], row["mean_speed_mps"], row["least_visibility_m"]) == (0, None, None)
-
-
-def test_the_report_is_of_everybody(tmp_path: Path) -> None:
-    page = Page((recorded(tmp_path, some_steps()) / "report.html").read_text(encoding="utf-8"))
-    assert len(page.images) == 3
+    assert len(page.images) == 4
     assert "traffic mean speed" in page.text
+    assert "Over the road of traffic.along" in page.text
     for word in ("of the ego", "camera", "Gap"):
         assert word not in page.text.split("Timeline")[1].split("All metrics")[0]
 
 
-def test_the_report_has_speed_over_a_road_that_is_named(tmp_path: Path) -> None:
-    road = np.array([[25.0, 30.0, 0.0, 5.0], [75.0, 28.0, 0.05, 4.0], [175.0, 20.0, 0.04, 4.0]])
-    page = Page((recorded(tmp_path, some_steps(), road=road) / "report.html").read_text(encoding="utf-8"))
-    assert len(page.images) == 4
-    assert "Over the road of traffic.along" in page.text
+def test_a_network_without_vehicles_has_rows_and_figures_too(tmp_path: Path) -> None:
+    page = recorded(tmp_path, [emptied(step) for step in some_steps()])
+    row = parquet.read_table(tmp_path / "steps.parquet").to_pylist()[0]
+    assert (row["n_vehicles"], row["mean_speed_mps"], row["least_visibility_m"]) == (0, None, None)
+    assert len(page.images) == 3
 
 
 def test_an_interrupted_report_says_so_and_that_there_were_steps(tmp_path: Path) -> None:
-    page = Page((recorded(tmp_path, some_steps(), complete=False) / "report.html").read_text(encoding="utf-8"))
+    page = recorded(tmp_path, some_steps(), complete=False)
     assert "PARTIAL: interrupted at t = 1.0 s" in page.text
     assert "Figures are of whole runs" in page.text
 

@@ -22,11 +22,8 @@ def handed_out(*kinds: FaultKind, begin: int = 3, end: int = 8, count: int = 12)
 PLAIN = [(float(second), second + 1) for second in range(12)]
 
 
-def test_without_faults_each_picture_is_handed_out_at_once() -> None:
-    assert handed_out() == PLAIN
-
-
 def test_black_frames_bear_their_own_time() -> None:
+    assert handed_out() == PLAIN
     assert handed_out(Blackout()) == [*PLAIN[:3], *((float(s), 0) for s in range(3, 8)), *PLAIN[8:]]
 
 
@@ -45,6 +42,7 @@ def test_late_frames_leave_a_gap_first_and_are_overtaken_at_last() -> None:
     ]
     stamped = handed_out(Latency(2.0, TimeStamp.DELIVERY))
     assert stamped[5:8] == [(5.0, 4), (6.0, 5), (7.0, 6)]
+    assert handed_out(Latency(2.0, TimeStamp.EXPOSURE), begin=0)[:3] == [(0.0, 0), (0.0, 0), (0.0, 1)]
 
 
 def test_frames_get_lost_at_the_rate_that_is_asked_for() -> None:
@@ -54,7 +52,3 @@ def test_frames_get_lost_at_the_rate_that_is_asked_for() -> None:
     assert lost == pytest.approx(0.3, abs=0.065)
     assert handed_out(DroppedFrames(1.0))[3:8] == [PLAIN[2]] * 5
     assert handed_out(DroppedFrames(0.0)) == PLAIN
-
-
-def test_a_camera_that_has_not_yet_handed_out_anything_is_black() -> None:
-    assert handed_out(Latency(2.0, TimeStamp.EXPOSURE), begin=0)[:3] == [(0.0, 0), (0.0, 0), (0.0, 1)]

@@ -1,6 +1,7 @@
 """Dirt, water and glare before the camera."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ GREY = np.full((240, 320, 3), 50.0, np.float32)
 HALF = np.where(np.arange(240)[:, None, None] < 120, 100.0, 10.0).astype(np.float32) * np.ones((1, 320, 3), np.float32)
 
 
-def seen(radiance: np.ndarray, *kinds: FaultKind, seed: int = 4) -> np.ndarray:
+def seen(radiance: np.ndarray, *kinds: FaultKind, seed: int = 4, camera: Camera = CAMERA) -> np.ndarray:
     faults = [RunningFault(Fault(kind), 0.0, math.inf, np.random.default_rng(seed)) for kind in kinds]
-    return FaultyLens().look_through(radiance, CAMERA, faults)
+    return FaultyLens().look_through(radiance, camera, faults)
 
 
 def test_circles_share_what_geometry_says() -> None:
@@ -41,27 +42,22 @@ def test_blots_take_as_much_light_as_they_cover() -> None:
 
 
 def test_a_blot_smaller_than_the_pupil_hides_its_share_of_it_and_is_as_wide() -> None:
-    (blot,) = [scattered_blots(CAMERA, 0.3, 0.001, np.random.default_rng(1))]
-    one = blot._replace(right=np.zeros(1), down=np.zeros(1), radius=np.array([0.5 * PUPIL]))
+    one = scattered_blots(CAMERA, 0.3, 0.001, np.random.default_rng(1))._replace(
+        right=np.zeros(1), down=np.zeros(1), radius=np.array([0.5 * PUPIL])
+    )
     passed = passed_light(CAMERA, one)[..., 0]
     assert passed[120, 160] == pytest.approx(1.0 - 0.25)
     reach = 1.5 * PUPIL * CAMERA.focal_length
     assert np.flatnonzero(passed[120] < 1.0).max() - 160 == pytest.approx(reach, abs=1.0)
 
 
-def test_faults_of_the_signal_leave_the_light_alone() -> None:
+def test_water_dirt_as_bright_as_an_even_scene_and_faults_of_the_signal_leave_its_light_alone() -> None:
     assert seen(GREY, FrozenFrame(TimeStamp.DELIVERY)) is GREY
-
-
-def test_dirt_as_bright_as_the_picture_is_not_seen_before_an_even_scene() -> None:
+    np.testing.assert_allclose(seen(GREY, WetLens(0.3, 0.004, 0.005)), GREY, rtol=1e-3)
     np.testing.assert_allclose(seen(GREY, DirtyLens(0.1, 0.002, 1.0)), GREY, rtol=1e-5)
     dark = seen(GREY, DirtyLens(0.2, 0.004, 0.0))
     assert dark.min() < 0.05 * 50.0
     assert dark.max() == pytest.approx(50.0)
-
-
-def test_water_makes_and_takes_no_light_of_an_even_scene() -> None:
-    np.testing.assert_allclose(seen(GREY, WetLens(0.3, 0.004, 0.005)), GREY, rtol=1e-3)
 
 
 def test_drops_show_the_scene_upside_down() -> None:
@@ -87,8 +83,7 @@ def test_dirt_stays_where_it_is_until_it_is_another_fault() -> None:
 
 def test_a_source_adds_its_illuminance_and_a_veil_that_falls_with_the_angle() -> None:
     camera = Camera(320, 240, 1000.0, (160.0, 120.0), 1.4)
-    fault = RunningFault(Fault(Glare(0.0, 0.0, 1000.0, 1.0)), 0.0, math.inf, np.random.default_rng(0))
-    glare = FaultyLens().look_through(np.zeros((240, 320, 3), np.float32), camera, [fault])[..., 0].astype(float)
+    glare = seen(np.zeros_like(GREY), Glare(0.0, 0.0, 1000.0, 1.0), camera=camera)[..., 0].astype(float)
     # The sun's disc of 0.27° is 4.7 px here; its light over the solid angle of the pixels is its illuminance.
     disc = glare[110:131, 150:171]
     assert (disc - disc[0, 0]).sum() / 1000.0**2 == pytest.approx(1000.0, rel=0.05)
@@ -99,10 +94,8 @@ def test_a_source_adds_its_illuminance_and_a_veil_that_falls_with_the_angle() ->
 
 
 def test_a_source_on_the_left_and_above_is_drawn_there_whatever_the_pitch() -> None:
-    camera = Camera(320, 240, 290.0, (160.0, 120.0), 1.4, pitch=math.radians(5.0))
     glare = Glare(math.radians(10.0), math.radians(4.0), 1000.0, 1.0)
-    fault = RunningFault(Fault(glare), 0.0, math.inf, np.random.default_rng(0))
-    bright = FaultyLens().look_through(np.zeros((240, 320, 3), np.float32), camera, [fault])[..., 0]
+    bright = seen(np.zeros_like(GREY), glare, camera=replace(CAMERA, pitch=math.radians(5.0)))[..., 0]
     row, column = np.unravel_index(int(bright.argmax()), bright.shape)
     # tan 10° to the left of the axis, over cos 5° of the way along it; 4° and 5° above it.
     assert int(column) == pytest.approx(160 - 290 * math.tan(math.radians(10.0)), abs=2.5)

@@ -19,21 +19,15 @@ LAYER = FogField(0.02, (1000.0, 1000.0, 1000.0), top=60.0, top_edge=20.0)
 def test_airlight_is_that_of_a_white_diffuser_times_its_share() -> None:
     assert luminance_of(airlight_from_illuminance(10_000.0)) == pytest.approx(0.406 * 10_000.0 / math.pi, rel=3e-3)
     assert airlight_from_illuminance(0.0) == (0.0, 0.0, 0.0)
-
-
-def test_impossible_light_is_refused() -> None:
     for illuminance in [-1.0, math.nan, math.inf]:
         with pytest.raises(ValueError, match="illuminance must be finite and not negative"):
             airlight_from_illuminance(illuminance)
 
 
-def test_without_shading_there_is_nothing_to_add() -> None:
-    assert airlight_source(LAYER, frustum_grid(LAYER, CAMERA, POSE)) is None
-
-
 def test_a_path_upward_is_brighter_and_one_along_the_ground_as_it_was() -> None:
     shaded = dataclasses.replace(LAYER, airlight_shading=0.1)
     grid = frustum_grid(shaded, CAMERA, POSE)
+    assert airlight_source(LAYER, grid) is None
     source = airlight_source(shaded, grid)
     assert source is not None
     assert source.shape[-1] == 3

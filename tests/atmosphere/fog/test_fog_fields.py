@@ -24,7 +24,7 @@ from tests.atmosphere.fields import AIRLIGHT, BANK, PATCHES, UNEVEN, brute_force
 GROUND_FOG = FogField(0.05, AIRLIGHT, scale_height=4.0)
 
 
-def test_ground_fog_has_its_closed_form() -> None:
+def test_ground_fog_has_its_closed_form_and_is_not_surely_anywhere() -> None:
     # τ = k h (e^(−z₁/h) − e^(−z₂/h)) / sin γ
     start, end = np.array([5.0, 6.0, 1.2]), np.array([85.0, 6.0, 9.5])
     slope = (end[2] - start[2]) / np.linalg.norm(end - start)
@@ -32,10 +32,9 @@ def test_ground_fog_has_its_closed_form() -> None:
     assert optical_depth(GROUND_FOG, start, end) == pytest.approx(expected, rel=1e-6)
     level = np.array([85.0, 6.0, 1.2])
     assert optical_depth(GROUND_FOG, start, level) == pytest.approx(80.0 * 0.05 * math.exp(-0.3), rel=1e-6)
-
-
-def test_ground_fog_upwards_without_end_is_its_scale_height_thick() -> None:
     assert optical_depth(GROUND_FOG, (0, 0, 0), (0, 0, 1e5)) == pytest.approx(0.05 * 4.0, rel=1e-6)
+    assert FieldAccess(GROUND_FOG).minimum_extinction == 0.0
+    assert FieldAccess(UNEVEN["lifted"]).minimum_extinction == 0.0
 
 
 def test_a_soft_layer_weighs_as_much_as_a_sharp_one() -> None:
@@ -131,15 +130,12 @@ def test_patches_keep_the_mean_and_have_their_strength_and_correlation() -> None
     assert np.corrcoef(log.ravel(), np.roll(log, 3 * PATCH_CELLS, axis=1).ravel())[0, 1] == pytest.approx(0.0, abs=0.08)
 
 
-def test_patches_differ_by_seed_and_repeat_with_it() -> None:
+def test_patches_differ_by_seed_repeat_with_it_and_are_even_without_strength() -> None:
     places = np.random.default_rng(0).uniform(0, 500, (50, 3))
     one, other = (extinction(FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.8, s)), places) for s in (1, 2))
     again = extinction(FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.8, 1)), places)
     assert np.array_equal(one, again)
     assert not np.allclose(one, other, rtol=0.1)
-
-
-def test_patches_without_strength_are_even() -> None:
     field = FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.0))
     assert optical_depth(field, (0, 0, 0), (300, 0, 5)) == pytest.approx(0.01 * math.hypot(300, 5))
 
@@ -160,9 +156,6 @@ def test_fog_thickens_and_lifts_over_time() -> None:
     assert float(extinction(field, low, 15.0)) == pytest.approx(0.015)
     assert float(extinction(field, low, 20.0)) == 0.0  # the base is at 3 m
     assert [float(extinction(field, high, time)) for time in (10.0, 25.0, 99.0)] == pytest.approx([0.0, 0.025, 0.03])
-
-
-def test_a_field_that_does_not_change_is_its_own_state() -> None:
     assert field_at(GROUND_FOG, 12.0) is GROUND_FOG
 
 
@@ -190,11 +183,6 @@ def test_fog_now_is_the_fog_of_the_time_that_was_set() -> None:
     assert now.minimum_extinction == FieldAccess(field).minimum_extinction
 
 
-def test_ground_fog_is_not_surely_anywhere() -> None:
-    assert FieldAccess(GROUND_FOG).minimum_extinction == 0.0
-    assert FieldAccess(UNEVEN["lifted"]).minimum_extinction == 0.0
-
-
 def test_impossible_fields_are_refused() -> None:
     for make, told in [
         (lambda: FogBank((0.0, 0.0), (1.0, 0.0), 200.0, 100.0, 10.0, 0.01), "end beyond its start"),
@@ -207,10 +195,7 @@ def test_impossible_fields_are_refused() -> None:
         (lambda: FogField(0.01, (1.0, -1.0, 1.0)), "airlight"),
         (lambda: FogField(0.01, AIRLIGHT, scale_height=0.0), "scale height"),
         (lambda: FogField(0.01, AIRLIGHT, base=20.0, top=10.0), "above its base"),
-        (
-            lambda: FogField(0.01, AIRLIGHT, changes=(FogChange(5.0, 1.0, 0.0, 9.0), FogChange(5.0, 1.0, 0.0, 9.0))),
-            "increase",
-        ),
+        (lambda: FogField(0.01, AIRLIGHT, changes=(FogChange(5.0, 1.0, 0.0, 9.0),) * 2), "increase"),
     ]:
         with pytest.raises(InputError, match=told):
             make()

@@ -12,14 +12,9 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogChange, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 from tests.atmosphere.fields import AIRLIGHT, BANK, CAMERA, POSE, UNEVEN, brute_force
+from tests.atmosphere.night_scene import rays
 
 SMALL = Camera(160, 120, 144.0, (80, 60), 1.38, 0.035)
-
-
-def rays(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-    directions = np.stack((u, v, np.ones_like(u)), axis=-1) @ ray_from_pixel(camera, pose).T
-    return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
 
 def black_road(camera: Camera, pose: CameraPose) -> View:
@@ -78,15 +73,6 @@ def test_the_grid_agrees_with_the_closed_form(field: FogField) -> None:
     assert np.sqrt(np.mean(np.square(transmittance(through_grid) - transmittance(exact)))) <= 0.002
 
 
-def test_grid_depths_are_optical_depths() -> None:
-    grid = frustum_grid(UNEVEN["shallow layer"], CAMERA, POSE)
-    assert grid.depth.shape == grid.extinction.shape == (*grid.directions.shape[:2], len(grid.distances))
-    assert grid.distances[0] == 0.0
-    assert np.all(np.diff(grid.distances) > 0)
-    assert np.all(np.diff(grid.depth, axis=-1) >= 0)
-    assert np.all(grid.depth[..., 0] == 0.0)
-
-
 def test_a_source_on_the_grid_comes_to_the_pixels() -> None:
     grid = frustum_grid(UNEVEN["ground fog"], SMALL, POSE)
     view = black_road(SMALL, POSE)
@@ -141,11 +127,8 @@ def test_shaded_airlight_is_darker_where_fog_is_deep_and_the_field_s_own_on_the_
     # At the ground the shaded airlight is the even one; upwards there is less fog overhead, and more light.
     assert np.allclose(other[level], one[level], rtol=0.02)
     assert np.all(other[up] > 1.02 * one[up])
-
-
-def test_shading_does_not_touch_a_level_view_through_a_deep_layer() -> None:
     even = FogField(0.05, AIRLIGHT, top=250.0)
-    view = black_road(SMALL, POSE)
+    # Nor is a level view through a deep layer touched.
     row = round(SMALL.horizon_row)
     one, other = (Air(dataclasses.replace(even, airlight_shading=s)).radiance(view, SMALL, POSE)[row] for s in (0, 0.1))
     assert np.allclose(other, one, rtol=0.02)

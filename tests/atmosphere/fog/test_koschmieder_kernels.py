@@ -3,14 +3,18 @@
 import math
 
 import numpy as np
+import pytest
 
 from fogsim.atmosphere import fogged_radiance, optical_depth
 from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
+from fogsim.units import CONTRAST_THRESHOLD, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
+from tests.atmosphere.night_scene import rays
 
 AIRLIGHT = (2900.0, 3000.0, 3100.0)
 CAMERA = Camera(160, 120, 144.0, (80, 60), 1.38, 0.035)
+POSE = CameraPose((10.0, 20.0, 1.38), 0.7)
 
 
 def exponential(depth: np.ndarray) -> np.ndarray:
@@ -23,9 +27,6 @@ def test_transmission_against_the_exponential_in_double_precision() -> None:
     depth = np.concatenate((np.linspace(0.0, 90.0, 300_001), np.geomspace(1e-9, 1.0, 10_000))).astype(np.float32)
     error = np.abs(exponential(depth) - np.exp(-depth.astype(np.float64)))
     assert error.max() < 3e-7
-
-
-def test_transmission_of_nothing_and_of_everything() -> None:
     seen = exponential(np.array([0.0, -0.0, 1e7, 3.4e38, np.inf]))
     assert np.array_equal(seen[:2], [1.0, 1.0])
     assert np.all(seen[2:] >= 0)
@@ -54,11 +55,51 @@ def test_every_direction_through_a_bank_within_a_12_bit_step() -> None:
             distance = np.random.default_rng(3).uniform(1.0, 400.0, shape).astype(np.float32)
             pose = CameraPose((station, 5.0, 1.38), turn)
             black = View(np.zeros((*shape, 3), np.float32), distance, np.zeros(shape, np.int32))
-            seen = (
-                1.0 - fogged_radiance(black, field, pose.position, ray_from_pixel(CAMERA, pose))[..., 1] / AIRLIGHT[1]
-            )
-            v, u = np.mgrid[0 : CAMERA.height, 0 : CAMERA.width]
-            rays = np.stack((u, v, np.ones_like(u)), axis=-1) @ ray_from_pixel(CAMERA, pose).T
-            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-            depth = optical_depth(field, pose.position, np.array(pose.position) + distance[..., None] * rays)
+            light = fogged_radiance(black, field, pose.position, ray_from_pixel(CAMERA, pose))
+            seen = 1.0 - light[..., 1] / AIRLIGHT[1]
+            ends = np.array(pose.position) + distance[..., None] * rays(CAMERA, pose)
+            depth = optical_depth(field, pose.position, ends)
             assert np.abs(seen - np.exp(-depth)).max() < 1.0 / 4095.0
+
+
+def drawn(radiance: float, distance: float, field: FogField) -> np.ndarray:
+    shape = (CAMERA.height, CAMERA.width)
+    light, far = np.full((*shape, 3), radiance, np.float32), np.full(shape, distance, np.float32)
+    view = View(light, far, np.zeros(shape, np.int32))
+    return fogged_radiance(view, field, POSE.position, ray_from_pixel(CAMERA, POSE))
+
+
+@pytest.mark.parametrize("visibility", [30.0, 100.0, 400.0])
+def test_a_black_target_at_the_visibility_shows_five_percent_contrast(visibility: float) -> None:
+    field = FogField(extinction_from_visibility(visibility), AIRLIGHT)
+    seen = drawn(0.0, visibility, field)
+    contrast = (np.array(AIRLIGHT) - seen) / np.array(AIRLIGHT)
+    assert np.allclose(contrast, CONTRAST_THRESHOLD, atol=1e-6)
+
+
+def test_clear_air_and_no_distance_change_nothing_and_endless_fog_is_airlight() -> None:
+    for distance in (5.0, math.inf):
+        assert (drawn(123.0, distance, FogField(0.0, AIRLIGHT)) == 123.0).all()
+    assert np.allclose(drawn(123.0, 0.0, FogField(0.1, AIRLIGHT)), 123.0)
+    assert np.allclose(drawn(9e4, math.inf, FogField(0.001, AIRLIGHT)), AIRLIGHT)
+
+
+def test_every_pixel_of_a_bank_agrees_with_the_optical_depth() -> None:
+    bank = FogBank((10.0, 20.0), (math.cos(0.5), math.sin(0.5)), 20.0, 90.0, 30.0, 0.05)
+    field = FogField(0.002, AIRLIGHT, (bank,), top=15.0)
+    seen = drawn(0.0, 120.0, field)
+    depth = optical_depth(field, POSE.position, np.array(POSE.position) + 120.0 * rays(CAMERA, POSE))
+    expected = np.array(AIRLIGHT) * (1 - np.exp(-depth))[..., None]
+    assert np.allclose(seen, expected, rtol=1e-5, atol=1e-2)
+
+
+def test_sky_is_seen_through_the_layer_only() -> None:
+    field = FogField(0.01, AIRLIGHT, top=11.38)
+    seen = drawn(5000.0, math.inf, field)
+    top_left = ray_from_pixel(CAMERA, POSE) @ (0.0, 0.0, 1.0)
+    transmittance = math.exp(-0.01 * 10.0 * np.linalg.norm(top_left) / top_left[2])
+    assert seen[0, 0, 1] == pytest.approx(5000.0 * transmittance + 3000.0 * (1 - transmittance), rel=1e-5)
+    field = FogField(0.06, AIRLIGHT, top=POSE.position[2])
+    seen = drawn(0.0, 20.0, field)
+    assert seen[100, 80, 1] == pytest.approx(3000.0 * (1 - math.exp(-0.06 * 20.0)), rel=1e-4)
+    assert seen[20, 80, 1] == pytest.approx(0.0, abs=0.01)

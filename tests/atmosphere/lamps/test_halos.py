@@ -89,6 +89,13 @@ def test_what_the_renderer_drew_is_not_added_again():
     whole = 100.0 / far**2 * 576.9**2
     view.radiance[239, 319] = 0.75 * whole
     assert flux(drawn(fog(math.inf), lamps(place), view), place) == pytest.approx(0.25 * 100.0 / far**2, rel=0.01)
+    # Two lamps close together share it.
+    left, right = (200.0, 0.2, 1.5), (200.0, -0.2, 1.5)
+    view.radiance[239, 319] = whole
+    assert flux(drawn(fog(math.inf), lamps(left, right), view), (200.0, 0.0, 1.5)) == pytest.approx(0.0025, rel=0.02)
+    # Nor is the background of a tiny lamp its light.
+    dusk = dataclasses.replace(empty_view(CAMERA), radiance=np.full((480, 640, 3), 30.0, np.float32))
+    assert flux(drawn(fog(math.inf), lamps(place), dusk), place) == pytest.approx(100.0 / 200.0**2, rel=0.01)
 
 
 def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity():
@@ -109,18 +116,6 @@ def test_a_lamp_in_daylight_does_not_darken_the_white_paint_around_it():
     out = view.radiance.copy()
     Halos().add(out, view, CAMERA, POSE, fog(math.inf), lamps((200.0, 0.0, 1.5)))
     assert (out >= view.radiance).all()
-
-
-def test_two_lamps_close_together_share_what_was_drawn():
-    left, right = (200.0, 0.2, 1.5), (200.0, -0.2, 1.5)
-    view = empty_view(CAMERA)
-    whole = 100.0 / 200.0**2 * 576.9**2
-    view.radiance[239, 319] = whole
-    assert flux(drawn(fog(math.inf), lamps(left, right), view), (200.0, 0.0, 1.5)) == pytest.approx(0.0025, rel=0.02)
-
-
-def test_lamps_behind_something_send_no_direct_light():
-    assert drawn(fog(math.inf), lamps((200.0, 0.0, 1.5)), empty_view(CAMERA, 50.0)).max() == 0.0
 
 
 def test_lamps_behind_something_do_not_shine_through():
@@ -152,11 +147,9 @@ def test_lamps_lost_in_the_light_of_others_are_left_out():
     assert drawn(fog(100), lamps(bright)).max() > 0.0
 
 
-def test_large_lamps_are_left_to_the_renderer():
+def test_lamps_behind_something_or_the_camera_large_or_dark_are_not_drawn():
+    assert drawn(fog(math.inf), lamps((200.0, 0.0, 1.5)), empty_view(CAMERA, 50.0)).max() == 0.0
     assert drawn(fog(math.inf), lamps((20.0, 0.0, 1.5), area=0.02)).max() == 0.0
-
-
-def test_lamps_behind_the_camera_or_dark_are_not_seen():
     assert drawn(fog(100), lamps((-20.0, 0.0, 1.5))).max() == 0.0
     assert drawn(fog(100), lamps((20.0, 0.0, 1.5), intensity=0.0)).max() == 0.0
     assert drawn(fog(100), lamps()).max() == 0.0
@@ -172,9 +165,3 @@ def test_colour_of_a_lamp_is_that_of_its_glow():
     ours = drawn(fog(100), lamps((40.0, 0.0, 1.5), colour=(2.0, 0.5, 0.25)))[240, ::40]
     assert ours[:, 0] == pytest.approx(4 * ours[:, 1], rel=1e-4)
     assert ours[:, 2] == pytest.approx(0.5 * ours[:, 1], rel=1e-4)
-
-
-def test_the_background_of_a_tiny_lamp_is_not_its_light():
-    place = (200.0, 0.0, 1.5)
-    dusk = dataclasses.replace(empty_view(CAMERA), radiance=np.full((480, 640, 3), 30.0, np.float32))
-    assert flux(drawn(fog(math.inf), lamps(place), dusk), place) == pytest.approx(100.0 / 200.0**2, rel=0.01)

@@ -36,9 +36,6 @@ def test_the_sharp_table_holds_the_beam() -> None:
 def test_blurring_leaves_even_light_even_near_the_axis() -> None:
     middle = slice(place(-0.1), place(0.1))
     assert lamp_table(EVEN)[:6, middle, middle] == pytest.approx(700.0, rel=1e-4)
-
-
-def test_the_peak_falls_with_each_blur() -> None:
     assert np.all(np.diff(lamp_table(low_beam()).max(axis=(1, 2))) < 0)
 
 

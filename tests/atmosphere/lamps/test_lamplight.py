@@ -83,10 +83,12 @@ def test_veil_hardly_changes_when_fog_hardly_changes():
     assert np.array_equal(drawn(fog(100.0), painter=painter), before)
 
 
-def test_uneven_fog_that_is_even_looks_even():
+def test_uneven_fog_that_is_even_looks_even_and_a_turning_vehicle_sees_the_same():
     field = fog(100)
     bank = FogBank((0.0, 0.0), (1.0, 0.0), 10.0, 40.0, 5.0, 1e-9)
     assert drawn(dataclasses.replace(field, banks=(bank,))) == pytest.approx(drawn(field), rel=0.02, abs=1e-5)
+    turned = dataclasses.replace(POSE, heading=1.0)
+    assert drawn(fog(100), pose=turned) == pytest.approx(drawn(fog(100)), rel=1e-4, abs=1e-6)
 
 
 def test_bank_ahead_shines_only_ahead():
@@ -96,11 +98,6 @@ def test_bank_ahead_shines_only_ahead():
     before = (road > 4.0) & (road < 25.0)
     assert veil[before][:, 0] == pytest.approx(road_light(0.0)[before], rel=0.06)
     assert 0.0 < sky < drawn(fog(50))[50, 80, 0]
-
-
-def test_turning_vehicle_sees_the_same_by_its_own_lamps():
-    turned = dataclasses.replace(POSE, heading=1.0)
-    assert drawn(fog(100), pose=turned) == pytest.approx(drawn(fog(100)), rel=1e-4, abs=1e-6)
 
 
 def test_lamps_in_one_housing_and_colours_add():
@@ -131,16 +128,13 @@ def test_air_adds_lamplight_to_twilight():
     assert 0.005 * drawn(field).sum() < (road - lit).sum() < 0.05 * drawn(field).sum()
 
 
-def test_preparing_changes_nothing():
+def test_preparing_changes_nothing_and_light_in_the_air_is_computed_once_a_process(monkeypatch):
     field, lights = fog(100), Lights(LOW, LightSources.none())
     prepared, fresh = Air(field), Air(field)
     prepared.prepare(CAMERA, [LOW])
     assert np.array_equal(
         prepared.radiance(road_view(), CAMERA, POSE, lights), fresh.radiance(road_view(), CAMERA, POSE, lights)
     )
-
-
-def test_light_in_the_air_is_computed_once_a_process(monkeypatch):
     OwnLamplight().prepare(CAMERA, LOW)
     monkeypatch.setattr(lamplight, "lit_air", lambda *_: pytest.fail("computed anew"))
     OwnLamplight().prepare(CAMERA, LOW)

@@ -23,14 +23,11 @@ def test_values_are_those_of_another_mie_code():
         assert ours == pytest.approx(table[droplets], rel=0.07)
 
 
-def test_all_light_goes_somewhere():
+def test_all_light_goes_somewhere_and_mostly_ahead():
     for droplets in Droplets:
         assert over_the_sphere(phase_function(droplets)) == pytest.approx(1.0, abs=2e-3)
-
-
-@pytest.mark.parametrize(("droplets", "mean"), MEAN_COSINE.items())
-def test_mean_cosine(droplets, mean):
-    assert over_the_sphere(phase_function(Droplets(droplets)), np.cos) == pytest.approx(mean, abs=2e-3)
+    for droplets, mean in MEAN_COSINE.items():
+        assert over_the_sphere(phase_function(Droplets(droplets)), np.cos) == pytest.approx(mean, abs=2e-3)
 
 
 def test_henyey_greenstein():

@@ -10,7 +10,6 @@ from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.veil import (
     FOLD_DISTANCE,
     INTERVALS,
-    LitAir,
     VeilRays,
     integrate_veil,
     lit_air,
@@ -107,27 +106,20 @@ def test_level_is_that_of_gallen_at_100_m(tables, droplets, kind):
     assert 1.2 < up_to(veil_along(air, k, k)[0], 40.0) / high_beam_veil(100.0, kind) < 1.7
 
 
-def test_veil_grows_along_the_ray_and_vanishes_in_clear_air(tables):
+def test_veil_grows_along_the_ray_through_fog_and_light_of_lamps_adds(tables):
     air = air_on(one_ray(0.0, 0.0), tables["low"], "heavy_radiation")
     veil = veil_along(air, everywhere(100.0), everywhere(100.0))[0]
     assert veil[0] == 0.0
     assert np.all(np.diff(veil) >= 0)
     assert veil_along(air, everywhere(math.inf), everywhere(math.inf)).max() == 0.0
-
-
-def test_fog_that_begins_farther_away_lights_only_there(tables):
-    air = air_on(one_ray(0.0, 0.0), tables["low"], "heavy_radiation")
+    # Fog that begins farther away lights only there.
     beyond = node_distances()[1:] > 30.0
     local = np.where(beyond, 0.03, 0.0).astype(np.float32)[None]
     mean = (np.cumsum(local[0] * np.diff(node_distances())) / node_distances()[1:]).astype(np.float32)[None]
     veil = veil_along(air, local, mean)[0]
     assert veil[:-1][node_distances()[:-1] <= 30.0].max() == 0.0
     assert veil[-1] > 0.0
-
-
-def test_light_of_lamps_adds(tables):
     ray = one_ray(0.0, -3.0)
     both = air_on(ray, tables["low"], "heavy_radiation")
     one, other = (lit_air(ray, [(place, tables["low"])], Droplets.HEAVY_RADIATION) for place in PLACES)
-    assert isinstance(both, LitAir)
     assert both.straight == pytest.approx(one.straight + other.straight, rel=1e-5)

@@ -73,23 +73,14 @@ def test_behind_lamps_and_above_them_there_is_no_light() -> None:
     place, seen = places()
     assert added()[seen & (place[..., 0] > 62.0)].max() == 0.0
     wall = road()
-    wall.distance[:] = 20.0
-    wall.radiance[:] = REFLECTANCE * SKY / math.pi
-    lit = TrafficLight().on(wall, CAMERA, POSE, fog(math.inf), COMING).radiance - wall.radiance
-    height = POSE.position[2] + 20.0 * rays()[..., 2]
-    assert lit[height > 1.7].max() == 0.0
-    assert lit[(height > 0.0) & (height < 0.6)].max() > 0.0
-
-
-def test_below_sea_level_there_is_no_light_above_the_lamps_either() -> None:
-    wall = road()
     wall.distance[:], wall.radiance[:] = 20.0, REFLECTANCE * SKY / math.pi
-    pose = dataclasses.replace(POSE, position=(0.0, 0.0, POSE.position[2] - 10.0))
-    lower = dataclasses.replace(COMING, position=COMING.position - (0.0, 0.0, 10.0))
-    lit = TrafficLight().on(wall, CAMERA, pose, fog(math.inf), lower).radiance - wall.radiance
     height = POSE.position[2] + 20.0 * rays()[..., 2]
-    assert lit[height > 1.7].max() == 0.0
-    assert lit[(height > 0.0) & (height < 0.6)].max() > 0.0
+    for below_sea_level in (0.0, 10.0):
+        pose = dataclasses.replace(POSE, position=(0.0, 0.0, POSE.position[2] - below_sea_level))
+        lower = dataclasses.replace(COMING, position=COMING.position - (0.0, 0.0, below_sea_level))
+        lit = TrafficLight().on(wall, CAMERA, pose, fog(math.inf), lower).radiance - wall.radiance
+        assert lit[height > 1.7].max() == 0.0
+        assert lit[(height > 0.0) & (height < 0.6)].max() > 0.0
 
 
 def test_light_follows_the_road_uphill() -> None:

@@ -41,10 +41,7 @@ def test_road_returns_the_lamps_light_as_the_skys():
     light, near = formula()
     assert added()[near][:, 1] == pytest.approx(light[near], rel=0.05)
     assert added()[~np.isfinite(road_view().distance)].max() == 0.0
-
-
-def test_fog_takes_a_little_of_the_light():
-    field = fog(100)
+    field = fog(100)  # takes a little of the light
     light, near = formula(0.3 * field.extinction)
     assert added(field=field)[near][:, 1] == pytest.approx(light[near], rel=0.05)
 
@@ -78,15 +75,12 @@ def test_map_stays_as_the_camera_drives_and_moves_on_with_it():
     assert light == pytest.approx(np.full(15, light[0]), rel=0.05)
 
 
-def test_what_hangs_above_the_lamps_stays_dark():
-    high = dataclasses.replace(EVEN, position=LAMP - np.array((0.0, 0.0, 8.0)))
-    assert added(lamps=dataclasses.replace(high, height=8.0)).max() < 0.02 * added().max()
-
-
-def test_what_shines_itself_returns_no_more_than_white():
+def test_what_shines_itself_returns_no_more_than_white_and_what_hangs_above_the_lamps_is_dark():
     bright = added(road(1e4))
     light, near = formula()
     assert bright[near][:, 1] == pytest.approx(0.95 / REFLECTANCE * light[near], rel=0.06, abs=2e-3)
+    high = dataclasses.replace(EVEN, position=LAMP - np.array((0.0, 0.0, 8.0)))
+    assert added(lamps=dataclasses.replace(high, height=8.0)).max() < 0.02 * added().max()
 
 
 @pytest.mark.parametrize(

@@ -9,39 +9,19 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.render import RENDERERS, Renderer, RenderError, best_renderer, make_renderer
 from fogsim.render.cpu.rasteriser import CPURasteriser
-from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable
+from fogsim.render.drawing import NEAR, MeshTable
 from fogsim.render.renderer import shapes_of
 from fogsim.render.shading.surfaces import retroreflection
 from fogsim.scene import vehicle_batches
 from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Surface
-from fogsim.values.pinhole import camera_axes, ray_from_pixel
+from fogsim.values.pinhole import camera_axes
+from tests.render.conftest import drawing_of, joined, mesh, rays, rectangle
 
 CAMERA = Camera(320, 240, 288.0, (160.0, 120.0), 1.38, pitch=math.radians(2.0))
 AHEAD = CameraPose((0.0, 0.0, 1.38), heading=0.0)
 ILLUMINANCE = 18e3
 WEIGHTS = (0.2126, 0.7152, 0.0722)
-
-
-def mesh(corners: Any, surface: Surface = Surface.MATT, road: Any = None, instance: int = 3) -> Mesh:
-    """Triangles (n, 3, 3) without shared vertices, their normals toward the origin's side of each."""
-    points = np.asarray(corners, np.float32).reshape(-1, 3, 3)
-    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    normal *= -np.sign(np.sum(normal * points.mean(axis=1), axis=1, keepdims=True))
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    count = 3 * len(points)
-    return Mesh(
-        positions=points.reshape(-1, 3),
-        normals=np.repeat(normal, 3, axis=0).astype(np.float32),
-        reflectance=np.full((count, 3), 0.1, np.float32),
-        surface=np.full(count, int(surface), np.int32),
-        road=np.zeros((count, 4), np.float32) if road is None else np.asarray(road, np.float32).reshape(-1, 4),
-        instance=np.full(count, instance, np.int32),
-        faces=np.arange(count, dtype=np.uint32).reshape(-1, 3),
-    )
-
-
-def rectangle(a: Any, b: Any, c: Any, d: Any) -> np.ndarray:
-    return np.array([[a, b, c], [a, c, d]], float)
+ONE = np.eye(4)[None, :3]
 
 
 def road(lines: int = 0, half: float = 1.75, reach: float = 1500.0) -> Mesh:
@@ -61,19 +41,6 @@ def terrain(height: float) -> Mesh:
     return level
 
 
-def joined(*parts: Mesh) -> Mesh:
-    table = MeshTable.of({str(number): part for number, part in enumerate(parts)})
-    return Mesh(
-        table.positions,
-        table.normals,
-        table.reflectance,
-        table.surface,
-        table.road,
-        table.instance,
-        table.faces.astype(np.uint32),
-    )
-
-
 def drawn(ground: Mesh, illuminance: float = ILLUMINANCE, **shapes: Mesh) -> Renderer:
     return make_renderer("cpu", Scene(ground, shapes, ()), illuminance)
 
@@ -83,13 +50,6 @@ def copy_of(shape: str, lamps: int = 0, instance: int = 16) -> Batch:
     return Batch(
         shape, transform, np.full((1, 3), 0.4, np.float32), np.array([lamps], np.int32), np.array([instance], np.int32)
     )
-
-
-def rays(camera: Camera, pose: CameraPose) -> np.ndarray:
-    """Rays (rows, cols, 3) that are 1 long along the optical axis."""
-    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    pixels = np.stack((u, v, np.ones_like(u)), axis=-1)
-    return np.asarray(pixels @ ray_from_pixel(camera, pose).T)
 
 
 @pytest.mark.parametrize(
@@ -142,12 +102,6 @@ def nearest(triangles: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarr
     return found.reshape(camera.height, camera.width), best.reshape(camera.height, camera.width)
 
 
-def one_copy(shape: Mesh) -> tuple[MeshTable, Drawing]:
-    record = np.zeros(1, RECORD)
-    record["transform"][0] = np.eye(4)[:3]
-    return MeshTable.of({"": shape}), Drawing(np.zeros(1, np.int64), record, np.array([0, len(shape.faces)]))
-
-
 def test_pixels_see_the_triangles_that_their_rays_hit() -> None:
     for seed in range(4):
         rng = np.random.default_rng(seed)
@@ -156,8 +110,10 @@ def test_pixels_see_the_triangles_that_their_rays_hit() -> None:
         triangles = (middle + rng.normal(size=(120, 3, 3)) * rng.choice([0.3, 2.0, 9.0], (120, 1, 1))).astype(
             np.float32
         )
-        table, drawing = one_copy(mesh(triangles))
-        triangle_ids = CPURasteriser(table).triangle_ids(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0))
+        table = MeshTable.of({"": mesh(triangles)})
+        triangle_ids = CPURasteriser(table).triangle_ids(
+            drawing_of(table, [0], ONE), camera, CameraPose((0.0, 0.0, 0.0), 0.0)
+        )
         exact, _ = nearest(triangles.astype(float), camera)
         assert (exact >= 0).mean() > 0.5
         assert (triangle_ids != exact).mean() < 1e-3  # edges and depths that rounding decides
@@ -173,13 +129,10 @@ def test_triangles_that_share_edges_leave_no_gap(seed: int) -> None:
     points = np.stack((2.0 + 0.3 * rng.random((count, count)), y + jitter[0], z + jitter[1]), axis=-1)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     triangles = np.concatenate((np.stack((a, b, c), axis=2), np.stack((a, c, d), axis=2))).reshape(-1, 3, 3)
-    table, drawing = one_copy(mesh(triangles))
-    assert (CPURasteriser(table).triangle_ids(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0)) >= 0).all()
-
-
-def test_nothing_before_the_near_plane_is_seen() -> None:
-    table, drawing = one_copy(mesh(rectangle((0.3, -9, -9), (0.3, 9, -9), (0.3, 9, 9), (0.3, -9, 9))))
-    assert (CPURasteriser(table).triangle_ids(drawing, CAMERA, CameraPose((0.0, 0.0, 0.0), 0.0)) == -1).all()
+    table = MeshTable.of({"": mesh(triangles)})
+    assert (
+        CPURasteriser(table).triangle_ids(drawing_of(table, [0], ONE), camera, CameraPose((0.0, 0.0, 0.0), 0.0)) >= 0
+    ).all()
 
 
 def test_what_is_seen_has_its_instance_id(place: Any) -> None:
@@ -208,6 +161,7 @@ def test_pictures_are_the_same_to_the_bit_and_share_nothing(place: Any) -> None:
             assert np.array_equal(one, two)
             assert not np.shares_memory(one, two)
             assert one.flags.c_contiguous
+            assert one.dtype == (np.int32 if name == "instance" else np.float32)
 
 
 def test_lamplight_does_not_change_what_is_seen_by_day(place: Any) -> None:
@@ -222,27 +176,27 @@ def wall(surface: Surface, far: float = 20.0) -> Mesh:
     return mesh(rectangle((far, -9, -9), (far, 9, -9), (far, 9, 9), (far, -9, 9)), surface)
 
 
-@pytest.mark.parametrize(("surface", "lamp"), [(Surface.LAMP_STOP, Lamp.STOP), (Surface.LAMP_HEAD, Lamp.LOW_BEAM)])
-def test_lamps_are_the_only_light_of_the_night(surface: Surface, lamp: Lamp) -> None:
+@pytest.mark.parametrize(
+    ("surface", "lamp", "luminance"),
+    [
+        (Surface.LAMP_STOP, Lamp.STOP, 17e3),
+        (Surface.LAMP_HEAD, Lamp.LOW_BEAM, 30e3),
+        (Surface.LAMP_STREET, Lamp.NONE, 30e3),  # always lit
+    ],
+)
+def test_lamps_are_the_only_light_of_the_night(surface: Surface, lamp: Lamp, luminance: float) -> None:
     renderer = drawn(road(), 0.0, lamp=wall(surface))
-    off = renderer.render([copy_of("lamp")], CAMERA, AHEAD)
+    off = renderer.render([copy_of("lamp")] if lamp else (), CAMERA, AHEAD)
     assert off.radiance.max() == 0.0
     on = renderer.render([copy_of("lamp", int(lamp))], CAMERA, AHEAD)
-    luminance = {Surface.LAMP_STOP: 17e3, Surface.LAMP_HEAD: 30e3}[surface]
     assert on.radiance[on.instance == 16] @ WEIGHTS == pytest.approx(luminance, rel=1e-4)
     assert on.radiance[on.instance != 16].max() == 0.0
 
 
-def test_street_lamps_are_always_lit() -> None:
-    view = drawn(road(), 0.0, lamp=wall(Surface.LAMP_STREET)).render([copy_of("lamp")], CAMERA, AHEAD)
-    assert view.radiance[view.instance == 16] @ WEIGHTS == pytest.approx(30e3, rel=1e-4)
-
-
 @pytest.mark.parametrize(("ground", "instance", "aside"), [(road(reach=9000.0), 2, 0.0), (terrain(0.0), 1, 91.7)])
 def test_texture_keeps_the_mean_at_any_distance(ground: Mesh, instance: int, aside: float) -> None:
-    camera = Camera(320, 240, 288.0, (160.0, 120.0), 1.38, pitch=math.radians(2.0))
     renderer = drawn(ground)
-    views = [renderer.render((), camera, CameraPose((207.3 * i, aside * i, 1.38), 0.0)) for i in range(40)]
+    views = [renderer.render((), CAMERA, CameraPose((207.3 * i, aside * i, 1.38), 0.0)) for i in range(40)]
     distance = np.stack([view.distance for view in views])
     reflectance = np.stack([view.radiance[..., 1] for view in views]) * math.pi / ILLUMINANCE
     deviations = []
@@ -263,10 +217,9 @@ def test_lines_keep_their_area_however_small_they_are(lines: int, share: float) 
     widths = []
     for i in range(18):
         pose = CameraPose((float(i), 0.0, 1.38), 0.0)
-        paint, asphalt = (
-            renderer.render((), camera, pose).radiance[..., 1].astype(float) for renderer in (painted, bare)
-        )
-        depth = painted.render((), camera, pose).distance[:, 320]
+        seen, without = (renderer.render((), camera, pose) for renderer in (painted, bare))
+        paint, asphalt = (view.radiance[..., 1].astype(float) for view in (seen, without))
+        depth = seen.distance[:, 320]
         rows = np.flatnonzero((depth > 8.0) & (depth < 150.0))
         contrast = 0.6 - 0.1
         width = (paint - asphalt).sum(axis=1)[rows] * math.pi / ILLUMINANCE / contrast * depth[rows] / 577.0
@@ -275,13 +228,10 @@ def test_lines_keep_their_area_however_small_they_are(lines: int, share: float) 
     assert np.mean(widths) == pytest.approx(0.2 * share, rel=0.03)
 
 
-def test_diffuse_surfaces_answer_lamplight_with_their_reflectance_over_pi() -> None:
+def test_surfaces_and_sky_answer_lamplight_as_measured() -> None:
     view = drawn(road(), wall=wall(Surface.MATT)).render([copy_of("wall")], CAMERA, AHEAD, lamplight=True)
     assert view.lamp_response is not None
     assert view.lamp_response[100, 160] == pytest.approx(0.1 / math.pi, rel=0.02)
-
-
-def test_road_lines_and_sky_answer_lamplight_as_measured() -> None:
     view = drawn(joined(road(3), terrain(-0.1))).render((), CAMERA, AHEAD, lamplight=True)
     response = view.lamp_response
     assert response is not None
@@ -297,7 +247,7 @@ def test_road_lines_and_sky_answer_lamplight_as_measured() -> None:
 def test_sheeting_sends_lamplight_back_and_less_of_it_from_near() -> None:
     answers = []
     for far in (15.0, 60.0, 130.0):
-        sheet = mesh(rectangle((far, -9, -9), (far, 9, -9), (far, 9, 9), (far, -9, 9)), Surface.SHEETING)
+        sheet = wall(Surface.SHEETING, far)
         sheet.reflectance[:] = 0.66
         view = drawn(road(), sheet=sheet).render([copy_of("sheet")], CAMERA, AHEAD, lamplight=True)
         assert view.lamp_response is not None
@@ -332,13 +282,10 @@ def test_a_camera_inside_a_vehicle_sees_it_from_inside(place: Any) -> None:
     assert np.isfinite(view.lamp_response).all()
 
 
-def test_shapes_that_the_scene_does_not_have_are_refused() -> None:
-    with pytest.raises(InputError, match="'sledge'"):
-        drawn(road()).render([copy_of("sledge")], CAMERA, AHEAD)
-
-
-def test_a_closed_renderer_says_so() -> None:
+def test_shapes_that_the_scene_does_not_have_and_closed_renderers_are_refused() -> None:
     renderer = drawn(road())
+    with pytest.raises(InputError, match="'sledge'"):
+        renderer.render([copy_of("sledge")], CAMERA, AHEAD)
     renderer.close()
     renderer.close()
     with pytest.raises(RenderError, match="closed"):

@@ -6,45 +6,22 @@ import numpy as np
 import trimesh
 
 from fogsim.render.cpu.rasteriser import CPURasteriser
-from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable, in_solids
-from fogsim.values import Camera, CameraPose, Mesh, Surface
+from fogsim.render.drawing import NEAR, Drawing, MeshTable, in_solids
+from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
+from tests.render.conftest import drawing_of, joined, mesh
 
 CAMERA = Camera(120, 90, 80.0, (60.0, 45.0), 1.0, roll=0.1)
 POSE = CameraPose((0.0, 0.0, 0.0), 0.0)
 
 
-def mesh_of(solid: trimesh.Trimesh) -> Mesh:
-    """A mesh of a solid whose triangles share no vertices."""
-    count = 3 * len(solid.faces)
-    return Mesh(
-        positions=np.asarray(solid.vertices[solid.faces].reshape(-1, 3), np.float32),
-        normals=np.repeat(np.asarray(solid.face_normals, np.float32), 3, axis=0),
-        reflectance=np.full((count, 3), 0.1, np.float32),
-        surface=np.full(count, int(Surface.MATT), np.int32),
-        road=np.zeros((count, 4), np.float32),
-        instance=np.full(count, 3, np.int32),
-        faces=np.arange(count, dtype=np.uint32).reshape(-1, 3),
-    )
-
-
-def joined(*meshes: Mesh) -> Mesh:
-    """One mesh of several."""
-    first = np.cumsum([0, *(len(one.positions) for one in meshes)])
-    columns = ("positions", "normals", "reflectance", "surface", "road", "instance")
-    return Mesh(
-        **{name: np.concatenate([getattr(one, name) for one in meshes]) for name in columns},
-        faces=np.concatenate([one.faces + np.uint32(start) for one, start in zip(meshes, first, strict=False)]),
-    )
-
-
-BALL = mesh_of(trimesh.creation.icosphere(subdivisions=1))
+BALL = mesh(trimesh.creation.icosphere(subdivisions=1).triangles)
 OPEN = replace(BALL, faces=BALL.faces[:-1])
 INSIDE_OUT = replace(BALL, faces=BALL.faces[:, ::-1])
 
 
 def test_solids_are_closed_and_wound_outward() -> None:
-    for mesh, expected in [
+    for solid, expected in [
         (BALL, [True] * 80),
         (OPEN, [False] * 79),
         (INSIDE_OUT, [False] * 80),
@@ -52,7 +29,7 @@ def test_solids_are_closed_and_wound_outward() -> None:
         (joined(BALL, BALL), [False] * 160),  # two triangles on the same side of each edge
         (replace(BALL, faces=BALL.faces[:0]), []),
     ]:
-        assert in_solids(mesh).tolist() == expected
+        assert in_solids(solid).tolist() == expected
 
 
 def scattered(rng: np.random.Generator, count: int, shapes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -66,13 +43,6 @@ def scattered(rng: np.random.Generator, count: int, shapes: int) -> tuple[np.nda
         transforms[number, :, :3] = turn * rng.uniform(0.05, 2.0, 3)
         transforms[number, :, 3] = place
     return rng.integers(0, shapes, count), transforms
-
-
-def drawing_of(table: MeshTable, mesh: np.ndarray, transforms: np.ndarray) -> Drawing:
-    record = np.zeros(len(mesh), RECORD)
-    record["transform"] = transforms
-    faces = np.diff(table.first_face)[mesh]
-    return Drawing(mesh.astype(np.int64), record, np.concatenate(([0], np.cumsum(faces))).astype(np.int64))
 
 
 def alone(table: MeshTable, drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
@@ -109,8 +79,8 @@ def test_copies_are_left_out_only_where_nothing_of_them_is_seen() -> None:
     for order, seed in [(1, 0), (-1, 1), (-1, 2)]:
         shapes = {"ball": BALL, "open": OPEN, "inside out": INSIDE_OUT}
         table = MeshTable.of(shapes)
-        mesh, transforms = scattered(np.random.default_rng(seed), 150, len(shapes))
-        drawing = drawing_of(table, mesh[::order], transforms[::order])
+        numbers, transforms = scattered(np.random.default_rng(seed), 150, len(shapes))
+        drawing = drawing_of(table, numbers[::order], transforms[::order])
         triangle_ids = CPURasteriser(table).triangle_ids(drawing, CAMERA, POSE)
         expected, inverse = alone(table, drawing)
         assert (expected >= 0).mean() > 0.3
@@ -125,8 +95,8 @@ def test_inner_sides_of_solids_make_no_difference_from_outside() -> None:
     culled = MeshTable.of({"ball": BALL}, never_inside=lambda name: name == "ball")
     assert culled.in_solid.all()
     assert not table.in_solid.any()
-    mesh, transforms = scattered(np.random.default_rng(5), 60, 1)
-    drawing = drawing_of(table, mesh, transforms)
+    numbers, transforms = scattered(np.random.default_rng(5), 60, 1)
+    drawing = drawing_of(table, numbers, transforms)
     seen, all_seen = (CPURasteriser(one).triangle_ids(drawing, CAMERA, POSE).copy() for one in (culled, table))
     assert (seen >= 0).mean() > 0.3
     np.testing.assert_array_equal(seen, all_seen)

@@ -9,13 +9,14 @@ import pytest
 from fogsim.errors import MissingDependencyError
 from fogsim.render import RenderError
 from fogsim.render.cpu.rasteriser import CPURasteriser
-from fogsim.render.drawing import NEAR, NOTHING, RECORD, Drawing, MeshTable
+from fogsim.render.drawing import NEAR, NOTHING, MeshTable
 from fogsim.render.opengl.context import context
 from fogsim.render.opengl.meshes import COMMAND, COPY, corners, packed
 from fogsim.render.opengl.rasteriser import GLRasteriser
-from fogsim.values import Camera, CameraPose, Mesh
+from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
 from tests.helpers.command import run_python
+from tests.render.conftest import drawing_of, mesh
 
 CAMERA = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
 POSE = CameraPose((3.0, -2.0, 1.38), heading=0.7)
@@ -29,27 +30,6 @@ def _opengl() -> None:
         pytest.skip(str(error))
 
 
-def mesh_of(triangles: np.ndarray) -> Mesh:
-    """A mesh of triangles (n, 3, 3) that share no vertices."""
-    n = 3 * len(triangles)
-    return Mesh(
-        positions=triangles.reshape(n, 3).astype(np.float32),
-        normals=np.tile(np.float32([0, 0, 1]), (n, 1)),
-        reflectance=np.full((n, 3), 0.5, np.float32),
-        surface=np.zeros(n, np.int32),
-        road=np.zeros((n, 4), np.float32),
-        instance=np.zeros(n, np.int32),
-        faces=np.arange(n, dtype=np.uint32).reshape(-1, 3),
-    )
-
-
-def drawing_of(table: MeshTable, mesh: list[int], transforms: np.ndarray) -> Drawing:
-    record = np.zeros(len(mesh), RECORD)
-    record["transform"] = transforms
-    counts = np.diff(table.first_face)[mesh]
-    return Drawing(np.array(mesh, np.int64), record, np.cumsum([0, *counts], dtype=np.int64))
-
-
 def scattered(rng: np.random.Generator, number: int, axes: np.ndarray) -> np.ndarray:
     """Turned and stretched transforms (n, 3, 4) to offsets that lie before a camera, some half beside the picture."""
     turned = np.linalg.qr(rng.normal(size=(number, 3, 3)))[0] * rng.uniform(0.3, 3.0, (number, 1, 3))
@@ -61,15 +41,14 @@ def scattered(rng: np.random.Generator, number: int, axes: np.ndarray) -> np.nda
 def soup(rng: np.random.Generator, counts: tuple[int, ...]) -> MeshTable:
     """Meshes of so many small triangles each, scattered over a few metres."""
     return MeshTable.of(
-        {f"mesh {n}": mesh_of(rng.normal(size=(n, 1, 3)) + 0.3 * rng.normal(size=(n, 3, 3))) for n in counts}
+        {f"mesh {n}": mesh(rng.normal(size=(n, 1, 3)) + 0.3 * rng.normal(size=(n, 3, 3))) for n in counts}
     )
 
 
 def test_both_rasterisers_see_the_same_triangle_of_the_same_copy() -> None:
     rng = np.random.default_rng(4)
     table = soup(rng, (1, 7, 60, 300))
-    mesh = list(rng.integers(0, 4, 200))
-    drawing = drawing_of(table, mesh, scattered(rng, 200, camera_axes(CAMERA, POSE)))
+    drawing = drawing_of(table, rng.integers(0, 4, 200), scattered(rng, 200, camera_axes(CAMERA, POSE)))
     by_opengl, by_numba = (
         maker(table).triangle_ids(drawing, CAMERA, POSE).copy() for maker in (GLRasteriser, CPURasteriser)
     )
@@ -81,7 +60,7 @@ def test_both_rasterisers_see_the_same_triangle_of_the_same_copy() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_both_rasterisers_cover_the_same_pixels_where_triangles_reach_behind_the_camera(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    table = MeshTable.of({"large": mesh_of(rng.normal(size=(4, 3, 3)))})
+    table = MeshTable.of({"large": mesh(rng.normal(size=(4, 3, 3)))})
     transforms = scattered(rng, 5, camera_axes(CAMERA, POSE))
     transforms[..., 3] *= 0.05
     drawing = drawing_of(table, [0] * 5, transforms)
@@ -101,7 +80,7 @@ def test_the_nearer_is_seen_from_both_sides_and_nothing_before_the_near_plane(
     maker: type[GLRasteriser] | type[CPURasteriser],
 ) -> None:
     turned = quad(20.0, 1.0)[:, ::-1]
-    table = MeshTable.of({"far": mesh_of(quad(30.0, 3.0)), "near": mesh_of(turned), "eye": mesh_of(quad(0.39, 1.0))})
+    table = MeshTable.of({"far": mesh(quad(30.0, 3.0)), "near": mesh(turned), "eye": mesh(quad(0.39, 1.0))})
     axes = camera_axes(CAMERA, POSE)
     level = np.concatenate((axes.T, np.zeros((3, 1))), axis=1)
     triangle_ids = maker(table).triangle_ids(drawing_of(table, [2, 1, 0], np.array([level] * 3)), CAMERA, POSE)
@@ -119,23 +98,13 @@ def test_a_pixel_is_seen_if_its_centre_is(maker: type[GLRasteriser] | type[CPURa
     shifted = quad(10.0, 1.0)
     shifted[..., 0] += 1.0 + (100 + beside - 80) * 10.0 / CAMERA.focal_length
     shifted[..., 1] += 1.0 + (70 + beside - 60) * 10.0 / CAMERA.focal_length
-    table = MeshTable.of({"quad": mesh_of(shifted)})
+    table = MeshTable.of({"quad": mesh(shifted)})
     level = np.concatenate((camera_axes(CAMERA, POSE).T, np.zeros((3, 1))), axis=1)
     rows, columns = np.nonzero(maker(table).triangle_ids(drawing_of(table, [0], level[None]), CAMERA, POSE) != NOTHING)
     assert (rows.min(), columns.min()) == ((70, 100) if beside < 0 else (71, 101))
 
 
-def test_an_empty_drawing_shows_nothing_and_forgets_the_last_one() -> None:
-    rng = np.random.default_rng(2)
-    table = soup(rng, (50,))
-    rasteriser = GLRasteriser(table)
-    full = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
-    assert (rasteriser.triangle_ids(full, CAMERA, POSE) != NOTHING).any()
-    empty = drawing_of(table, [], np.empty((0, 3, 4)))
-    assert (rasteriser.triangle_ids(empty, CAMERA, POSE) == NOTHING).all()
-
-
-def test_packing_keeps_copies_of_a_mesh_together_and_their_slots() -> None:
+def test_packing_keeps_copies_of_a_mesh_together_and_corners_know_their_triangles() -> None:
     table = soup(np.random.default_rng(1), (2, 3, 4))
     transforms = np.random.default_rng(2).normal(size=(5, 3, 4)).astype(np.float32)
     drawing = drawing_of(table, [2, 0, 2, 2, 0], transforms)
@@ -146,21 +115,21 @@ def test_packing_keeps_copies_of_a_mesh_together_and_their_slots() -> None:
     order = [1, 4, 0, 2, 3]
     assert copies["first"].tolist() == drawing.first[order].tolist()
     assert copies["clip"] == pytest.approx(np.einsum("ij,njk->nik", clip, transforms[order]), rel=1e-5, abs=1e-5)
-
-
-def test_every_corner_knows_the_number_of_its_triangle_in_its_mesh() -> None:
     table = soup(np.random.default_rng(1), (2, 3))
     made = corners(table)
     assert made["triangle"].tolist() == [0] * 3 + [1] * 3 + [0] * 3 + [1] * 3 + [2] * 3
     assert np.array_equal(made["position"], table.positions[table.faces.ravel()])
 
 
-def test_a_size_can_change_and_a_closed_one_is_refused() -> None:
+def test_a_drawing_may_be_empty_a_size_can_change_and_a_closed_one_is_refused() -> None:
     rng = np.random.default_rng(2)
     table = soup(rng, (50,))
     rasteriser = GLRasteriser(table)
     drawing = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
     first = rasteriser.triangle_ids(drawing, CAMERA, POSE).copy()
+    assert (first != NOTHING).any()
+    empty = drawing_of(table, [], np.empty((0, 3, 4)))
+    assert (rasteriser.triangle_ids(empty, CAMERA, POSE) == NOTHING).all()
     wide = Camera(200, 50, 144.25, (100.0, 25.0), 1.38)
     assert rasteriser.triangle_ids(drawing, wide, POSE).shape == (50, 200)
     assert np.array_equal(rasteriser.triangle_ids(drawing, CAMERA, POSE), first)

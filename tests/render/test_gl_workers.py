@@ -42,15 +42,6 @@ def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_opengl")
-def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> None:
-    said = run(str(WORKERS), "fork", "opengl", "--draw-first")
-    assert "RenderError" in said
-    assert "start workers before the parent draws, or with the start method 'spawn'" in said
-    assert "parent draws on" in said
-
-
-@pytest.mark.nightly
-@pytest.mark.usefixtures("_opengl")
 def test_workers_that_are_spawned_after_the_parent_drew_draw() -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "opengl", "--draw-first")
 

@@ -11,8 +11,8 @@ from fogsim.render import make_renderer
 from fogsim.render.shading.pavement import PERIOD, asphalt, mean_of_stretches, reflectance_at, reflectance_by_sine
 from fogsim.scenario import build, load_scenario
 from fogsim.values import CameraPose, Pavement, RoadSurface, Scene, View
-from tests.render.conftest import Place, camera
-from tests.render.test_cpu import ILLUMINANCE, rays, road
+from tests.render.conftest import Place, camera, rays
+from tests.render.test_cpu import ILLUMINANCE, road
 
 REAL = [surface for surface in RoadSurface if surface is not RoadSurface.LAMBERTIAN]
 CAMERA = camera(640, 480)

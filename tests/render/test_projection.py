@@ -1,6 +1,5 @@
 import math
 
-import numpy as np
 import pytest
 
 from fogsim.render.projection import clip_from_camera
@@ -11,36 +10,15 @@ CAMERA = Camera(640, 480, 577.0, (310.0, 250.0), 1.38, pitch=0.05, roll=0.04)
 POSE = CameraPose((3.0, 4.0, 1.38), heading=0.7, grade=0.01)
 
 
-def test_axes_are_a_right_handed_rotation() -> None:
-    axes = camera_axes(CAMERA, POSE)
-    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-
-
-def test_a_level_camera_looks_ahead_with_its_right_to_the_south() -> None:
-    level = Camera(64, 48, 60.0, (32.0, 24.0), 1.0)
-    axes = camera_axes(level, CameraPose((0, 0, 1), heading=0.0))
-    assert axes == pytest.approx(np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]]), abs=1e-12)
-
-
 def test_positive_pitch_looks_down_and_a_grade_looks_up() -> None:
     axes = camera_axes(Camera(64, 48, 60.0, (32.0, 24.0), 1.0, pitch=0.1), CameraPose((0, 0, 1), 0.0, grade=0.03))
     assert math.asin(-axes[2, 2]) == pytest.approx(0.07)
 
 
-def test_positive_roll_turns_the_right_side_of_the_image_down() -> None:
-    axes = camera_axes(Camera(64, 48, 60.0, (32.0, 24.0), 1.0, roll=0.1), CameraPose((0, 0, 1), 0.0))
-    horizon_right = axes @ (10.0, -3.0, 0.0)  # a point on the horizon to the right of the camera
-    assert horizon_right[1] / horizon_right[2] > 0
-
-
-def test_pixel_centres_lie_half_a_window_unit_in() -> None:
+def test_pixel_centres_lie_half_a_window_unit_in_and_rays_project_back_to_their_pixels() -> None:
     x, y, _, w = clip_from_camera(CAMERA) @ (0.0, 0.0, 5.0, 1.0)
     assert (x / w + 1) / 2 * CAMERA.width - 0.5 == pytest.approx(310.0)
     assert (y / w + 1) / 2 * CAMERA.height - 0.5 == pytest.approx(250.0)
-
-
-def test_a_ray_projects_back_to_its_pixel() -> None:
     for pixel in ((0, 0), (639, 479), (123, 45)):
         ray = ray_from_pixel(CAMERA, POSE) @ (*pixel, 1.0)
         right, down, ahead = camera_axes(CAMERA, POSE) @ ray

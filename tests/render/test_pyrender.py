@@ -15,9 +15,9 @@ from fogsim.render import Renderer, RenderError, make_renderer, to_pyrender
 from fogsim.render.photometry import lamp_radiance
 from fogsim.scenario import load_scenario
 from fogsim.scene import vehicle_batches
-from fogsim.values import Beam, CameraPose, HeadLamp, Lights, LightSources, Mesh, Scene, StreetLighting, Surface, View
+from fogsim.values import Beam, CameraPose, HeadLamp, Lights, LightSources, Scene, StreetLighting, Surface, View
 from fogsim.values.scene import LEVELS_OF_DETAIL
-from tests.render.conftest import Place, camera
+from tests.render.conftest import Place, camera, walls
 
 ILLUMINANCE = 1e4
 LARGE, SMALL, TILTED = camera(640, 480), camera(160, 120), camera(160, 120, roll=0.15)
@@ -104,25 +104,9 @@ def test_lit_lamps_have_their_radiance(views: dict[str, View]) -> None:
     assert (views["pyrender"].instance[lit] >= 16).all()
 
 
-def wall(distance: float) -> Scene:
-    """A wall of reflectance ½ across the x axis that fills the picture, seen from the back of its triangles."""
-    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    positions = np.column_stack((np.full(4, distance), distance * corners)).astype(np.float32)
-    mesh = Mesh(
-        positions=positions,
-        normals=np.tile(np.float32([0, 0, 1]), (4, 1)),
-        reflectance=np.full((4, 3), 0.5, np.float32),
-        surface=np.zeros(4, np.int32),
-        road=np.zeros((4, 4), np.float32),
-        instance=np.full(4, 3, np.int32),
-        faces=np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
-    )
-    return Scene(ground=mesh, shapes={}, scenery=())
-
-
 @pytest.mark.parametrize("distance", [1.0, 10.0, 100.0, 1000.0])
 def test_a_wall_is_as_far_and_as_bright_as_it_is(distance: float) -> None:
-    one = make_renderer("reference", wall(distance), ILLUMINANCE)
+    one = make_renderer("reference", walls(distance), ILLUMINANCE)
     view = one.render((), LEVEL, POSE)
     one.close()
     across, down = (np.arange(640) - 320.0) / LEVEL.focal_length, (np.arange(480) - 240.0) / LEVEL.focal_length
@@ -140,7 +124,7 @@ def test_what_opengl_draws_does_not_change_when_pyrender_draws_between(
 ) -> None:
     vehicles = vehicle_batches(place.traffic, None)
     before = three["opengl"].render(vehicles, SMALL, place.pose)
-    passing = make_renderer("pyrender", wall(20.0), ILLUMINANCE)
+    passing = make_renderer("pyrender", walls(20.0), ILLUMINANCE)
     passing.render((), SMALL, POSE)
     passing.close()
     passing.close()
@@ -152,7 +136,7 @@ def test_what_opengl_draws_does_not_change_when_pyrender_draws_between(
 
 
 def test_lamplight_is_refused_and_told_where_it_is_drawn() -> None:
-    one = make_renderer("pyrender", wall(20.0), 0.5)
+    one = make_renderer("pyrender", walls(20.0), 0.5)
     with pytest.raises(InputError, match="use opengl or cpu"):
         one.render((), SMALL, POSE, lamplight=True)
     one.close()
@@ -200,10 +184,10 @@ def test_what_old_scenarios_call_pyrender_is_drawn_by_opengl_and_told() -> None:
 
 
 def test_without_lamps_and_vehicles_the_scene_is_that_of_the_day() -> None:
-    made = to_pyrender(wall(10.0), POSE)
+    made = to_pyrender(walls(10.0), POSE)
     assert not made.light_nodes
     np.testing.assert_allclose(made.ambient_light, 1.0)
-    dark = to_pyrender(wall(10.0), POSE, illuminance=0.0)
+    dark = to_pyrender(walls(10.0), POSE, illuminance=0.0)
     np.testing.assert_allclose(dark.ambient_light, 0.0)
 
 
@@ -213,8 +197,8 @@ def test_pyrenders_own_renderer_draws_it_in_a_process_of_its_own() -> None:
         "import os\nos.environ.setdefault('PYOPENGL_PLATFORM', 'egl')\n"
         "import warnings\nwarnings.simplefilter('ignore')\n"
         "import numpy as np, pyrender\nfrom fogsim.render import to_pyrender\n"
-        "from fogsim.values import CameraPose\nfrom tests.render.test_pyrender import LEVEL, wall\n"
-        "scene = to_pyrender(wall(12.0), CameraPose((0.0, 0.0, 0.0), 0.0), camera=LEVEL)\n"
+        "from fogsim.values import CameraPose\nfrom tests.render.test_pyrender import LEVEL, walls\n"
+        "scene = to_pyrender(walls(12.0), CameraPose((0.0, 0.0, 0.0), 0.0), camera=LEVEL)\n"
         "colour, depth = pyrender.OffscreenRenderer(640, 480).render(scene)\n"
         "print(round(float(np.median(depth)), 2), int(np.median(colour)))\n"
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from fogsim.values import Lane, LaneMarking, Mesh, RoadNetwork, Surface
 
@@ -11,19 +12,19 @@ def carriageway(edge: str, start: tuple[float, float], heading: float, length: f
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
     left = np.array([-np.sin(heading), np.cos(heading), 0.0])
     distance = np.linspace(0.0, length, 7)[:, None]
+    solid, dashed = LaneMarking.SOLID, LaneMarking.DASHED
+    lines = [np.array([*start, 0.0]) + left * 3.5 * i + ahead * distance for i in range(3)]
     return [
-        Lane(
-            lane_id=f"{edge}_{i}",
-            edge_id=edge,
-            centreline=np.array([*start, 0.0]) + left * 3.5 * i + ahead * distance,
-            width=3.5,
-            speed_limit=speed,
-            left=LaneMarking.SOLID if i == 2 else LaneMarking.DASHED,
-            right=LaneMarking.SOLID if i == 0 else LaneMarking.DASHED,
-            outermost=i == 0,
-        )
-        for i in range(3)
+        Lane(f"{edge}_{i}", edge, line, 3.5, speed, dashed if i < 2 else solid, dashed if i else solid, i == 0)
+        for i, line in enumerate(lines)
     ]
+
+
+def street(line: ArrayLike, name: str = "a", speed: float = 13.9, width: float = 3.2) -> Lane:
+    """A lane of its own between solid lines, beside which a road ends."""
+    return Lane(
+        name, name, np.asarray(line, np.float64), width, speed, LaneMarking.SOLID, LaneMarking.SOLID, outermost=True
+    )
 
 
 @pytest.fixture(scope="session")

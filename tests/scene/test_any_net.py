@@ -20,7 +20,7 @@ from fogsim.values import (
     StructureKind,
     Surface,
 )
-from tests.scene.conftest import road_under
+from tests.scene.conftest import road_under, street
 
 
 def build(network: RoadNetwork) -> Scene:
@@ -29,11 +29,10 @@ def build(network: RoadNetwork) -> Scene:
 
 def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
     # A street whose directions lie 1.2 m apart, and narrow to nothing.
-    line, solid = np.array([[0.0, 0, 0], [60, 0, 0], [120, 0, 0]]), LaneMarking.SOLID
-    there = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
-    beside = line[::-1] + np.array([[0.0, 3.2, 0], [0, 4.4, 0], [0, 4.4, 0]])
-    back = Lane("b", "b", beside, 3.2, 13.9, solid, solid, outermost=True)
-    ground = build(RoadNetwork((there, back), line)).ground
+    there = street([[0.0, 0, 0], [60, 0, 0], [120, 0, 0]])
+    beside = there.centreline[::-1] + np.array([[0.0, 3.2, 0], [0, 4.4, 0], [0, 4.4, 0]])
+    back = street(beside, "b")
+    ground = build(RoadNetwork((there, back), there.centreline)).ground
     raised = (ground.surface == Surface.MATT) & (ground.positions[:, 2] > 0.01)
     assert raised.sum() > 100
     assert LaneIndex([there, back]).clearance(ground.positions[raised].astype(float)).min() > -0.15
@@ -43,11 +42,9 @@ def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
 
 
 def test_what_lies_beside_a_road_reaches_up_to_the_road_that_it_ends_at() -> None:
-    line, solid = np.array([[-100.0, 0, 0], [0, 0, 0]]), LaneMarking.SOLID
-    into = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
-    across = np.array([[1.6, 80.0, 0], [1.6, -80, 0]])
-    other = Lane("b", "b", across, 3.2, 13.9, solid, solid, outermost=True)
-    ground = build(RoadNetwork((into, other), line)).ground
+    into = street([[-100.0, 0, 0], [0, 0, 0]])
+    other = street([[1.6, 80.0, 0], [1.6, -80, 0]], "b")
+    ground = build(RoadNetwork((into, other), into.centreline)).ground
     assert max(road_under(ground, -0.5, -2.5, (Surface.MATT,))) == pytest.approx(KERB)
 
 
@@ -61,8 +58,7 @@ def test_a_walking_area_that_vehicles_drive_over_is_no_kerb_in_their_way() -> No
 
 
 def test_a_road_leads_on_from_the_middle_of_a_long_border() -> None:
-    line, solid = np.array([[-60.0, 0, 0], [0, 0, 0]]), LaneMarking.SOLID
-    lane = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    lane = street([[-60.0, 0, 0], [0, 0, 0]])
     area = PavedArea("j", np.array([[0.0, -8, 0], [6, -8, 0], [6, 8, 0], [0, 8, 0]]))
     for edge in free_borders([area], [lane], LaneIndex([lane])):
         inner = edge.line[np.abs(edge.line[:, 0]) < 0.01]
@@ -70,9 +66,9 @@ def test_a_road_leads_on_from_the_middle_of_a_long_border() -> None:
 
 
 def test_woods_keep_off_the_road_from_end_to_end() -> None:
-    solid, rng = LaneMarking.SOLID, np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     lines = [np.array([[-900.0, y, 0], [900, y, 0]]) for y in (0.0, 160.0)]
-    lanes = [Lane(str(k), str(k), line, 3.5, 25.0, solid, solid, outermost=True) for k, line in enumerate(lines)]
+    lanes = [street(line, str(k), 25.0, 3.5) for k, line in enumerate(lines)]
     scene = build_scene(RoadNetwork(tuple(lanes), lines[0]), SignMap(), rng)
     woods = [batch.transforms.astype(float) for batch in scene.scenery if batch.shape.startswith("woodland")]
     assert sum(map(len, woods)) > 10
@@ -83,11 +79,8 @@ def test_woods_keep_off_the_road_from_end_to_end() -> None:
 
 
 def test_houses_of_a_street_keep_their_distance_however_many_there_are() -> None:
-    line, solid = np.array([[0.0, 0, 0], [400, 0, 0]]), LaneMarking.SOLID
-    lanes = tuple(
-        Lane(f"{k}", f"{k}", line + np.array([0.0, 34.0 * k, 0]), 3.2, 13.9, solid, solid, outermost=True)
-        for k in range(6)
-    )
+    line = np.array([[0.0, 0, 0], [400, 0, 0]])
+    lanes = tuple(street(line + np.array([0.0, 34.0 * k, 0]), f"{k}") for k in range(6))
     scene = build(RoadNetwork(lanes, line))
     places = np.concatenate([b.transforms[:, :2, 3] for b in scene.scenery if b.shape.startswith("house")])
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
@@ -96,11 +89,10 @@ def test_houses_of_a_street_keep_their_distance_however_many_there_are() -> None
 
 
 def test_nothing_is_put_by_chance_where_a_building_stands() -> None:
-    line, solid = np.array([[0.0, 0, 0], [400, 0, 0]]), LaneMarking.SOLID
-    street = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    line = np.array([[0.0, 0, 0], [400, 0, 0]])
     wall = line * 0.5 + np.array([0.0, 12.0, 0.0])
     building = Structure("b", StructureKind.BUILDING, wall, 0.6, 0.0, 20.0)
-    bare, built = (build(RoadNetwork((street,), line, structures=own)) for own in ((), (building,)))
+    bare, built = (build(RoadNetwork((street(line),), line, structures=own)) for own in ((), (building,)))
 
     def beside_the_wall(scene: Scene) -> int:
         batches = [b for b in scene.scenery if b.shape.startswith(("house", "conifer", "broad_leaved"))]
@@ -112,18 +104,17 @@ def test_nothing_is_put_by_chance_where_a_building_stands() -> None:
 
 
 def test_a_footway_ends_where_a_road_lies_across_it() -> None:
-    line, solid = np.array([[-40.0, 0, 0], [40, 0, 0]]), LaneMarking.SOLID
-    road = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    road = street([[-40.0, 0, 0], [40, 0, 0]])
     none = LaneMarking.NONE
-    way = Lane("w", "w", line[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
-    ground = build(RoadNetwork((road, way), line)).ground
+    way = Lane("w", "w", road.centreline[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
+    ground = build(RoadNetwork((road, way), road.centreline)).ground
     assert max(road_under(ground, 0.0, 10.0, (Surface.MATT,))) == pytest.approx(KERB)
     assert max(road_under(ground, 0.0, 0.0, (Surface.MATT,)), default=-1.0) < 0.0
 
 
 def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:
-    solid, none = LaneMarking.SOLID, LaneMarking.NONE
-    leading = Lane("a", "a", np.array([[-40.0, 0, 0], [0, 0, 0]]), 3.2, 13.9, solid, solid, outermost=True)
+    none = LaneMarking.NONE
+    leading = street(np.array([[-40.0, 0, 0], [0, 0, 0]]))
     area = PavedArea("j", np.array([[0.0, -2, 0], [20, -2, 0], [20, 2, 0], [0, 2, 0]]))
     bend = np.array([[0.0, 0, 0], [10, -2.5, 0], [20, 0, 0]])
     across = Lane(":j", ":j", bend, 3.2, 6.0, none, none, outermost=False, kind=LaneKind.JUNCTION)
@@ -136,10 +127,11 @@ def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:
 
 
 def test_street_lamps_stand_on_the_left_where_vehicles_keep_to_it() -> None:
-    line, solid = np.array([[0.0, 0, 0], [200, 0, 0]]), LaneMarking.SOLID
-    there = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
-    back = Lane("b", "b", line[::-1] - np.array([0.0, 3.2, 0.0]), 3.2, 13.9, solid, solid, outermost=True)
-    scene = build_scene(RoadNetwork((there, back), line), SignMap(), np.random.default_rng(5), street_lamps=True)
+    there = street([[0.0, 0, 0], [200, 0, 0]])
+    back = street(there.centreline[::-1] - np.array([0.0, 3.2, 0.0]), "b")
+    scene = build_scene(
+        RoadNetwork((there, back), there.centreline), SignMap(), np.random.default_rng(5), street_lamps=True
+    )
     heads = street_lamp_heads(scene)
     feet = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape == "street_lamp"]).astype(float)
     index = LaneIndex([there, back])

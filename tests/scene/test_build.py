@@ -6,7 +6,8 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.scene import build_scene
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.values import Lane, LaneMarking, RoadNetwork, Scene, Sign, SignMap, Surface
+from fogsim.values import RoadNetwork, Scene, Sign, SignMap, Surface
+from tests.scene.conftest import street
 
 LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
 
@@ -61,7 +62,7 @@ def test_slow_roads_have_no_guard_rail(motorway: RoadNetwork) -> None:
     assert "rail_post" not in {b.shape for b in build(RoadNetwork(tuple(slow), motorway.route)).scenery}
 
 
-def test_lanes_carry_the_attributes_of_their_lines(scene: Scene) -> None:
+def test_lanes_carry_the_attributes_of_their_lines_and_shoulders_the_other_half(scene: Scene) -> None:
     ground = scene.ground
     middle = (ground.surface == Surface.ROAD) & np.isclose(ground.road[:, 2], 1.75) & (ground.positions[:, 1] < 9)
     codes = {int(code) for code in ground.road[middle, 3]}
@@ -70,22 +71,14 @@ def test_lanes_carry_the_attributes_of_their_lines(scene: Scene) -> None:
     assert lane == pytest.approx(np.round(lane), abs=1e-3)
     assert np.ptp(ground.road[middle, 1]) == pytest.approx(3.5 + 2 * 0.03, abs=1e-3)
     assert ground.road[middle, 0] == pytest.approx(ground.positions[middle, 0], abs=1e-3)
-
-
-def test_half_a_line_lies_on_the_shoulder_where_the_lane_has_the_other_half(scene: Scene) -> None:
-    ground = scene.ground
     right = (ground.surface == Surface.ROAD) & np.isclose(ground.road[:, 2], 1.25) & (ground.positions[:, 1] < 0)
     assert set(ground.road[right, 3]) == {3.0}  # solid on its left
     assert ground.positions[right, 1] - ground.road[right, 1] == pytest.approx(-1.75 - 1.25, abs=1e-3)
 
 
 def test_crossing_roads_have_no_furniture_on_the_crossing() -> None:
-    def lane(name: str, heading: float) -> Lane:
-        way = np.array([np.cos(heading), np.sin(heading), 0.0])
-        line = np.linspace(-200, 200, 9)[:, None] * way
-        return Lane(name, name, line, 3.5, 25.0, LaneMarking.SOLID, LaneMarking.SOLID, outermost=True)
-
-    lanes = (lane("a", 0.0), lane("b", np.pi / 2))
+    line = np.linspace(-200, 200, 9)[:, None]
+    lanes = (street(line * (1.0, 0.0, 0.0), "a", 25.0, 3.5), street(line * (0.0, 1.0, 0.0), "b", 25.0, 3.5))
     index = LaneIndex(lanes)
     scene = build(RoadNetwork(lanes, lanes[0].centreline))
     for batch in scene.scenery:

@@ -6,7 +6,7 @@ import pytest
 from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
 from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSITIES
 from fogsim.scene.vehicles import body_shapes
-from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
+from fogsim.values import Beam, Lamp, RoadNetwork, SignMap, Surface, TrafficState
 from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 from tests.helpers.vehicles import vehicles
 
@@ -72,6 +72,8 @@ def test_lamps_that_face_away_or_are_dark_are_left_out() -> None:
     assert len(light_sources(one(rear), 0, EYE, BEAMS).intensity) == 0
     beside = one(rear, gap=-2.0, y=4.0)
     assert light_sources(beside, None, EYE, BEAMS).intensity.sum() < 1.0
+    found = light_sources(vehicles([]), None, EYE, BEAMS)
+    assert (found.position.shape, found.colour.shape) == ((0, 3), (0, 3))
 
 
 def test_head_lamps_shine_what_their_beam_has_in_the_direction_of_the_eye() -> None:
@@ -120,12 +122,6 @@ def test_street_lamps_within_400_m_shine_by_their_angle(motorway: RoadNetwork) -
     assert len(above.intensity) == 0
     scene = build_scene(motorway, SignMap(), np.random.default_rng(1), street_lamps=True)
     assert len(light_sources(empty, None, EYE, BEAMS, street_lamp_heads(scene)).intensity) > 5
-
-
-def test_an_empty_dark_road_has_no_sources() -> None:
-    found = light_sources(vehicles([]), None, EYE, BEAMS)
-    assert isinstance(found, LightSources)
-    assert (found.position.shape, found.colour.shape) == ((0, 3), (0, 3))
 
 
 def test_street_lighting_is_what_the_lamps_are_seen_with():

@@ -1,7 +1,22 @@
+"""Polylines, distances along roads, and compiled work on many lines, which is numpy's one by one, to the bit."""
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from fogsim.scene.polyline import arc_length, at_distance, cleaned, parallel, project, refined, true_spans
+from fogsim.scene.polyline import (
+    Chainage,
+    all_cleaned,
+    arc_length,
+    at_distance,
+    cleaned,
+    parallel,
+    project,
+    refined,
+    refined_lines,
+    true_spans,
+)
+from fogsim.values import Lane, LaneMarking
 
 
 def circle(radius: float, count: int = 400) -> np.ndarray:
@@ -14,15 +29,12 @@ def test_a_parallel_of_a_circle_is_a_circle() -> None:
     assert np.hypot(left[:, 0], left[:, 1] - 100.0) == pytest.approx(90.0, abs=1e-3)
 
 
-def test_refining_keeps_vertices_and_length() -> None:
+def test_refining_keeps_vertices_and_length_and_doubled_points_are_cleaned_away() -> None:
     line = np.array([[0.0, 0, 0], [7, 0, 1], [7, 20, 1]])
     fine = refined(line, 3.0)
     assert np.diff(arc_length(fine)).max() <= 3.0
     assert arc_length(fine)[-1] == pytest.approx(27.0)
     assert any(np.allclose(point, line[1]) for point in fine)
-
-
-def test_doubled_points_are_cleaned_away() -> None:
     assert len(cleaned(np.array([[0.0, 0, 0], [0, 0, 0], [5, 0, 0], [5, 0.001, 0]]))) == 2
 
 
@@ -51,3 +63,63 @@ def test_spans_are_the_stretches_between_changes() -> None:
     assert true_spans(chosen, least=2) == [(0, 2), (6, 9)]
     assert true_spans(np.zeros(3, np.bool_)) == []
     assert true_spans(np.ones(3, np.bool_)) == [(0, 3)]
+
+
+def _lines() -> list[NDArray[np.float64]]:
+    rng = np.random.default_rng(5)
+    lines = [np.cumsum(rng.normal(size=(count, 3)) * (9.0, 9.0, 0.1), axis=0) for count in rng.integers(2, 7, 40)]
+    lines[3] = np.repeat(lines[3], 2, axis=0)
+    return lines
+
+
+def test_many_lines_are_cleaned_and_refined_as_each_alone() -> None:
+    lines = _lines()
+    alone = [refined(cleaned(line), 4.0) for line in lines]
+    points, counts = refined_lines(lines, 4.0)
+    np.testing.assert_array_equal(points, np.concatenate(alone))
+    assert counts.tolist() == [len(line) for line in alone]
+    for line, same in zip(lines, all_cleaned(lines), strict=True):
+        np.testing.assert_array_equal(same, cleaned(line))
+    assert all_cleaned([]) == []
+
+
+def test_places_along_a_line_are_interpolated_as_by_numpy() -> None:
+    for line in _lines():
+        length = arc_length(line)
+        distance = np.concatenate((np.linspace(-1.0, length[-1] + 1.0, 17), length))
+        expected = np.stack([np.interp(distance, length, line[:, axis]) for axis in range(3)], axis=1)
+        np.testing.assert_array_equal(at_distance(line, distance), expected)
+
+
+def lane(edge: str, index: int, line: np.ndarray) -> Lane:
+    return Lane(f"{edge}_{index}", edge, line, 3.5, 30.0, LaneMarking.DASHED, LaneMarking.DASHED, index == 0)
+
+
+def test_neighbours_on_a_curve_share_distances_and_edges_count_on() -> None:
+    angle = np.linspace(0.0, np.pi / 2, 400)
+    outer = 100.0 * np.column_stack((np.sin(angle), 1 - np.cos(angle), np.zeros(len(angle))))
+    inner = parallel(outer, 3.5)
+    onward = outer[-1] + np.array([[0.0, 0, 0], [0, 50.0, 0]])
+    lanes = [lane("curve", 0, outer), lane("curve", 1, inner), lane("straight", 0, onward)]
+    chainage = Chainage(lanes)
+    assert chainage.along(lanes[1], inner) == pytest.approx(chainage.along(lanes[0], outer), abs=0.02)
+    assert chainage.along(lanes[2], onward)[0] == pytest.approx(arc_length(outer)[-1])
+
+
+def test_a_ring_of_edges_has_distances() -> None:
+    corners = np.array([[0.0, 0, 0], [50, 0, 0], [50, 50, 0], [0, 50, 0], [0, 0, 0]])
+    lanes = [lane(str(i), 0, corners[i : i + 2]) for i in range(4)]
+    chainage = Chainage(lanes)
+    assert all(np.isfinite(chainage.along(each, each.centreline)).all() for each in lanes)
+
+
+def test_both_directions_of_a_road_put_the_dashes_of_their_common_line_at_the_same_places() -> None:
+    pieces = [np.array([[0.0, 0, 0], [100, 0, 0]]), np.array([[100.0, 0, 0], [231, 0, 0]])]
+    there = [lane(f"there{i}", 0, piece) for i, piece in enumerate(pieces)]
+    back = [lane(f"back{i}", 0, piece[::-1] + np.array([0, 3.5, 0])) for i, piece in enumerate(pieces)]
+    chainage = Chainage([*there, *back])
+    for one, other in zip(there, back, strict=True):
+        points = at_distance(one.centreline, np.linspace(1.0, 99.0, 50))
+        painted = [np.mod(chainage.along(each, points), 18.0) < 6.0 for each in (one, other)]
+        assert np.mean(painted[0] == painted[1]) > 0.95
+        assert 0.2 < np.mean(painted[0]) < 0.5

@@ -13,7 +13,7 @@ from fogsim.scene.polyline import Chainage
 from fogsim.scene.road import KERB, lane_mesh, transverse_markings
 from fogsim.scene.terrain import Terrain
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
-from tests.scene.conftest import road_under
+from tests.scene.conftest import road_under, street
 
 L_SHAPE = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [4, 4, 0], [4, 10, 0], [0, 10, 0]])
 
@@ -35,22 +35,11 @@ def town() -> RoadNetwork:
             "right": [[-10.0, -1.75, 0.0], [-5.0, -3.2, 0.0], [-1.75, -10.0, 0.0]],
         }
         for name, way in ways.items():
-            inside = name in {"on", "right"}
-            none, solid, double = LaneMarking.NONE, LaneMarking.SOLID, LaneMarking.DOUBLE
-            lanes.append(
-                Lane(
-                    lane_id=f"{name}{arm}",
-                    edge_id=f"{name}{arm}",
-                    centreline=np.array(way) @ turn,
-                    width=3.5,
-                    speed_limit=13.9,
-                    left=none if inside else double,
-                    right=none if inside else solid,
-                    outermost=not inside,
-                    kind=LaneKind.JUNCTION if inside else LaneKind.CARRIAGEWAY,
-                    end=LaneEnd.STOP if name == "in" else LaneEnd.OPEN,
-                )
-            )
+            marks = (LaneMarking.DOUBLE, LaneMarking.SOLID, True, LaneKind.CARRIAGEWAY)
+            if name in {"on", "right"}:
+                marks = (LaneMarking.NONE, LaneMarking.NONE, False, LaneKind.JUNCTION)
+            end = LaneEnd.STOP if name == "in" else LaneEnd.OPEN
+            lanes.append(Lane(f"{name}{arm}", f"{name}{arm}", np.array(way) @ turn, 3.5, 13.9, *marks, end))
     corners = [(10, 3.5), (6, 4), (4, 6), (3.5, 10), (-3.5, 10), (-4, 6), (-6, 4), (-10, 3.5)]
     corners += [(-x, -y) for x, y in corners]
     outline = np.array([(x, y, 0.0) for x, y in corners])
@@ -60,8 +49,7 @@ def town() -> RoadNetwork:
 def hill(slope: float = 0.06) -> Lane:
     x = np.linspace(0.0, 400.0, 21)
     line = np.column_stack((x, np.zeros(21), slope * x))
-    solid = LaneMarking.SOLID
-    return Lane("h_0", "h", line, 3.5, 25.0, solid, solid, outermost=True)
+    return street(line, "h", 25.0, 3.5)
 
 
 def areas_of(part: Mesh) -> np.ndarray:
@@ -78,11 +66,8 @@ def test_a_concave_junction_is_paved_once_and_without_holes(outline: np.ndarray)
     assert set(mesh.instance) == {2}
 
 
-def test_a_sliver_of_a_junction_is_left_out() -> None:
+def test_a_sliver_of_a_junction_is_left_out_and_areas_tell_what_they_cover() -> None:
     assert area_mesh(PavedArea("j", np.array([[0.0, 0, 0], [5, 0, 0], [5, 0.001, 0]]))) is None
-
-
-def test_areas_tell_what_they_cover() -> None:
     lines = np.array([[0.0, 2, 0], [9, 2, 0]]), np.array([[2.0, 2, 0], [8, 8, 0]])
     assert Areas([PavedArea("j", L_SHAPE)]).cover_all(lines) == [True, False]
     assert Areas([]).cover_all(lines) == [False, False]
@@ -192,12 +177,8 @@ def test_road_roadside_and_land_follow_a_hill() -> None:
             assert place[:, 2] == pytest.approx(0.06 * place[:, 0], abs=0.01)
 
 
-def test_the_land_lies_below_every_road_and_falls_to_the_plain() -> None:
-    high = hill(0.0)
-    high = dataclasses.replace(
-        high, lane_id="b_0", edge_id="b", centreline=high.centreline + np.array([0.0, 60.0, 8.0])
-    )
-    climbing = hill()
+def test_the_land_lies_below_every_road_and_falls_to_the_plain(motorway: RoadNetwork) -> None:
+    high, climbing = street(hill(0.0).centreline + np.array([0.0, 60.0, 8.0]), "b", 25.0, 3.5), hill()
     terrain = Terrain([climbing, high])
     for lane in (climbing, high):
         assert (terrain.height(lane.centreline) < lane.centreline[:, 2] - 0.3).all()
@@ -206,9 +187,7 @@ def test_the_land_lies_below_every_road_and_falls_to_the_plain() -> None:
     assert mesh is not None
     chosen = mesh.positions[::7].astype(float)
     assert terrain.height(chosen) - 0.02 == pytest.approx(chosen[:, 2], abs=1e-4)
-
-
-def test_a_plain_has_no_land_of_its_own(motorway: RoadNetwork) -> None:
+    # A plain has no land of its own.
     terrain = Terrain(motorway.lanes)
     assert terrain.mesh() is None
     assert terrain.height(np.zeros((3, 2))) == pytest.approx(terrain.plain) == pytest.approx(-0.1)
@@ -218,8 +197,7 @@ def test_a_road_that_passes_over_another_leaves_it_free() -> None:
     below = hill(0.0)
     x = np.linspace(-200.0, 200.0, 9)
     over = np.column_stack((np.full(9, 200.0), x, np.full(9, 7.0)))
-    above = dataclasses.replace(below, lane_id="o_0", edge_id="o", centreline=over)
-    scene = build(RoadNetwork((below, above), below.centreline))
+    scene = build(RoadNetwork((below, street(over, "o", 25.0, 3.5)), below.centreline))
     surfaces = (Surface.ROAD, Surface.MATT)
     for along in (180.0, 195.0, 205.0, 220.0):
         heights = road_under(scene.ground, along, 0.0, surfaces)
@@ -229,10 +207,8 @@ def test_a_road_that_passes_over_another_leaves_it_free() -> None:
 
 def test_street_lamps_stand_on_one_side_about_every_35_m_if_asked() -> None:
     line = np.array([[0.0, 0, 0], [400, 0, 0]])
-    solid = LaneMarking.SOLID
-    there = Lane("a", "a", line, 3.5, 13.9, solid, solid, outermost=True)
-    back = Lane("b", "b", line[::-1] + np.array([0.0, 3.5, 0.0]), 3.5, 13.9, solid, solid, outermost=True)
-    network = RoadNetwork((there, back), line)
+    back = line[::-1] + np.array([0.0, 3.5, 0.0])
+    network = RoadNetwork((street(line, width=3.5), street(back, "b", width=3.5)), line)
     assert len(street_lamp_heads(build(network))) == 0
     scene = build(network, street_lamps=True)
     heads = street_lamp_heads(scene)
@@ -250,26 +226,21 @@ def test_street_lamps_stand_on_one_side_about_every_35_m_if_asked() -> None:
         assert np.linalg.norm(heads - middle, axis=1).min() < 0.01
 
 
-def test_houses_stand_along_streets_only_and_clear_of_lanes_and_trees(town: RoadNetwork) -> None:
+def test_houses_face_streets_and_stand_along_them_only_and_clear_of_lanes_and_trees(town: RoadNetwork) -> None:
     scene = build(town)
     places = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape.startswith("house")])
     trees = [b for b in scene.scenery if b.shape.startswith(("conifer", "broad_leaved"))]
     assert len(places) > 10
     assert LaneIndex(town.lanes).clearance(places.astype(float)).min() > 9.0
-    apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
-    assert apart[~np.eye(len(places), dtype=bool)].min() > 16.0
     for batch in trees:
         gap = np.abs(batch.transforms[:, None, :2, 3] - places[None, :, :2]).max(axis=2)
         assert gap.min() > 10.9
-    rural = dataclasses.replace(town, lanes=tuple(dataclasses.replace(one, speed_limit=25.0) for one in town.lanes))
-    assert not [batch for batch in build(rural).scenery if batch.shape.startswith("house")]
-
-
-def test_houses_face_their_street(town: RoadNetwork) -> None:
-    scene = build(town)
+    # They face their street.
     batch = next(b for b in scene.scenery if b.shape.startswith("house"))
     for transform in batch.transforms.astype(float):
         place, front = transform[:2, 3], -transform[:2, 1] / np.linalg.norm(transform[:2, 1])
         before = np.array([[*(place + 4.0 * front), 0.0], [*(place - 4.0 * front), 0.0]])
         nearer, farther = LaneIndex(town.lanes).clearance(before)
         assert nearer < farther - 5.0
+    rural = dataclasses.replace(town, lanes=tuple(dataclasses.replace(one, speed_limit=25.0) for one in town.lanes))
+    assert not [batch for batch in build(rural).scenery if batch.shape.startswith("house")]

@@ -9,7 +9,7 @@ from fogsim.scene import build_scene
 from fogsim.scene.signs import SIGN_KINDS, gantries, sign_shapes
 from fogsim.scene.signs.kinds import face_of, shape_name
 from fogsim.scene.signs.symbols import BLACK, lettering
-from fogsim.values import Batch, Camera, CameraPose, RoadNetwork, Scene, Sign, SignMap, Surface
+from fogsim.values import Batch, Camera, CameraPose, Mesh, RoadNetwork, Scene, Sign, SignMap, Surface
 from fogsim.values.scene import Instance
 
 LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
@@ -69,19 +69,15 @@ def test_every_kind_fills_its_diameter_in_every_size() -> None:
 
 
 def test_from_afar_a_face_keeps_its_mean_colour() -> None:
-    def mean(face_mesh: object) -> np.ndarray:
-        mesh = face_mesh
-        a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))  # type: ignore[attr-defined]
-        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        depth = a[:, 2]
+    def mean(mesh: Mesh) -> np.ndarray:
+        a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))
+        area, depth = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), a[:, 2]
         # Of layers above one another only the uppermost shows: subtract what the next one covers.
-        total, levels = np.zeros(3), np.unique(np.round(depth, 4))
-        sums = [area[np.isclose(depth, z, atol=1e-3)].sum() for z in levels] + [0.0]
-        for number, z in enumerate(levels):
-            chosen = np.isclose(depth, z, atol=1e-3)
-            colour = area[chosen] @ mesh.reflectance[mesh.faces[chosen, 0]] / area[chosen].sum()  # type: ignore[attr-defined]
-            total += colour * (sums[number] - sums[number + 1])
-        return total / sums[0]
+        layers = [np.isclose(depth, z, atol=1e-3) for z in np.unique(np.round(depth, 4))]
+        sums = [area[layer].sum() for layer in layers] + [0.0]
+        colours = [area[layer] @ mesh.reflectance[mesh.faces[layer, 0]] / area[layer].sum() for layer in layers]
+        shown = [colour * (sums[n] - sums[n + 1]) for n, colour in enumerate(colours)]
+        return np.asarray(sum(shown) / sums[0])
 
     face = face_of(LIMIT)
     assert mean(face.tiny()) == pytest.approx(mean(face.far()), rel=0.03)

@@ -48,7 +48,7 @@ def test_a_box_has_its_volume_and_area_whichever_corners_are_given() -> None:
         assert np.linalg.norm(part.normals, axis=1) == pytest.approx(1.0)
 
 
-def test_a_disc_has_the_area_of_its_polygon_and_a_ring_that_less_its_hole() -> None:
+def test_discs_rings_quads_and_polygons_have_the_area_within_their_corners() -> None:
     right, up = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     whole = 0.5 * 24 * math.sin(2 * math.pi / 24) * 2.0**2
     assert area(disc((0, 0, 5), 2.0, right, up, GLASS)) == pytest.approx(whole)
@@ -56,9 +56,6 @@ def test_a_disc_has_the_area_of_its_polygon_and_a_ring_that_less_its_hole() -> N
     assert area(ring) == pytest.approx(0.75 * whole)
     assert np.array_equal(np.unique(ring.normals, axis=0), [[0, 0, 1]])
     assert math.pi * 4 == pytest.approx(area(disc((0, 0, 0), 2.0, right, up, GLASS, sides=2000)), rel=1e-5)
-
-
-def test_quads_and_polygons_have_the_area_within_their_corners() -> None:
     assert area(quad([(0, 0, 0), (4, 0, 0), (4, 0, 3), (0, 0, 3)], GLASS, (0, -1, 0))) == pytest.approx(12)
     hexagon = [(math.cos(a), math.sin(a), 0) for a in np.arange(6) * math.pi / 3]
     assert area(polygon(hexagon, GLASS, (0, 0, 1))) == pytest.approx(1.5 * math.sqrt(3))

@@ -20,6 +20,7 @@ from fogsim.units import luminance_of
 from fogsim.values import (
     Camera,
     CameraPose,
+    LightSources,
     PersonState,
     SignalColour,
     SignalHead,
@@ -42,6 +43,12 @@ def showing(*colours: SignalColour, diameter: float = 0.2) -> SignalState:
     return SignalState(("C",) * count, ("a_0",) * count, places, np.zeros(count), np.full(count, diameter), colours)
 
 
+def sources(signals: SignalState, x: float) -> LightSources:
+    """What shines to an eye at a place along the road, of a road without vehicles."""
+    state = dataclasses.replace(traffic(0.0, 10.0), signals=signals, ids=(), types=())
+    return light_sources(state, None, (x, 0.0, 3.0), {})
+
+
 def walking(*ids: str, speed: float = 1.4, x: float = 0.0, raised: bool = False) -> PersonState:
     """Persons who walk east."""
     count = len(ids)
@@ -49,7 +56,7 @@ def walking(*ids: str, speed: float = 1.4, x: float = 0.0, raised: bool = False)
     return PersonState(ids, places, np.zeros(count), np.full(count, speed), ("f_0",) * count, np.full(count, raised))
 
 
-def test_a_head_has_the_lenses_lit_that_it_shows() -> None:
+def test_a_head_has_the_lenses_lit_that_it_shows_or_half_of_the_time() -> None:
     for colour, lit in [
         (SignalColour.RED, SignalLight.RED),
         (SignalColour.RED_YELLOW, SignalLight.RED | SignalLight.YELLOW),
@@ -60,25 +67,18 @@ def test_a_head_has_the_lenses_lit_that_it_shows() -> None:
         (batch,) = signal_batches(showing(colour), 0.0)
         assert batch.lamps.tolist() == [int(lit)]
         assert batch.instance.tolist() == [Instance.TRAFFIC_LIGHT]
-
-
-def test_what_blinks_is_lit_half_of_the_time() -> None:
+    # What blinks is lit half of the time.
     lit = [int(signal_batches(showing(SignalColour.BLINKING), 0.1 * n)[0].lamps[0]) for n in range(20)]
     assert lit.count(int(SignalLight.YELLOW)) == lit.count(0) == 10
 
 
 def test_lit_lenses_shine_200_cd_toward_those_who_approach_and_none_back() -> None:
-    state = dataclasses.replace(traffic(0.0, 10.0), signals=showing(SignalColour.RED, SignalColour.GREEN))
-    none = dataclasses.replace(state, ids=(), types=())
-    seen = light_sources(none, None, (-300.0, 0.0, 3.0), {})
+    seen = sources(showing(SignalColour.RED, SignalColour.GREEN), -300.0)
     assert seen.intensity == pytest.approx([200.0, 200.0], rel=1e-3)
     # Red is above, green below.
     assert seen.position[0, 2] == pytest.approx(3.3)
     assert seen.position[1, 2] == pytest.approx(2.7)
-    assert len(light_sources(none, None, (300.0, 0.0, 3.0), {}).intensity) == 0
-
-
-def test_light_beside_and_below_the_axis_is_as_in_the_published_example() -> None:
+    assert len(sources(showing(SignalColour.RED, SignalColour.GREEN), 300.0).intensity) == 0
     # ITE: 475 cd straight ahead are 0.953 · 0.678 of that, 309 cd, at 5 degrees down and 10 degrees left.
     share = directed_share(np.radians([10.0, 0.0, 120.0]), np.radians([5.0, 0.0, 0.0]))
     assert 475.0 * share[0] == pytest.approx(309.0, abs=3.0)
@@ -87,8 +87,7 @@ def test_light_beside_and_below_the_axis_is_as_in_the_published_example() -> Non
 
 def test_large_lenses_are_as_luminous_as_small_ones_and_so_is_their_surface() -> None:
     for diameter in (0.2, 0.3):
-        state = dataclasses.replace(traffic(0.0, 10.0), signals=showing(SignalColour.GREEN, diameter=diameter))
-        seen = light_sources(dataclasses.replace(state, ids=(), types=()), None, (-500.0, 0.0, 3.0), {})
+        seen = sources(showing(SignalColour.GREEN, diameter=diameter), -500.0)
         luminance = seen.intensity[0] / seen.area[0]
         assert luminance == pytest.approx(luminance_of(lamp_radiance(Surface.LENS_GREEN)), rel=2e-3)
 
@@ -100,8 +99,7 @@ def test_heads_for_persons_have_two_figures_that_shine_less() -> None:
     assert (head.shape, walk.shape) == ("signal_head", "signal_walk")
     assert walk.lamps.tolist() == [int(SignalLight.RED), int(SignalLight.GREEN)]
     assert head.lamps.tolist() == [int(SignalLight.GREEN)]
-    state = dataclasses.replace(traffic(0.0, 10.0), signals=shown, ids=(), types=())
-    seen = light_sources(state, None, (-300.0, 0.0, 3.0), {})
+    seen = sources(shown, -300.0)
     red, green, full = seen.intensity.tolist()
     assert full == pytest.approx(200.0, rel=1e-3)
     assert red == pytest.approx(green) == pytest.approx(0.3 * full)
@@ -171,14 +169,8 @@ def test_a_picture_of_a_crossing_shows_its_light_and_who_walks_there() -> None:
     scene = build_scene(network, SignMap(), np.random.default_rng(0))
     head = next(head for head in network.signal_heads if head.lane_id == "WC_1")
     x, y, _ = head.position
-    signals = SignalState(
-        ("C",),
-        (head.lane_id,),
-        np.array([head.position]),
-        np.array([head.heading]),
-        np.array([head.diameter]),
-        (SignalColour.RED,),
-    )
+    places = {"position": np.array([head.position]), "heading": np.array([head.heading])}
+    signals = dataclasses.replace(showing(SignalColour.RED, diameter=head.diameter), **places)
     persons = dataclasses.replace(walking("anna"), position=np.array([[x - 2.0, y + 3.0, 0.0]]))
     pose = CameraPose((x - 25.0, y + 3.0, 1.4), 0.0)
     with contextlib.closing(make_renderer("cpu", scene, 1e4)) as renderer:

@@ -1,6 +1,5 @@
 """What others tell of the fog: who, where, how often, how wrong, and what arrives."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -13,7 +12,7 @@ from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import FogBank, FogField, FogReport, TrafficState
 from tests.data.early_motorway import EARLY
-from tests.recorders.synthetic import traffic
+from tests.helpers import vehicles as states
 
 ROUTE = np.array([[0.0, 0.0, 0.0], [1000.0, 0.0, 0.0], [1000.0, 2000.0, 0.0]])
 EVEN = FogField(0.03, (1.0,) * 3)
@@ -28,17 +27,12 @@ def senders(**reports: object) -> FogReports:
 
 def vehicles(places: list[tuple[float, float, float]], ego: tuple[float, float] = (100.0, 0.0)) -> TrafficState:
     """The ego, which goes east, and others: x, y, heading."""
-    count = 1 + len(places)
-    repeated = {
-        field.name: np.repeat(value[:1], count, axis=0)
-        for field in dataclasses.fields(TrafficState)
-        if isinstance(value := getattr(traffic(0.0, 20.0), field.name), np.ndarray)
-    }
-    repeated["position"] = np.array([(*ego, 0.0), *((x, y, 0.0) for x, y, _ in places)])
-    repeated["heading"] = np.array([0.0, *(heading for _, _, heading in places)])
-    names = ("ego", *(f"car{i}" for i in range(len(places))))
-    return dataclasses.replace(
-        traffic(0.0, 20.0), ids=names, types=("car",) * count, lane=("motorway_1",) * count, **repeated
+    return states.vehicles(
+        [(*ego, 0.0), *((x, y, 0.0) for x, y, _ in places)],
+        ids=("ego", *(f"car{i}" for i in range(len(places)))),
+        heading=[0.0, *(heading for _, _, heading in places)],
+        speed=20.0,
+        lane="motorway_1",
     )
 
 

@@ -24,6 +24,13 @@ def two_cars(x: float, y: float) -> TrafficState:
     return vehicles(places, ids=("ego", "other"), speed=20.0, size=(4.5, 1.8, 1.5), paint=0.4)
 
 
+def drawing(scenario: fogsim.Scenario, *lanes: Lane, structures: tuple[Structure, ...] = ()) -> ViewRenderer:
+    """A renderer of a network whose route leads along its lanes."""
+    route = np.concatenate([lane.centreline for lane in lanes])
+    network = RoadNetwork(lanes, route, structures=structures)
+    return ViewRenderer(build.world_config(scenario), build.camera_config(scenario), network, SignMap())
+
+
 def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
     pose = mounted_pose(
         build.camera_config(scenario).on(), state.position[0], 0.0, build.camera_config(scenario).mount().setback
@@ -33,10 +40,7 @@ def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficS
 
 
 def test_a_camera_beside_the_road_sees_every_vehicle(scenario: fogsim.Scenario) -> None:
-    lane, state = road((0.0, 0.0), 900.0, "a"), two_cars(100.0, 0.0)
-    view_renderer = ViewRenderer(
-        build.world_config(scenario), build.camera_config(scenario), RoadNetwork((lane,), lane.centreline), SignMap()
-    )
+    view_renderer, state = drawing(scenario, road((0.0, 0.0), 900.0, "a")), two_cars(100.0, 0.0)
     pose = mounted_pose(build.camera_config(scenario).on(), np.array([60.0, 0.0, 0.0]), 0.0, 0.0)
     seen_by = {ego: set(view_renderer.render(state, ego, pose, 0.0)[0].instance.ravel()) for ego in (None, 0)}
     # One hides the other.
@@ -53,13 +57,7 @@ def scenario() -> fogsim.Scenario:
 def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogsim.Scenario) -> None:
     pictures = []
     for x, y in ((0.0, 0.0), (1.0e6, 5.5e6)):
-        lane = road((x, y), 900.0, "a")
-        view_renderer = ViewRenderer(
-            build.world_config(scenario),
-            build.camera_config(scenario),
-            RoadNetwork((lane,), lane.centreline),
-            SignMap(),
-        )
+        view_renderer = drawing(scenario, road((x, y), 900.0, "a"))
         pictures.append(seen(view_renderer, scenario, two_cars(x + 100.13, y + 0.17)))
         view_renderer.close()
     assert (pictures[0][0] >= 16).sum() > 10
@@ -83,11 +81,10 @@ def test_a_large_network_looks_as_if_it_were_built_whole(
     scenario: fogsim.Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lanes = [road((900.0 * number, 0.0), 900.0, str(number)) for number in range(5)]
-    network = RoadNetwork(tuple(lanes), np.concatenate([lane.centreline for lane in lanes]))
     pictures = []
     for few in (0, 2000):
         monkeypatch.setattr(view_rendering, "FEW_LANES", few)
-        view_renderer = ViewRenderer(build.world_config(scenario), build.camera_config(scenario), network, SignMap())
+        view_renderer = drawing(scenario, *lanes)
         pictures.append([seen(view_renderer, scenario, two_cars(x, 0.1)) for x in (100.0, 2100.0)])
         view_renderer.close()
     for there, here in zip(*pictures, strict=True):
@@ -96,10 +93,7 @@ def test_a_large_network_looks_as_if_it_were_built_whole(
 
 
 def test_a_closed_view_renderer_says_so(scenario: fogsim.Scenario) -> None:
-    lane = road((0.0, 0.0), 100.0, "a")
-    view_renderer = ViewRenderer(
-        build.world_config(scenario), build.camera_config(scenario), RoadNetwork((lane,), lane.centreline), SignMap()
-    )
+    view_renderer = drawing(scenario, road((0.0, 0.0), 100.0, "a"))
     view_renderer.close()
     with pytest.raises(fogsim.FogSimError, match="closed"):
         seen(view_renderer, scenario, two_cars(10.0, 0.0))
@@ -110,8 +104,7 @@ def test_lamps_in_tunnels_shine_by_day_as_at_dusk_on_the_bonnet_too() -> None:
     dim = fogsim.load_scenario("motorway_fog_bank", settings)
     lane = road((0.0, 0.0), 900.0, "a")
     roof = Structure("t", StructureKind.TUNNEL, lane.centreline, 12.0, 5.2, 6.0)
-    network = RoadNetwork((lane,), lane.centreline, structures=(roof,))
-    view_renderer = ViewRenderer(build.world_config(dim), build.camera_config(dim), network, SignMap())
+    view_renderer = drawing(dim, lane, structures=(roof,))
     state, camera = two_cars(400.0, 0.0), build.camera_config(dim)
     pose = mounted_pose(camera.on(), state.position[0], 0.0, camera.mount().setback)
     day, dusk = (view_renderer.render(state, 0, pose, 0.0, illuminance=light)[1].copy() for light in (10_000.0, 100.0))

@@ -52,6 +52,8 @@ def test_statistics_of_episodes_in_a_vector(name: str, mode: AutoresetMode) -> N
 def test_infos_have_one_tree_and_are_numbers_on_request(name: str) -> None:
     env = made(name, 4)
     _, first = env.reset(seed=1)
+    with pytest.raises(InputError, match=r"only before its first reset\(\)"):
+        pickle.dumps(env.unwrapped)
     later = [env.step(env.action_space.sample())[-1] for _ in range(4)]
     assert all(tree(info) == tree(first) for info in later)
     assert first["reward_terms"].keys() == later[0]["reward_terms"].keys()
@@ -68,10 +70,10 @@ def test_environments_pickle_before_the_reset_and_say_why_not_after() -> None:
     for name in ALL:
         env = made(name).unwrapped
         pickle.loads(pickle.dumps(env))  # noqa: S301 - our own
-        env.reset(seed=1)
-        with pytest.raises(InputError, match=r"only before its first reset\(\)"):
-            pickle.dumps(env)
-        env.close()
+    env.reset(seed=1)
+    with pytest.raises(InputError, match=r"only before its first reset\(\)"):
+        pickle.dumps(env)
+    env.close()
 
 
 def test_corridors_pickle_and_their_infos_are_numbers() -> None:

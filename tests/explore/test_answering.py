@@ -13,20 +13,14 @@ SMALL = [EARLY, "renderer=cpu", "camera.width=160", "camera.height=120", "durati
 IN_FOG = Question(time=0.5, chosen={"visibility": 80.0})
 
 
-@pytest.fixture
-def explorer() -> Iterator[Explorer]:
-    explorer = begun(SMALL)
-    yield explorer
-    explorer.close()
-
-
 def begun(settings: list[str]) -> Explorer:
     explorer = Explorer(load_scenario("motorway_fog_bank", settings), "motorway_fog_bank", 1, settings)
     explorer.drive.start()
     return explorer
 
 
-def test_a_question_has_one_answer_whatever_was_asked_before(explorer: Explorer) -> None:
+def test_a_question_has_one_answer_whatever_was_asked_before() -> None:
+    explorer = begun(SMALL)
     questions = [
         IN_FOG,
         Question(time=0.5, chosen={"visibility": 80.0, "light": 1.0, "height": 2.0, "pitch": 4.0}),
@@ -39,6 +33,58 @@ def test_a_question_has_one_answer_whatever_was_asked_before(explorer: Explorer)
         other = begun(SMALL)
         assert other.answer(asked) == answer
         other.close()
+
+
+def test_what_the_script_does_is_seen_until_it_is_chosen_otherwise() -> None:
+    dusk = "timeline=[{when: time >= 0.2 s, do: {light: {illuminance_lx: 100}}}]"
+    explorer = begun([*SMALL, dusk])
+    lights = [
+        explorer.answer(Question(time, chosen=chosen))
+        for time, chosen in ((0.1, {}), (0.5, {}), (0.5, {"light": 3000.0}))
+    ]
+    explorer.close()
+    assert [answer and answer["values"]["light"] for answer in lights] == [10_000.0, 100.0, 3000.0]
+
+
+def test_only_a_drive_with_frames_is_explored() -> None:
+    with pytest.raises(InputError, match="renderer: none draws no frames"):
+        begun(["renderer=none", "estimators=[]"])
+    with pytest.raises(InputError, match="fogsim explore needs an ego vehicle"):
+        begun(
+            [
+                "traffic.ego=none",
+                "lighting=low_beam",
+                "traffic.keep_lane=[]",
+                "traffic.events=[]",
+                "renderer=none",
+                "estimators=[]",
+                "fog={visibility_m: 80}",
+                "fusion=grid_filter",
+            ]
+        )
+
+
+@pytest.mark.timeout(1800)  # night methods calibrate themselves for each camera
+@pytest.mark.nightly
+def test_every_shipped_scenario_is_explored() -> None:
+    for name in catalogue():
+        # One draws nothing and has no estimators.
+        estimators = ["estimators=[joint_road]"] if "renderer: none" in catalogue()[name].read_text("utf-8") else []
+        explorer = Explorer(load_scenario(name, [*SMALL[1:4], *estimators]), name, 1)
+        explorer.drive.start()
+        for chosen in ({}, {"visibility": 80.0}, {"visibility": 80.0, "light": 2000.0}):
+            answer = explorer.answer(Question(time=1.0, chosen=chosen))
+            assert answer is not None
+            assert answer["estimates"], name
+        explorer.close()
+
+
+@pytest.fixture(scope="module")
+def explorer() -> Iterator[Explorer]:
+    """One for all tests below; other drives come before it, since a process has one SUMO."""
+    explorer = begun(SMALL)
+    yield explorer
+    explorer.close()
 
 
 def test_the_frame_the_estimates_and_the_advice_follow_what_is_chosen(explorer: Explorer) -> None:
@@ -76,17 +122,6 @@ def test_lamps_show_by_night(explorer: Explorer) -> None:
     assert len(images) == 4
 
 
-def test_what_the_script_does_is_seen_until_it_is_chosen_otherwise() -> None:
-    dusk = "timeline=[{when: time >= 0.2 s, do: {light: {illuminance_lx: 100}}}]"
-    explorer = begun([*SMALL, dusk])
-    lights = [
-        explorer.answer(Question(time, chosen=chosen))
-        for time, chosen in ((0.1, {}), (0.5, {}), (0.5, {"light": 3000.0}))
-    ]
-    explorer.close()
-    assert [answer and answer["values"]["light"] for answer in lights] == [10_000.0, 100.0, 3000.0]
-
-
 def test_after_the_end_comes_the_last_moment(explorer: Explorer) -> None:
     answer = explorer.answer(Question(time=100.0))
     assert answer is not None
@@ -115,36 +150,3 @@ def test_a_query_that_the_page_does_not_send_is_refused(query: dict[str, str], m
 def test_a_value_out_of_range_is_refused_as_in_a_file(explorer: Explorer) -> None:
     with pytest.raises(InputError, match=r"camera\.pitch_deg: input should be less than or equal to 45; got 80"):
         explorer.answer(Question(chosen={"pitch": 80.0}))
-
-
-def test_only_a_drive_with_frames_is_explored() -> None:
-    with pytest.raises(InputError, match="renderer: none draws no frames"):
-        begun(["renderer=none", "estimators=[]"])
-    with pytest.raises(InputError, match="fogsim explore needs an ego vehicle"):
-        begun(
-            [
-                "traffic.ego=none",
-                "lighting=low_beam",
-                "traffic.keep_lane=[]",
-                "traffic.events=[]",
-                "renderer=none",
-                "estimators=[]",
-                "fog={visibility_m: 80}",
-                "fusion=grid_filter",
-            ]
-        )
-
-
-@pytest.mark.timeout(1800)  # night methods calibrate themselves for each camera
-@pytest.mark.nightly
-def test_every_shipped_scenario_is_explored() -> None:
-    for name in catalogue():
-        # One draws nothing and has no estimators.
-        estimators = ["estimators=[joint_road]"] if "renderer: none" in catalogue()[name].read_text("utf-8") else []
-        explorer = Explorer(load_scenario(name, [*SMALL[1:4], *estimators]), name, 1)
-        explorer.drive.start()
-        for chosen in ({}, {"visibility": 80.0}, {"visibility": 80.0, "light": 2000.0}):
-            answer = explorer.answer(Question(time=1.0, chosen=chosen))
-            assert answer is not None
-            assert answer["estimates"], name
-        explorer.close()

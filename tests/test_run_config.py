@@ -31,11 +31,7 @@ def test_clocks_that_do_not_fit_are_refused() -> None:
         replace(CONFIG, periods=Periods(traffic_steps=2))
 
 
-def test_who_cannot_run_it_says_why() -> None:
-    with pytest.raises(InputError, match="closed loop needs an ego"):
-        fogsim.ClosedLoop(replace(CONFIG, traffic=TrafficSetup(None, ego=None)))
-    with pytest.raises(InputError, match="'ego'; write none"):
-        next(fogsim.run_traffic(CONFIG))
+def test_advice_without_sections_is_refused() -> None:
     with pytest.raises(InputError, match="needs sections"):
         RoadAdvice(AdviceConfig())
 

@@ -52,14 +52,7 @@ def test_an_entry_begins_once_or_each_time_and_after_its_delay() -> None:
     )
     speeds = [5.0, 20.0, 20.0, 20.0, 5.0, 20.0]
     steps = [step(0.1 * i, speed=speed, lead=100.0) for i, speed in enumerate(speeds)]
-    assert names(timeline, *steps) == [
-        [],
-        ["first", "timeline.1"],
-        [],
-        ["timeline.2"],
-        [],
-        ["timeline.1"],
-    ]
+    assert names(timeline, *steps) == [[], ["first", "timeline.1"], [], ["timeline.2"], [], ["timeline.1"]]
 
 
 def test_an_entry_waits_for_its_vehicles() -> None:
@@ -204,10 +197,7 @@ def test_speeds_and_lanes_as_others_have_them() -> None:
     # Nobody is called ego in traffic alone: what refers to it waits.
     assert names(timeline, step(0.0, speed=20.0, lead=100.0)) == [[]]
     due = timeline.due(step(0.1, speed=20.0, lead=100.0, ego=0.0))
-    assert due.actions.traffic == (
-        ChangeSpeed("lead", 31.0, pytest.approx(5.5)),
-        ChangeLane("lead", 1, 60.0),
-    )
+    assert due.actions.traffic == (ChangeSpeed("lead", 31.0, pytest.approx(5.5)), ChangeLane("lead", 1, 60.0))
 
 
 def test_an_entry_that_does_nothing_remembers_and_a_condition_ends_the_run() -> None:

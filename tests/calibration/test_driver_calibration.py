@@ -65,8 +65,7 @@ def test_shares_of_kinds_come_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reach", "fitted"),
-    [((25.0, 45.0), ["overdriving", "speed_spread"]), ((150.0, 200.0), ["slowest_share"])],
+    ("reach", "fitted"), [((25.0, 45.0), ["overdriving", "speed_spread"]), ((150.0, 200.0), ["slowest_share"])]
 )
 def test_constants_that_no_vehicle_shows_are_left_out(reach: tuple[float, float], fitted: list[str]) -> None:
     found = fit_drivers(passages(500, 1, reach=reach))

@@ -80,7 +80,7 @@ def test_the_coco_file_hangs_together(whole: Path) -> None:
         assert np.all(read_png(whole / image["semantic_file"])[mask] == annotation["category_id"])
 
 
-@pytest.mark.parametrize("stop_after", [1, 3, 4])
+@pytest.mark.parametrize("stop_after", [3, 4])
 def test_an_interrupted_data_set_is_continued_to_the_same_bytes(whole: Path, tmp_path: Path, stop_after: int) -> None:
     def interrupt(frames: int) -> None:
         if frames == stop_after:

@@ -74,14 +74,6 @@ def test_kept_pictures_are_those_drawn_today(sheets: ModuleType, renderer: str, 
     assert difference(drawn, known.pop(title)) < TOLERANCE
 
 
-@pytest.mark.parametrize("renderer", ["cpu", "opengl"])
-def test_no_two_pictures_of_a_sheet_pass_for_each_other(sheets: ModuleType, renderer: str) -> None:
-    known = list(kept(sheets, renderer).items())
-    for number, (title, picture) in enumerate(known):
-        for other_title, other in known[number + 1 :]:
-            assert difference(picture, other) > TOLERANCE, (title, other_title)
-
-
 @pytest.mark.parametrize(
     ("title", "change"),
     [

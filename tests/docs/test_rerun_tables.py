@@ -69,15 +69,8 @@ WIDTH = ("width", "python benchmarks/roads.py width 1")
 TWICE = ("twice", "python benchmarks/roads.py twice 2")
 FAILS = ("twice", "python benchmarks/roads.py twice 9 && exit 3")
 BUSY = ("width", f"{WIDTH[1]} && if test ! -e stopped; then touch busy; sleep 60; fi")
-UNTIL = "for i in $(seq 300); do test -e {0} && break; sleep 0.1; done; test -e {0}"
-STOPS = (
-    "twice",
-    f"{TWICE[1]} && if test ! -e stopped; then {UNTIL.format('busy')}; touch stopped; kill $PPID; sleep 60; fi",
-)
-MEET = tuple(
-    (name, f"{command} && touch {name} && {UNTIL.format(other)}")
-    for (name, command), other in ((WIDTH, "twice"), (TWICE, "width"))
-)
+UNTIL = "for i in $(seq 300); do test -e busy && break; sleep 0.1; done; test -e busy"
+STOPS = ("twice", f"{TWICE[1]} && if test ! -e stopped; then {UNTIL}; touch stopped; kill $PPID; sleep 60; fi")
 ALONE = tuple((name, f"mkdir busy && {command} && sleep 0.5 && rmdir busy") for name, command in (WIDTH, TWICE))
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -247,15 +240,6 @@ def test_tables_that_have_not_changed_are_not_measured(root: Path, rerun: Run) -
     assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
 
 
-def test_two_commands_run_at_once(root: Path, rerun: Run) -> None:
-    change(root / "fogsim" / "road.py", "3.5", "3.7")
-    done = rerun(measured=MEET)
-    assert done.returncode == 0, done.stderr
-    assert page(root).count("*Measured with FogSim 1.2.3 (") == 2
-    assert "| any | 3.7 |" in page(root)
-    assert "| any | 7.4 |" in page(root)
-
-
 @pytest.mark.parametrize("field", [{"times": "all"}, {"cores": 2}], ids=str)
 def test_times_and_two_cores_need_the_whole_machine(root: Path, rerun: Run, field: dict[str, object]) -> None:
     done = rerun(measured=ALONE, **field)
@@ -287,18 +271,6 @@ def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> 
     assert done.returncode == 1
     assert "width is being measured by another command" in done.stderr
     assert rerun("width").returncode == 0
-
-
-def test_a_forecast_fills_both_cores(docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
-    table_round, measurement = docs("table_round"), docs("measured_tables").Measurement
-    monkeypatch.setattr(table_round, "CORES", 2)
-    one, other, both, timed = (
-        measurement(name, (), 0.0, (), (), times, cores)
-        for name, times, cores in (("a", "", 1), ("b", "", 1), ("c", "", 2), ("d", "ms", 1))
-    )
-    assert table_round.forecast({one: 10.0, other: 20.0}) == 20.0
-    assert table_round.forecast({one: 10.0, other: 20.0, both: 8.0, timed: 2.0}) == 25.0
-    assert table_round.forecast({}) == 0.0
 
 
 def test_last_digits_and_times_of_a_cell(docs: Callable[[str], ModuleType]) -> None:

@@ -192,8 +192,3 @@ def test_settings_that_a_scenario_speaks_of_are_its_keys() -> None:
     for page, settings in SETTINGS.items():
         for setting in settings:
             load_scenario(str(CHECKOUT / Path(page).parent), [setting])
-
-
-def test_a_wrong_option_is_found() -> None:
-    with pytest.raises(Exception, match="No such option"):
-        KNOWN["run"].make_context("run", ["motorway_fog_bank", "--sed", "1"])

@@ -1,7 +1,6 @@
 """Files that are whole or not there."""
 
 import errno
-import json
 import math
 import os
 import stat
@@ -21,19 +20,8 @@ from fogsim.core.files.atomic import (
     whole_file,
     write_bytes,
     write_json,
-    write_text,
 )
 from fogsim.errors import InputError
-
-
-def test_what_is_written_is_read_back_and_nothing_else_stays(tmp_path: Path) -> None:
-    write_bytes(tmp_path / "a", b"\x00\xff")
-    write_text(tmp_path / "b", "20 m – Ω\n")
-    write_json(tmp_path / "c", {"V": 80.0, "name": "Nebel", "none": None})
-    assert (tmp_path / "a").read_bytes() == b"\x00\xff"
-    assert (tmp_path / "b").read_text(encoding="utf-8") == "20 m – Ω\n"
-    assert json.loads((tmp_path / "c").read_text(encoding="utf-8")) == {"V": 80.0, "name": "Nebel", "none": None}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "c"]
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

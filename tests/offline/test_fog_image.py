@@ -228,10 +228,6 @@ def test_impossible_depths_are_refused(folder: Path, distance: NDArray[np.float6
         run(folder, depth=folder / "wrong.npy")
 
 
-def test_a_camera_file_is_read_in_its_readers_units(folder: Path) -> None:
-    assert load_camera(folder / "camera.yaml") == CAMERA
-
-
 def test_mistakes_in_a_camera_file_are_told(folder: Path) -> None:
     for old, new, told in [
         ("focal_length_px", "focal_lenght_px", "camera.yaml:3: focal_lenght_px: unknown key; did you mean 'focal_len"),

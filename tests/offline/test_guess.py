@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from fogsim.errors import InputError
-from fogsim.offline import camera_text, estimate_images, find_source, guess_camera, write_camera
+from fogsim.offline import camera_text, find_source, guess_camera, write_camera
 from fogsim.offline.camera_file import load_camera
 from fogsim.offline.source import ImageFiles
 from fogsim.values import Response
@@ -31,18 +31,6 @@ def test_the_pitch_comes_from_the_lines_of_the_road(drive) -> None:
     assert (guess.camera.width, guess.camera.height, guess.camera.mount_height) == (640, 480, HEIGHT)
     assert guess.camera.response is Response.SRGB
     assert "8 of 8 images" in guess.reasons["pitch_deg"]
-
-
-def test_a_guessed_camera_is_good_enough_to_estimate_with(drive, tmp_path: Path) -> None:
-    source = find_source(drive.folder / "drive.mp4")
-    write_camera(
-        tmp_path / "camera.yaml", guess_camera(source, mount_height=HEIGHT, field_of_view=true_field_of_view(drive))
-    )
-    camera = load_camera(tmp_path / "camera.yaml")
-    estimates = [result.estimates[0] for result in estimate_images(drive.folder / "images", camera, "joint_road")]
-    found = [estimate.visibility for estimate in estimates if estimate.valid]
-    assert len(found) >= len(drive.frames) // 2
-    assert found == pytest.approx([120.0] * len(found), rel=0.06)
 
 
 def test_what_is_not_stated_is_assumed_and_said(drive) -> None:

@@ -76,7 +76,7 @@ def inverse_depths(table: MeshTable, one: Drawing, seen: np.ndarray, u: np.ndarr
 
 
 def test_copies_are_left_out_only_where_nothing_of_them_is_seen() -> None:
-    for order, seed in [(1, 0), (-1, 1), (-1, 2)]:
+    for order, seed in [(1, 0), (-1, 1)]:
         shapes = {"ball": BALL, "open": OPEN, "inside out": INSIDE_OUT}
         table = MeshTable.of(shapes)
         numbers, transforms = scattered(np.random.default_rng(seed), 150, len(shapes))

@@ -9,7 +9,6 @@ from fogsim.errors import InputError, MissingDependencyError, UnknownNameError
 from fogsim.render import Renderer, RenderError, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.values import Camera, CameraPose, Lamp, RoadNetwork, Scene, SignMap, TrafficState
-from tests.helpers.command import run_python
 from tests.helpers.vehicles import vehicles
 from tests.render.conftest import rays
 from tests.scene.conftest import carriageway
@@ -47,6 +46,11 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="session")
+def bare(make: Maker, scene: Scene) -> Renderer:
+    return make(Scene(ground=scene.ground, shapes={}, scenery=()))
+
+
+@pytest.fixture(scope="session")
 def renderer(make: Maker, scene: Scene) -> Renderer:
     return make(scene)
 
@@ -75,11 +79,8 @@ def upward(camera: Camera, pose: CameraPose) -> np.ndarray:
         (Camera(320, 240, 300.0, (150.0, 130.0), 2.0, -0.02, -0.1), CameraPose((50.0, 1.0, 2.0), 2.8, 0.05)),
     ],
 )
-def test_terrain_and_sky_part_at_the_horizon_for_any_attitude(
-    make: Maker, scene: Scene, camera: Camera, pose: CameraPose
-) -> None:
-    bare = Scene(ground=scene.ground, shapes=scene.shapes, scenery=())
-    view = make(bare).render((), camera, pose)
+def test_terrain_and_sky_part_at_the_horizon_for_any_attitude(bare: Renderer, camera: Camera, pose: CameraPose) -> None:
+    view = bare.render((), camera, pose)
     up = upward(camera, pose)
     terrain = (view.instance == 1) & (view.distance < 5e3)
     assert terrain.sum() > 1000
@@ -144,10 +145,9 @@ def test_a_lit_lamp_adds_its_luminance(renderer: Renderer, camera: Camera, lamp:
     assert 4 <= np.count_nonzero(added > 1) < 0.05 * added.size
 
 
-def test_far_from_the_origin_the_picture_is_the_same(make: Maker, scene: Scene) -> None:
-    bare = Scene(ground=scene.ground, shapes=scene.shapes, scenery=())
+def test_far_from_the_origin_the_picture_is_the_same(bare: Renderer) -> None:
     pose = CameraPose((1000.0, 0.0, 1.38), 0.0)
-    view = make(bare).render((), CAMERA, pose)
+    view = bare.render((), CAMERA, pose)
     exact = 1.38 / -upward(CAMERA, pose)[400, 320]
     assert view.distance[400, 320] == pytest.approx(exact, rel=1e-4)
 
@@ -189,20 +189,3 @@ def test_unknown_renderers_and_light_are_refused_and_the_report_names_the_versio
     with pytest.raises(InputError, match="illuminance"):
         make_renderer("opengl", scene, -1.0)
     assert re.match(r"OpenGL \((EGL|OSMesa)\) [34]\.\d", gl_report())
-
-
-def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer) -> None:
-    code = (
-        "import os\nfrom fogsim.render import gl_report\ngl_report()\n"
-        "if os.fork() == 0:\n"
-        "    try:\n        gl_report()\n"
-        "    except Exception as error:\n        print(type(error).__name__, error, flush=True)\n"
-        "    os._exit(0)\n"
-        "os.wait()\nprint('parent', gl_report())\n"
-    )
-    done = run_python("-c", code)
-    said = done.stdout + done.stderr
-    assert "RenderError" in said
-    assert "does not survive a fork" in said
-    assert "start workers before the parent draws, or with the start method 'spawn'" in said
-    assert "parent" in said

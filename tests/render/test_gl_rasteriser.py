@@ -149,21 +149,45 @@ def here() -> tuple[str, str]:
     return f"{context().version} {context().description}", f"{len(np.unique(triangle_ids))} {digest}"
 
 
-def elsewhere(**environment: str) -> tuple[str, str]:
-    """The same of another process."""
+FORK = """
+import os
+from fogsim.render import gl_report
+if os.fork() == 0:
+    try:
+        gl_report()
+    except Exception as error:
+        print(type(error).__name__, error, flush=True)
+    os._exit(0)
+os.wait()
+print("parent", gl_report())"""
+
+
+def elsewhere(then: str = "", **environment: str) -> list[str]:
+    """The same of another process, and what it prints in code thereafter."""
     code = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\nimport test_gl_rasteriser as t"
-    version, digest = run_python(
-        "-c", f"{code}\nprint(*t.here(), sep='\\n')", environment=environment
-    ).stdout.splitlines()
-    return version, digest
+    code += f"\nprint(*t.here(), sep='\\n', flush=True)\n{then}"
+    return run_python("-c", code, environment=environment).stdout.splitlines()
 
 
-def test_an_older_opengl_draws_the_same() -> None:
-    newer, old = here(), elsewhere(MESA_GL_VERSION_OVERRIDE="4.1")
-    if not old[0].startswith("(4, 1)"):
+@pytest.fixture(scope="module")
+def older() -> list[str]:
+    """What a process with an older OpenGL draws, and its child that is forked after it."""
+    return elsewhere(FORK, MESA_GL_VERSION_OVERRIDE="4.1")
+
+
+def test_a_context_from_before_a_fork_is_refused_in_the_child(older: list[str]) -> None:
+    child, parent = older[2:]
+    assert child.startswith("RenderError")
+    assert "does not survive a fork: start workers before the parent draws, or with the start method 'spawn'" in child
+    assert parent.startswith("parent OpenGL")
+
+
+def test_an_older_opengl_draws_the_same(older: list[str]) -> None:
+    newer = here()
+    if not older[0].startswith("(4, 1)"):
         pytest.skip("this OpenGL is not Mesa's, which can be told to be old")
     assert not newer[0].startswith("(4, 1)")
-    assert newer[1] == old[1]
+    assert newer[1] == older[1]
 
 
 @pytest.mark.nightly

@@ -96,7 +96,7 @@ def test_stretches_keep_the_mean_and_have_their_deviation_at_any_distance() -> N
 
 
 def test_all_renderers_draw_the_same_road(place: Place) -> None:
-    scene = dataclasses.replace(place.scene, pavement=Pavement(RoadSurface.WET, repairs=0.0))
+    scene = Scene(place.scene.ground, {}, (), Pavement(RoadSurface.WET, repairs=0.0))
     made = {name: make_renderer(name, scene, ILLUMINANCE) for name in ("cpu", "opengl", "pyrender")}
     views = {name: one.render((), CAMERA, place.pose) for name, one in made.items()}
     for one in made.values():

@@ -10,10 +10,12 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 from fogsim.values.scene import Instance
-from tests.openscenario.writing import CAR, after, begun, box, event, first_step, lane, over, row_of, run, speed, write
+
+from tests.openscenario.writing import (  # isort: skip
+    CAR, PERSON, after, begun, box, event, first_step, lane, linear, over, row_of, run, speed, speed_of, write,
+)  # fmt: skip
 
 CARGO = box("MiscObject", "obstacle", 1.0, 1.5, 1.0)
-PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
 
 
 def _run(file: Path, *settings: str) -> list[Step]:
@@ -82,24 +84,18 @@ def test_names_may_hold_blanks(tmp_path: Path) -> None:
 
 
 def test_a_thing_without_a_size_is_refused(tmp_path: Path) -> None:
-    file = write(
-        tmp_path, {"Ego": CAR, "Box": '<MiscObject miscObjectCategory="none"/>'}, {"Ego": lane(30), "Box": lane(90)}
-    )
+    entities = {"Ego": CAR, "Box": '<MiscObject miscObjectCategory="none"/>'}
+    file = write(tmp_path, entities, {"Ego": lane(30), "Box": lane(90)})
     with pytest.raises(InputError, match=r"MiscObject: expected BoundingBox inside, got"):
         fogsim.load_scenario(file)
-
-
-def _like(other: str) -> str:
-    relative = f'<RelativeTargetSpeed entityRef="{other}" value="1" speedTargetValueType="factor"/>'
-    return speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
 
 
 def test_who_is_no_entity_is_named(tmp_path: Path) -> None:
     for begin, actor, action in [
         ({"Ghost": lane(90)}, "Ego", speed(5)),
-        ({"Ego": f"{lane(30)}\n{_like('Ghost')}"}, "Ego", speed(5)),
+        ({"Ego": f"{lane(30)}\n{speed(speed_of('Ghost'))}"}, "Ego", speed(5)),
         ({}, "Ghost", speed(5)),
-        ({}, "Ego", _like("Ghost")),
+        ({}, "Ego", speed(speed_of("Ghost"))),
     ]:
         file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30), **begin}, {actor: event("e", action, after(1))})
         with pytest.raises(InputError) as refused:
@@ -109,8 +105,7 @@ def test_who_is_no_entity_is_named(tmp_path: Path) -> None:
 
 
 def test_a_story_waits_for_a_vehicle_with_a_blank_in_its_name(tmp_path: Path) -> None:
-    slower = speed(2).replace("step", "linear").replace('"time"', '"rate"').replace('value="0"', 'value="4"', 1)
-    events = event("slow", slower, after(1)) + event("then", speed(5), over("slow"))
+    events = event("slow", speed(2, linear(4, "rate")), after(1)) + event("then", speed(5), over("slow"))
     begin = {"Ego": lane(30), "slow lorry": f"{lane(90)}\n{speed(10)}"}
     steps = _run(write(tmp_path, {"Ego": CAR, "slow lorry": CAR}, begin, {"slow lorry": events}))
     times = begun(steps)
@@ -121,8 +116,7 @@ def test_no_vehicle_begins_where_another_one_is(tmp_path: Path) -> None:
     for ahead, is_free in [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)]:
         file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, {"Ego": lane(90), "Lead": lane(90 + ahead)})
         if is_free:
-            first = first_step(file)
-            assert set(first.traffic.ids) == {"Ego", "Lead"}
+            assert {*first_step(file).traffic.ids} == {"Ego", "Lead"}
         else:
             with pytest.raises(InputError, match="Lead cannot begin where it is to: Ego is there"):
                 read_openscenario(file)

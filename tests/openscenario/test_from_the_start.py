@@ -1,98 +1,65 @@
 """What vehicles do from Init on: speeds that change, trajectories on which they meet the ego, and offsets."""
 
-import math
 from pathlib import Path
 
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
-from tests.openscenario.writing import CAR, after, begun, box, event, group, lane, motion_at, run, speed, write
 
-PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
+from tests.openscenario.writing import (  # isort: skip
+    CAR, HEADER, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, polyline, profile,
+    run, speed, trajectory, world, write,
+)  # fmt: skip
+
 EGO = f"{lane(30)}\n{speed(10)}"
 
 
-def _accelerates(value: float, time: float) -> str:
-    return speed(value).replace('Shape="step" value="0"', f'Shape="linear" value="{time}"')
-
-
-def _profile(*entries: tuple[float, float]) -> str:
-    inner = "".join(f'<SpeedProfileEntry time="{time}" speed="{value}"/>' for time, value in entries)
-    return (
-        '<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="position">'
-        f"{inner}</SpeedProfileAction></LongitudinalAction></PrivateAction>"
-    )
-
-
-def _condition(test: str, who: str = "Ego") -> str:
-    """Group of one condition on a vehicle."""
-    return group(
-        '<Condition name="c" delay="0" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
-        f'triggeringEntitiesRule="any"><EntityRef entityRef="{who}"/></TriggeringEntities><EntityCondition>{test}'
-        "</EntityCondition></ByEntityCondition></Condition>"
-    )
-
-
-def _trajectory(offset: float) -> str:
-    """Action to follow one from (100, 10) by (160, 10) to (160, 60), from an offset on."""
-    inner = "".join(
-        f'<Vertex><Position><WorldPosition x="{x}" y="{y}"/></Position></Vertex>'
-        for x, y in ((100, 10), (160, 10), (160, 60))
-    )
-    return (
-        f'<PrivateAction><RoutingAction><FollowTrajectoryAction initialDistanceOffset="{offset}"><TrajectoryRef>'
-        f'<Trajectory name="t" closed="false"><Shape><Polyline>{inner}</Polyline></Shape></Trajectory></TrajectoryRef>'
-        '<TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/>'
-        "</FollowTrajectoryAction></RoutingAction></PrivateAction>"
-    )
+def _reaches(place: str, tolerance: float, who: str = "Ego") -> str:
+    return group(on(f'<ReachPositionCondition tolerance="{tolerance}">{place}</ReachPositionCondition>', who))
 
 
 def test_a_speed_that_is_ordered_in_init_over_a_time_is_reached_then(tmp_path: Path) -> None:
-    begin = {"Ego": f"{lane(30)}\n{_profile((0, 5), (4, 15))}", "Lead": f"{lane(300)}\n{_accelerates(8, 4)}"}
-    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, stop=after(6.0)))
+    begin = {"Ego": f"{lane(30)}\n{profile((0, 5), (4, 15))}", "Lead": f"{lane(300)}\n{speed(8, linear(4))}"}
+    # One off the lanes, too.
+    begin["Far"] = world(150, -30, 'h="0"') + f"\n{speed(8, linear(2))}"
+    steps = run(write(tmp_path, dict.fromkeys(begin, CAR), begin, stop=after(6.0)))
     for name, speeds in (("Ego", (5.0, 10.0, 15.0)), ("Lead", (0.0, 4.0, 8.0))):
         found = [motion_at(steps, time, name)[2] for time in (0.0, 2.0, 5.0)]
         assert found == pytest.approx(speeds, abs=0.4)
+    assert motion_at(steps, 3.9, "Far")[2] == pytest.approx(8.0, abs=0.1)
+    assert motion_at(steps, 3.9, "Far")[0] > 150.0 + 3.7 + 15.0
+    where = _reaches('<Position><RelativeWorldPosition entityRef="Lead" dx="5" dy="0"/></Position>', 1)
+    with pytest.raises(InputError, match="where Lead is by then is not known"):
+        read_openscenario(write(tmp_path, dict.fromkeys(begin, CAR), begin, stop=where))
 
 
-@pytest.mark.parametrize(("begins", "fast"), [(_accelerates(0, 1), 0.0), (_profile((0, 8)), 8.0)])
+@pytest.mark.parametrize(("begins", "fast"), [(speed(0, linear(1)), 0.0), (profile((0, 8)), 8.0)])
 def test_the_ego_keeps_the_speed_to_which_it_comes_in_init(tmp_path: Path, begins: str, fast: float) -> None:
     steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{begins}"}, stop=after(4.0)))
     assert motion_at(steps, 3.9, "Ego")[2] == pytest.approx(fast, abs=0.05)
 
 
-def test_who_comes_to_a_speed_in_init_is_elsewhere_later(tmp_path: Path) -> None:
-    place = '<Position><RelativeWorldPosition entityRef="Lead" dx="5" dy="0"/></Position>'
-    begin = {"Ego": EGO, "Lead": f"{lane(300)}\n{_accelerates(8, 4)}"}
-    stop = _condition(f'<ReachPositionCondition tolerance="1">{place}</ReachPositionCondition>')
-    with pytest.raises(InputError, match="where Lead is by then is not known"):
-        read_openscenario(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, stop=stop))
+NEAR = (
+    '<RelativeDistanceCondition entityRef="Other" relativeDistanceType="longitudinal" value="0.1" freespace="false" '
+    'rule="lessThan"/>'
+)
 
 
-def test_a_car_off_the_lanes_comes_to_a_speed_in_init(tmp_path: Path) -> None:
-    begin = {"Ego": EGO, "Far": f'<Position><WorldPosition x="150" y="-30" h="0"/></Position>\n{_accelerates(8, 2)}'}
-    steps = run(write(tmp_path, {"Ego": CAR, "Far": CAR}, begin, stop=after(4.0)))
-    assert motion_at(steps, 3.9, "Far")[2] == pytest.approx(8.0, abs=0.1)
-    assert motion_at(steps, 3.9, "Far")[0] > 150.0 + 3.7 + 15.0
-
-
-def test_a_distance_driven_counts_on_any_road(tmp_path: Path) -> None:
-    begin = {"Ego": EGO, "Other": f"{lane(420, 1)}\n{speed(10)}"}
-    stop = _condition('<TraveledDistanceCondition value="30"/>', "Other")
-    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=stop))
-    assert steps[-1].time == pytest.approx(3.0, abs=0.11)
-
-
-def test_reference_points_pass_each_other_between_two_steps(tmp_path: Path) -> None:
-    begin = {"Ego": EGO, "Other": f"{lane(70, 1)}\n{speed(10)}"}
-    close = (
-        '<RelativeDistanceCondition entityRef="Other" relativeDistanceType="longitudinal" value="0.1" '
-        'freespace="false" rule="lessThan"/>'
+@pytest.mark.parametrize(
+    ("s", "stop", "time"),
+    [
+        # A distance that is driven counts on any road.
+        (420, on('<TraveledDistanceCondition value="30"/>', "Other"), 3.0),
+        # Reference points pass each other between two steps: they approach by 2 m a period, from 40 m.
+        (70, on(NEAR), 2.0),
+    ],
+)
+def test_an_oncoming_vehicle_ends_the_run(tmp_path: Path, s: float, stop: str, time: float) -> None:
+    begin = {"Ego": EGO, "Other": f"{lane(s, 1)}\n{speed(10)}"}
+    assert run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=group(stop)))[-1].time == pytest.approx(
+        time, abs=0.11
     )
-    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=_condition(close)))
-    # They approach by 2 m a period, from 40 m.
-    assert steps[-1].time == pytest.approx(2.0, abs=0.11)
 
 
 @pytest.mark.parametrize(
@@ -101,40 +68,29 @@ def test_reference_points_pass_each_other_between_two_steps(tmp_path: Path) -> N
 def test_a_position_is_reached_between_two_steps_but_not_beside_it(
     tmp_path: Path, y: float, tolerance: float, time: float
 ) -> None:
-    place = f'<Position><WorldPosition x="120" y="{y}"/></Position>'
-    reach = _condition(f'<ReachPositionCondition tolerance="{tolerance}">{place}</ReachPositionCondition>')
-    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach + after(5.0)))
+    reach = _reaches(world(120, y), tolerance) + after(5.0)
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach))
     assert steps[-1].time == pytest.approx(time, abs=0.11)
 
 
 @pytest.mark.parametrize("place", ["", f"{lane(118)}\n"])
 def test_a_person_who_crosses_reaches_a_position_in_a_lane(tmp_path: Path, place: str) -> None:
-    line = "".join(
-        f'<Vertex time="{time}"><Position><WorldPosition x="120" y="{y}"/></Position></Vertex>'
-        for time, y in ((0, -6), (4, 2))
-    )
-    crosses = (
-        '<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="t" closed="false">'
-        f"<Shape><Polyline>{line}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>"
-        '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/></TimeReference><TrajectoryFollowingMode '
-        'followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
-    )
-    reach = _condition(f'<ReachPositionCondition tolerance="0.2">{lane(120)}</ReachPositionCondition>', "Ann")
-    steps = run(
-        write(tmp_path, {"Ego": CAR, "Ann": PERSON}, {"Ego": EGO, "Ann": place + crosses}, stop=reach + after(5.0))
-    )
+    crosses = follows(polyline((0, world(120, -6)), (4, world(120, 2))), TIMED)
+    begin, stop = {"Ego": EGO, "Ann": place + crosses}, _reaches(lane(120), 0.2, "Ann") + after(5.0)
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=stop))
     assert steps[-1].time == pytest.approx(2.1, abs=0.21)
 
 
 def test_a_trajectory_is_followed_from_an_offset_on(tmp_path: Path) -> None:
-    begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(90, 1)}\n{speed(10)}\n{_trajectory(70)}"}
-    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, stop=after(2.0)))
+    line = polyline(*((None, world(x, y)) for x, y in ((100, 10), (160, 10), (160, 60))))
+    begin = f"{lane(90, 1)}\n{speed(10)}\n" + follows(line, more=' initialDistanceOffset="70"')
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, {"Ego": EGO, "Other": begin}, stop=after(2.0)))
     # 60 m and 10 m of the trajectory are left out; the front is 3.7 m ahead of the point that follows it.
     for time in (0.1, 1.0):
         expected = 160.0, 20.0 + 10.0 * time + 3.7
         assert motion_at(steps, time, "Other")[:2] == pytest.approx(expected, abs=0.02)
     with pytest.raises(InputError, match=r"initialDistanceOffset: the trajectory is no longer than 110.0 m"):
-        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(10)}\n{_trajectory(110)}"}))
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": begin.replace('"70"', '"110"')}))
 
 
 def test_the_offset_of_one_that_drives_against_a_lane_is_kept(tmp_path: Path) -> None:
@@ -148,24 +104,15 @@ def test_the_offset_of_one_that_drives_against_a_lane_is_kept(tmp_path: Path) ->
     "target", ['<TrajectoryPosition s="5">{}</TrajectoryPosition>', '<WorldPosition x="110" y="-1"/>']
 )
 def test_a_person_on_a_trajectory_meets_the_ego_at_a_steady_speed(tmp_path: Path, target: str) -> None:
-    line = "".join(f'<Vertex><Position><WorldPosition x="110" y="{y}"/></Position></Vertex>' for y in (-6, 6))
-    trajectory = (
-        '<TrajectoryRef><Trajectory name="t" closed="false"><Shape><Polyline>'
-        f"{line}</Polyline></Shape></Trajectory></TrajectoryRef>"
-    )
-    follows = (
-        f"<PrivateAction><RoutingAction><FollowTrajectoryAction>{trajectory}<TimeReference><None/></TimeReference>"
-        '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
-    )
+    line = polyline(*((None, world(110, y)) for y in (-6, 6)))
     meets = (
         '<PrivateAction><SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="7" '
-        f'laneId="-1" s="100"/></TargetPositionMaster><TargetPosition>{target.format(trajectory)}</TargetPosition>'
-        '<FinalSpeed><AbsoluteSpeed value="1.5"><TargetDistanceSteadyState distance="3"/></AbsoluteSpeed></FinalSpeed>'
-        "</SynchronizeAction></PrivateAction>"
+        f'laneId="-1" s="100"/></TargetPositionMaster><TargetPosition>{target.format(trajectory(line))}'
+        '</TargetPosition><FinalSpeed><AbsoluteSpeed value="1.5"><TargetDistanceSteadyState distance="3"/>'
+        "</AbsoluteSpeed></FinalSpeed></SynchronizeAction></PrivateAction>"
     )
-    begin = {"Ego": EGO, "Ann": follows}
-    file = write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("meet", meets, after(0))}, stop=after(8.0))
-    steps = run(file)
+    begin, story = {"Ego": EGO, "Ann": follows(line)}, {"Ann": event("meet", meets, after(0))}
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, story, stop=after(8.0)))
     # The ego needs 7 s for its 70 m; 2 s before, the person has walked 2 m of 5 m and is as fast as it is there.
     (_, early, slow), (_, y, fast) = (motion_at(steps, time, "Ann") for time in (1.0, 5.1))
     assert (early, slow) == pytest.approx((-5.75, 0.0), abs=0.05)
@@ -177,8 +124,8 @@ def test_a_lane_against_its_route_counts_along_the_route(tmp_path: Path) -> None
     points = "".join(f'<Waypoint routeStrategy="shortest">{lane(s, 1)}</Waypoint>' for s in (700, 100))
     place = (
         f'<Position><RoutePosition><RouteRef><Route name="r" closed="false">{points}</Route></RouteRef>'
-        "<InRoutePosition>"
-        '<FromLaneCoordinates pathS="100" laneId="-1" laneOffset="0.3"/></InRoutePosition></RoutePosition></Position>'
+        '<InRoutePosition><FromLaneCoordinates pathS="100" laneId="-1" laneOffset="0.3"/></InRoutePosition>'
+        "</RoutePosition></Position>"
     )
     file = write(tmp_path, {"Ego": CAR, "Other": CAR}, {"Ego": EGO, "Other": place}, stop=after(1.0))
     with pytest.warns(match="lane -1 leads against the route; read as counted along it, which is lane 1"):
@@ -187,9 +134,8 @@ def test_a_lane_against_its_route_counts_along_the_route(tmp_path: Path) -> None
 
 
 def test_places_may_be_relative_to_one_off_the_lanes(tmp_path: Path) -> None:
-    ann = '<Position><WorldPosition x="150" y="-9" h="1.5708"/></Position>'
     ben = '<Position><RelativeObjectPosition entityRef="Ann" dx="2" dy="1"/></Position>'
-    begin = {"Ego": EGO, "Ben": ben, "Ann": ann}
+    begin = {"Ego": EGO, "Ben": ben, "Ann": world(150, -9, 'h="1.5708"')}
     steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON, "Ben": PERSON}, begin, stop=after(1.0)))
     assert motion_at(steps, 0.9, "Ben")[:2] == pytest.approx((149.0, -7.0 + 0.25), abs=0.01)
 
@@ -208,15 +154,8 @@ def test_files_written_on_windows_name_folders_with_backslashes(tmp_path: Path) 
     road = text.split('LogicFile filepath="')[1].split('"')[0]
     (tmp_path / "maps" / "road.xodr").write_bytes(Path(road).read_bytes())
     entry = CAR.replace('name="car"', 'name="entry"')
-    (tmp_path / "maps" / "cars.xosc").write_text(
-        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>'
-        f'<Catalog name="cars">{entry}</Catalog></OpenSCENARIO>'
-    )
-    text = text.replace(road, ".\\maps\\road.xodr").replace(
-        CAR, '<CatalogReference catalogName="cars" entryName="entry"/>'
-    )
-    text = text.replace(
-        "<RouteCatalog>", '<VehicleCatalog><Directory path="..\\FOLDER\\maps"/></VehicleCatalog><RouteCatalog>'
-    )
-    file.write_text(text.replace("FOLDER", tmp_path.name))
-    assert math.isclose(read_openscenario(file).data["fog"]["visibility_m"], 200.0)
+    (tmp_path / "maps" / "cars.xosc").write_text(f'{HEADER}<Catalog name="cars">{entry}</Catalog></OpenSCENARIO>')
+    folder = f'<VehicleCatalog><Directory path="..\\{tmp_path.name}\\maps"/></VehicleCatalog><RouteCatalog>'
+    text = text.replace(road, ".\\maps\\road.xodr").replace("<RouteCatalog>", folder)
+    file.write_text(text.replace(CAR, '<CatalogReference catalogName="cars" entryName="entry"/>'))
+    assert read_openscenario(file).data["fog"]["visibility_m"] == pytest.approx(200.0)

@@ -8,8 +8,9 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
-from .test_shapes import ANN, TIMED, follows, world
-from .writing import CAR, after, begun, event, lane, motion_at, over, run, speed, write
+from tests.openscenario.writing import (  # isort: skip
+    CAR, PERSON, TIMED, after, begun, event, follows, lane, linear, motion_at, over, polyline, run, speed, world, write,
+)  # fmt: skip
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
 
@@ -43,9 +44,8 @@ def between(steps: list[Step], time: float) -> float:
 )
 def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, gap: float) -> None:
     events = event("near", distance(f'displacement="trailingReferencedEntity" {wanted}'), after(1.0))
-    faster = event("faster", speed(14), over("near"))
+    story = {"Next": events, "Ego": event("faster", speed(14), over("near"))}
     begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
-    story = {"Next": events, "Ego": faster}
     steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=after(40.0)))
     then = begun(steps)["faster"]
     assert between(steps, then) == pytest.approx(gap, abs=0.5)
@@ -55,14 +55,9 @@ def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, ga
 
 def test_another_order_before_a_distance_is_reached_counts(tmp_path: Path) -> None:
     # Next speeds up to 15 m/s, brakes from 3 s on, and is as fast as the ego at 16.3 s, 20 m behind it.
-    events = event("near", distance('distance="20" freespace="true"'), after(1.0)).replace("override", "parallel")
+    events = event("near", distance('distance="20" freespace="true"'), after(1.0))
+    events = (events + event("slow", speed(0, linear(40)), after(3.0))).replace("override", "parallel")
     begin = {"Ego": f"{lane(122.95)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
-    slow = (
-        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="40" '
-        'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="0"/></SpeedActionTarget>'
-        "</SpeedAction></LongitudinalAction></PrivateAction>"
-    )
-    events += event("slow", slow, after(3.0)).replace("override", "parallel")
     steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": events}, stop=after(18.0)))
     assert between(steps, 16.3) == pytest.approx(20.0, abs=0.05)
     assert motion_at(steps, 17.5, "Next")[2] < 9.7
@@ -73,8 +68,8 @@ def test_a_distance_of_a_story_that_begins_at_once_is_a_place(tmp_path: Path) ->
     begin = {"Ego": f"{lane(60)}\n{speed(10)}", "Next": f"{lane(90)}\n{speed(10)}"}
     story = {"Next": event("place", place, after(0)) + event("then", speed(5), over("place"))}
     steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=after(2.0)))
-    ego, ahead = (motion_at(steps, 0.0, name) for name in ("Ego", "Next"))
-    assert ahead[0] - 4.6 - ego[0] == pytest.approx(30.0, abs=0.1)
+    ego, ahead = (motion_at(steps, 0.0, name)[0] for name in ("Ego", "Next"))
+    assert ahead - 4.6 - ego == pytest.approx(30.0, abs=0.1)
     assert begun(steps)["then"] == pytest.approx(0.1, abs=0.11)
     late = {"Next": event("place", place.replace("leading", "trailing"), after(1))}
     with pytest.raises(InputError, match="without DynamicConstraints it is there at once"):
@@ -85,18 +80,16 @@ def test_a_distance_of_a_story_that_begins_at_once_is_a_place(tmp_path: Path) ->
 def test_an_event_that_overrides_ends_a_trajectory(tmp_path: Path, reference: str) -> None:
     # Both turn away by 2.9 degrees at 10 m/s; the car takes to its lane from 4 s on, and Ann goes straight on.
     def line(x: float, y: float) -> str:
-        there = f"<Position>{world(x, y)}</Position>", f"<Position>{world(x + 100, y + 5)}</Position>"
-        vertices = "".join(f'<Vertex time="{10 * n}">{place}</Vertex>' for n, place in enumerate(there))
-        return follows(f"<Polyline>{vertices}</Polyline>", reference)
+        return follows(polyline((0, world(x, y)), (10, world(x + 100, y + 5))), reference)
 
     story = {
         "Far": event("path", line(150, -1.75), after(1.0)) + event("lit", LAMPS, after(4.0)),
         "Ann": event("walk", line(150, 30), after(1.0)) + event("stop", speed(2), after(4.0)),
         "Ego": event("then", speed(9), over("path")),
     }
-    begin = {"Ego": f"{lane(20)}\n{speed(10)}", "Far": f"{lane(140)}\n{speed(10)}"}
-    begin["Ann"] = f"<Position>{world(150, 30)}</Position>\n{speed(10)}"
-    steps = run(write(tmp_path, {"Ego": CAR, "Far": CAR, "Ann": ANN}, begin, story, stop=after(8.0)))
+    begin = {"Ego": lane(20), "Far": lane(140), "Ann": world(150, 30)}
+    begin = {name: f"{place}\n{speed(10)}" for name, place in begin.items()}
+    steps = run(write(tmp_path, {"Ego": CAR, "Far": CAR, "Ann": PERSON}, begin, story, stop=after(8.0)))
     x, y, fast = motion_at(steps, 7.5, "Far")
     assert (y, fast) == (pytest.approx(-1.75 + 1.75, abs=1.8), pytest.approx(10.0, abs=0.1))
     assert y == pytest.approx(motion_at(steps, 6.0, "Far")[1], abs=0.01)
@@ -107,19 +100,12 @@ def test_an_event_that_overrides_ends_a_trajectory(tmp_path: Path, reference: st
 
 
 def test_an_event_is_skipped_while_another_of_its_maneuver_runs(tmp_path: Path) -> None:
-    slow = (
-        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="3" '
-        'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget>'
-        "</SpeedAction></LongitudinalAction></PrivateAction>"
-    )
-    events = event("slow", slow, after(1.0))
-    events += event("waits", LAMPS, after(2.0)).replace("override", "skip")
-    events += event("same", LAMPS, after(1.0)).replace("override", "skip").replace('"none"', '"rising"')
-    events += event("free", LAMPS, after(0.5)).replace("override", "skip")
+    events = event("waits", LAMPS, after(2.0)) + event("free", LAMPS, after(0.5))
+    events = (events + event("same", LAMPS, after(1.0)).replace('"none"', '"rising"')).replace("override", "skip")
+    events = event("slow", speed(5, linear(3)), after(1.0)) + events
     file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(20)}\n{speed(10)}"}, {"Ego": events}, stop=after(6.0))
     times = begun(run(file))
-    assert times["free"] == pytest.approx(0.5, abs=0.11)
-    assert times["slow"] == pytest.approx(1.0, abs=0.11)
+    assert (times["free"], times["slow"]) == pytest.approx((0.5, 1.0), abs=0.11)
     assert times["waits"] == pytest.approx(4.0, abs=0.21)
     # Its edge has passed.
     assert "same" not in times

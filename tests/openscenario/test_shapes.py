@@ -11,40 +11,22 @@ from scipy.special import fresnel
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 
-from .writing import CAR, after, box, entry, event, lane, motion_at, run, speed, write
+from tests.openscenario.writing import (  # isort: skip
+    CAR, PERSON, TIMED, after, entry, event, follows, lane, motion_at, run, speed, trajectory, world, write,
+)  # fmt: skip
 
-ANN = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
-TIMED = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
-
-
-def world(x: float, y: float, inside: str = "") -> str:
-    return f'<WorldPosition x="{x}" y="{y}" {inside}/>'
-
-
-def follows(shape: str, reference: str = "<None/>") -> str:
-    return (
-        f'<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="t" closed="false">'
-        f"<Shape>{shape}</Shape></Trajectory></TrajectoryRef><TimeReference>{reference}</TimeReference>"
-        '<TrajectoryFollowingMode followingMode="follow"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
-    )
+HERE = world(100, 20)
 
 
 def nurbs(order: int, controls: Sequence[tuple[float, float, float, float]], knots: Sequence[float]) -> str:
     """NURBS of control points: time, weight, x and y."""
-    points = "".join(
-        f'<ControlPoint time="{t}" weight="{w}"><Position>{world(x, y)}</Position></ControlPoint>'
-        for t, w, x, y in controls
-    )
+    points = "".join(f'<ControlPoint time="{t}" weight="{w}">{world(x, y)}</ControlPoint>' for t, w, x, y in controls)
     return f'<Nurbs order="{order}">{points}{"".join(f"<Knot value={chr(34)}{k}{chr(34)}/>" for k in knots)}</Nurbs>'
 
 
 def written(folder: Path, action: str) -> Path:
-    return write(
-        folder,
-        {"Ego": CAR, "Ann": ANN},
-        {"Ego": f"{lane(50)}\n{speed(20)}", "Ann": f"<Position>{world(100, 20)}</Position>"},
-        {"Ann": event("goes", action, after(1))},
-    )
+    begin = {"Ego": f"{lane(50)}\n{speed(20)}", "Ann": HERE}
+    return write(folder, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("goes", action, after(1))})
 
 
 def path(folder: Path, action: str) -> tuple[np.ndarray, np.ndarray]:
@@ -63,9 +45,8 @@ def off(points: np.ndarray, curve: np.ndarray) -> float:
 
 def test_a_clothoid_is_that_of_fresnel(tmp_path: Path) -> None:
     # From a straight line, curvature s / a²: x and y are Fresnel's integrals, to a radius of 9 m.
-    position = f"<Position>{world(100, 20)}</Position>"
     change, length = 0.01, 100.0 / 9.0
-    shape = f'<Clothoid curvature="0" curvaturePrime="{change}" length="{length}" startTime="0" stopTime="8">{position}'
+    shape = f'<Clothoid curvature="0" curvaturePrime="{change}" length="{length}" startTime="0" stopTime="8">{HERE}'
     points, times = path(tmp_path, follows(f"{shape}</Clothoid>", TIMED))
     scale = math.sqrt(math.pi / change)
     s = np.linspace(0.0, length, 500)
@@ -85,7 +66,7 @@ def test_segments_of_a_spline_follow_one_another(tmp_path: Path) -> None:
         f'<ClothoidSplineSegment hOffset="{turn}" curvatureStart="{a}" curvatureEnd="{b}" length="{m}" timeStart="{t}">'
         for t, (turn, a, b, m) in enumerate(rows)
     ]
-    segments[0] += f"<PositionStart>{world(100, 20)}</PositionStart>"
+    segments[0] += HERE.replace("Position>", "PositionStart>")
     inner = "</ClothoidSplineSegment>".join([*segments, ""])
     points, times = path(tmp_path, follows(f'<ClothoidSpline timeEnd="5">{inner}</ClothoidSpline>', TIMED))
     assert points[-1, :2] == pytest.approx([124.0, 30.0])
@@ -114,11 +95,8 @@ def test_a_weighted_nurbs_is_a_circle_and_one_of_order_4_a_bezier_curve(tmp_path
 def test_a_car_follows_a_clothoid_from_its_position_on(tmp_path: Path) -> None:
     # The reference point turns to the left on a circle of 20 m, from the lane; the front bumper is 3.7 m ahead.
     arc = f'<Clothoid curvature="0.05" length="30">{lane(100)}</Clothoid>'
-    file = write(
-        tmp_path,
-        {"Ego": CAR, "Far": CAR},
-        {"Ego": f"{lane(20)}\n{speed(10)}", "Far": f"{follows(arc)}\n{speed(10)}"},
-    )
+    begin = {"Ego": f"{lane(20)}\n{speed(10)}", "Far": f"{follows(arc)}\n{speed(10)}"}
+    file = write(tmp_path, {"Ego": CAR, "Far": CAR}, begin)
     x, y, _ = motion_at(run(file, "duration_s=2.2"), 2.0, "Far")
     assert (x, y) == pytest.approx(
         (100 + 20 * math.sin(1) + 3.7 * math.cos(1), -1.75 + 20 * (1 - math.cos(1)) + 3.7 * math.sin(1)), abs=0.05
@@ -126,24 +104,22 @@ def test_a_car_follows_a_clothoid_from_its_position_on(tmp_path: Path) -> None:
 
 
 def test_a_position_may_be_at_the_end_of_a_curve(tmp_path: Path) -> None:
-    arc = f'<Clothoid curvature="0.05" length="30"><Position>{world(100, 20)}</Position></Clothoid>'
-    trajectory = f'<TrajectoryRef><Trajectory name="t" closed="false"><Shape>{arc}</Shape></Trajectory></TrajectoryRef>'
+    arc = f'<Clothoid curvature="0.05" length="30">{HERE}</Clothoid>'
     file = written(tmp_path, speed(1))
-    there = f'<TrajectoryPosition s="30">{trajectory}</TrajectoryPosition>'
-    file.write_text(file.read_text(encoding="utf-8").replace(world(100, 20), there, 1), encoding="utf-8")
+    there = f'<Position><TrajectoryPosition s="30">{trajectory(arc)}</TrajectoryPosition></Position>'
+    file.write_text(file.read_text(encoding="utf-8").replace(HERE, there, 1), encoding="utf-8")
     begins = entry(read_openscenario(file).data, "Init_off_the_lanes")["do"]["Ann"]["path"]["points"][0]
     assert begins[:2] == pytest.approx((100 + 20 * math.sin(1.5), 40 - 20 * math.cos(1.5)), abs=0.01)
 
 
 def test_shapes_that_fit_no_curve_are_refused(tmp_path: Path) -> None:
-    position = f"<Position>{world(100, 20)}</Position>"
     segment = '<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="5">'
-    later = f"{segment}<PositionStart>{world(0, 0)}</PositionStart>"
+    later = segment + world(0, 0).replace("Position>", "PositionStart>")
     bad = {
-        f'<Clothoid curvature="0" length="0">{position}</Clothoid>': "length: expected more than 0",
-        f'<Clothoid curvature="0" length="5" startTime="1">{position}</Clothoid>': "startTime and stopTime, or neither",
-        f'<Clothoid curvature="0" curvaturePrime="1e300" length="1e300">{position}</Clothoid>': "at most 5000 pieces",
-        f'<Clothoid curvature="9" length="500">{position}</Clothoid>': "at most 5000 pieces",
+        f'<Clothoid curvature="0" length="0">{HERE}</Clothoid>': "length: expected more than 0",
+        f'<Clothoid curvature="0" length="5" startTime="1">{HERE}</Clothoid>': "startTime and stopTime, or neither",
+        f'<Clothoid curvature="0" curvaturePrime="1e300" length="1e300">{HERE}</Clothoid>': "at most 5000 pieces",
+        f'<Clothoid curvature="9" length="500">{HERE}</Clothoid>': "at most 5000 pieces",
         f"<ClothoidSpline>{2 * (later + '</ClothoidSplineSegment>')}</ClothoidSpline>": "begins where the one before",
         nurbs(3, [(0, 1, 1, 1)] * 3, [0, 0, 1, 1, 1]): "got order 3, 3 points and 5 knots",
         nurbs(3, [(0, 1, 1, 1)] * 3, [0, 0, 0.2, 1, 1, 1]): "the first and the last 3 times",

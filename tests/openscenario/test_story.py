@@ -10,32 +10,24 @@ from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.scenario.loading import load_scenario
 from fogsim.values import Ending
-from tests.openscenario.writing import (
-    CAR,
-    CASES,
-    QUIET,
-    TWO_LANES,
-    after,
-    begun,
-    changes_lane,
-    event,
-    group,
-    lane,
-    motion_at,
-    over,
-    run,
-    speed,
-    state,
-    write,
+
+from tests.openscenario.writing import (  # isort: skip
+    CAR, CASES, QUIET, TWO_LANES, after, begun, changes_lane, event, group, lane, linear, motion_at, on, over, run,
+    speed, speed_of, state, write,
 )  # fmt: skip
 
 
-def _faster_than(value: float, delay: float = 0.0) -> str:
-    return (
-        f'<Condition name="v" delay="{delay}" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
-        'triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
-        f'<SpeedCondition value="{value}" rule="greaterThan"/></EntityCondition></ByEntityCondition></Condition>'
-    )
+RATE, IN_TWO_SECONDS = linear(4, "rate"), linear(2)
+
+
+def _faster_than(value: float, delay: float = 0.0, who: str = "Ego") -> str:
+    return on(f'<SpeedCondition value="{value}" rule="greaterThan"/>', who, delay)
+
+
+def _two_cars(folder: Path, events: str, stop: str, at: float = 20.0) -> Path:
+    """A file whose events move Lead, which begins at a speed [m/s], far ahead of the ego."""
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(at)}"}
+    return write(folder, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}, stop=stop, visibility=5000.0)
 
 
 def test_forty_metres_at_fifteen_metres_a_second_take_2_7_seconds() -> None:
@@ -54,8 +46,7 @@ def test_forty_metres_at_fifteen_metres_a_second_take_2_7_seconds() -> None:
 def test_what_follows_a_change_by_distance_waits_until_it_is_over(tmp_path: Path) -> None:
     leave = event("leave", changes_lane(1, "distance", 30.0), after(1.0))
     back = event("back", changes_lane(-1, "time", 2.0), over("leave"))
-    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
-    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leave + back}, visibility=5000.0))
+    steps = run(_two_cars(tmp_path, leave + back, after(10), at=10.0))
     times = begun(steps)
     assert times["back"] - times["leave"] == pytest.approx(3.0, abs=0.25)
     assert motion_at(steps, times["back"] - 0.1, "Lead")[1] == pytest.approx(1.75, abs=0.1)
@@ -99,31 +90,22 @@ def test_a_rate_is_across_as_many_lanes_as_there_are(tmp_path: Path, number: int
     assert (done["lanes"], done["duration_s"]) == (number, pytest.approx(lanes * 1.5 * 3.5 / 2.0))
 
 
-def _slows(dynamics: str, to: float = 2.0) -> str:
-    at_once = 'dynamicsShape="step" value="0" dynamicsDimension="time"'
-    return speed(to).replace(at_once, dynamics)
-
-
 @pytest.mark.parametrize("dynamics", ['dynamicsShape="step"', 'dynamicsShape="step" dynamicsDimension="distance"'])
-def test_what_happens_at_once_needs_no_dimension(tmp_path: Path, dynamics: str) -> None:
-    begin = {"Ego": f"{lane(30)}\n{_slows(dynamics, 12)}"}
-    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("slow", _slows(dynamics), after(1.0))})
+def test_what_happens_at_once_needs_no_dimension_and_what_takes_time_does(tmp_path: Path, dynamics: str) -> None:
+    begin = {"Ego": f"{lane(30)}\n{speed(12, dynamics)}"}
+    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("slow", speed(2.0, dynamics), after(1.0))})
     assert read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["speed"] == {"to_kmh": 7.2, "shape": "step"}
-
-
-@pytest.mark.parametrize(
-    "missing", ['dynamicsShape="linear" value="3"', 'dynamicsShape="linear" dynamicsDimension="time"']
-)
-def test_what_takes_time_needs_dimension_and_value(tmp_path: Path, missing: str) -> None:
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": event("slow", _slows(missing), after(1.0))})
+    # The one lacks the dimension, the other a value.
+    missing = dynamics.replace("step", "linear").replace("distance", "time")
+    missing += "" if "Dimension" in missing else ' value="3"'
+    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("slow", speed(2.0, missing), after(1.0))})
     with pytest.raises(InputError, match=r"dynamicsDimension: this attribute is missing|expected a number for value"):
         read_openscenario(file)
 
 
 def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
-    never = event("never", _slows('dynamicsShape="linear" value="0" dynamicsDimension="rate"'), after(1.0))
-    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
-    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": never}, stop=after(3.0)))
+    never = event("never", speed(2, linear(0, "rate")), after(1.0))
+    steps = run(_two_cars(tmp_path, never, after(3.0), at=10.0))
     assert motion_at(steps, 2.9, "Lead") == pytest.approx((90.0 + 3.7 + 29.0, -1.75, 10.0), abs=0.1)
 
 
@@ -131,36 +113,23 @@ def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
 def test_an_event_that_overrides_ends_a_change_of_speed_of_its_maneuver(
     tmp_path: Path, priority: str, speed_after: float
 ) -> None:
-    brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(1.0))
+    brakes = event("brake", speed(2, linear(2, "rate")), after(1.0))
     leaves = event("leave", changes_lane(1, "time", 2.0), after(3.0)).replace("override", priority)
-    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
-    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(6.1))
-    steps = run(file)
+    steps = run(_two_cars(tmp_path, leaves + brakes, after(6.1)))
     assert motion_at(steps, 2.9, "Lead")[2] == pytest.approx(16.2, abs=0.25)
     assert motion_at(steps, 6.0, "Lead")[1:] == pytest.approx((1.75, speed_after), abs=0.25)
 
 
-def _two_cars(folder: Path, events: str, stop: str, at: float = 20.0) -> Path:
-    """A file whose events move Lead, which begins at a speed [m/s], far ahead of the ego."""
-    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(at)}"}
-    return write(folder, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}, stop=stop, visibility=5000.0)
-
-
 def _time(later: float) -> str:
+    """Condition on the time [s]."""
     return after(later).removeprefix("<ConditionGroup>").removesuffix("</ConditionGroup>")
 
 
-RATE = 'dynamicsShape="linear" value="4" dynamicsDimension="rate"'
-IN_TWO_SECONDS = 'dynamicsShape="linear" value="2" dynamicsDimension="time"'
-NEXT = '</Maneuver><Maneuver name="n">'
-CONTINUES = speed(5).replace(
-    '<AbsoluteTargetSpeed value="5"/>',
-    '<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="factor" continuous="true"/>',
-)
+CONTINUES = speed(speed_of("Ego", more='continuous="true"'))
 
 
 def test_what_is_over_stays_over(tmp_path: Path) -> None:
-    events = event("up", _slows(RATE, 16), after(1.0)) + event("down", _slows(RATE, 10), after(4.0))
+    events = event("up", speed(16, RATE), after(1.0)) + event("down", speed(10, RATE), after(4.0))
     steps = run(_two_cars(tmp_path, events, group(state("act", "a", "completeState")), at=10.0))
     assert steps[-1].ending is Ending.END_CONDITION
     assert steps[-1].time == pytest.approx(5.7, abs=0.21)
@@ -172,28 +141,22 @@ def test_a_stop_trigger_is_waited_for_longer_than_two_minutes(tmp_path: Path) ->
 
 
 def test_an_event_that_is_over_is_not_ended_by_one_that_overrides(tmp_path: Path) -> None:
-    early, late = (
-        event("early", _slows(IN_TWO_SECONDS, 20), after(1.0)),
-        event("across", changes_lane(1, "time", 1.0), after(7.0)),
-    )
-    slows = event("slows", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"', 5), after(5.0))
-    steps = run(_two_cars(tmp_path, early + late + NEXT + slows, after(13.1)))
+    events = event("early", speed(20, IN_TWO_SECONDS), after(1.0))
+    events += event("across", changes_lane(1, "time", 1.0), after(7.0)) + '</Maneuver><Maneuver name="n">'
+    steps = run(_two_cars(tmp_path, events + event("slows", speed(5, linear(2, "rate")), after(5.0)), after(13.1)))
     assert motion_at(steps, 13.0, "Lead")[2] == pytest.approx(5.0, abs=0.1)
 
 
 def test_an_endless_event_is_over_when_it_is_overridden_and_not_before(tmp_path: Path) -> None:
     events = event("across", changes_lane(1, "time", 1.0), after(0.5)) + event("like", CONTINUES, after(2.0))
-    steps = run(
-        _two_cars(
-            tmp_path, events + event("fast", speed(9), after(4.0)), group(state("maneuver", "m", "endTransition"))
-        )
-    )
+    events += event("fast", speed(9), after(4.0))
+    steps = run(_two_cars(tmp_path, events, group(state("maneuver", "m", "endTransition"))))
     assert steps[-1].ending is Ending.END_CONDITION
     assert steps[-1].time == pytest.approx(4.3, abs=0.15)
 
 
 def test_acts_of_many_events_are_read(tmp_path: Path) -> None:
-    events = "".join(event(f"slower_{n}", _slows(RATE, n), after(n)) for n in range(1, 31))
+    events = "".join(event(f"slower_{n}", speed(n, RATE), after(n)) for n in range(1, 31))
     across = event("across", changes_lane(1, "time", 1.0), after(7.0))
     file = _two_cars(tmp_path, events + across, group(state("act", "a", "completeState")))
     scenario = load_scenario(file, QUIET)
@@ -208,9 +171,7 @@ def test_an_act_that_is_stopped_is_over(tmp_path: Path) -> None:
 
 
 def test_ends_that_are_not_known_are_refused(tmp_path: Path) -> None:
-    by_rate = CONTINUES.replace(' continuous="true"', "").replace(
-        'dynamicsShape="step" value="0" dynamicsDimension="time"', RATE
-    )
+    by_rate = speed(speed_of("Ego"), RATE)
     with pytest.raises(InputError, match="nor is the end of a relative speed by rate"):
         read_openscenario(_two_cars(tmp_path, event("like", by_rate, after(1.0)), over("like")))
 
@@ -223,9 +184,9 @@ def test_one_of_several_actions_of_an_event_has_an_end_of_its_own(tmp_path: Path
 
 
 def test_conditions_that_are_true_for_a_while_are_true_no_longer(tmp_path: Path) -> None:
-    fast = _faster_than(18).replace('"Ego"', '"Lead"')
+    fast = _faster_than(18, who="Lead")
     running = state("event", "up", "runningState")
-    events = event("up", _slows(IN_TWO_SECONDS, 20), after(2.0))
+    events = event("up", speed(20, IN_TWO_SECONDS), after(2.0))
     events += event("at_3", speed(20), group(running, _time(3.0))).replace("override", "parallel")
     for name, conditions in {
         "too_late": group(running, _time(6.0)),
@@ -246,11 +207,10 @@ def test_what_init_sets_replaces_the_declared_value(tmp_path: Path) -> None:
 
 
 def test_an_event_that_overrides_leaves_alone_what_begins_later(tmp_path: Path) -> None:
-    brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(2.0))
+    brakes = event("brake", speed(2, linear(2, "rate")), after(2.0))
     leaves = event("leave", changes_lane(1, "time", 1.0), after(1.0))
-    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
-    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(5.1))
-    assert motion_at(run(file), 5.0, "Lead")[2] == pytest.approx(14.0, abs=0.25)
+    steps = run(_two_cars(tmp_path, leaves + brakes, after(5.1)))
+    assert motion_at(steps, 5.0, "Lead")[2] == pytest.approx(14.0, abs=0.25)
 
 
 def test_the_first_of_two_delayed_groups_ends_therun() -> None:
@@ -281,13 +241,8 @@ def test_each_condition_of_a_group_has_its_delay(tmp_path: Path) -> None:
 
 
 def test_events_are_played_as_often_as_they_may(tmp_path: Path) -> None:
-    slower = (
-        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="1" '
-        'dynamicsDimension="time"/><SpeedActionTarget><RelativeTargetSpeed entityRef="Ego" value="-2" '
-        'speedTargetValueType="delta" continuous="false"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-        "</PrivateAction>"
-    )
-    events = event("slower", slower, group(_faster_than(8)), count=5)
+    slower = speed_of("Ego", -2, "delta", 'continuous="false"')
+    events = event("slower", speed(slower, linear(1)), group(_faster_than(8)), count=5)
     file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(13)}"}, {"Ego": events}, visibility=5000.0)
     steps = run(file)
     times = [one.time for step in steps for one in step.begun if one.name.startswith("slower") and not one.is_over]
@@ -312,9 +267,10 @@ SETS = '<GlobalAction><ParameterAction parameterRef="brakes"><SetAction value="t
 
 
 def _waits_for(value: str) -> str:
-    condition = f'<ParameterCondition parameterRef="brakes" rule="equalTo" value="{value}"/>'
-    inner = f"<ByValueCondition>{condition}</ByValueCondition>"
-    return f'<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">{inner}</Condition></ConditionGroup>'
+    inner = f'<ParameterCondition parameterRef="brakes" rule="equalTo" value="{value}"/>'
+    return group(
+        f'<Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>{inner}</ByValueCondition></Condition>'
+    )
 
 
 @pytest.mark.parametrize("whole_act", [True, False])
@@ -354,11 +310,8 @@ def test_counts_out_of_range_are_refused(tmp_path: Path) -> None:
 
 
 def test_the_end_of_the_road_ends_therun(tmp_path: Path) -> None:
-    end = _faster_than(0).replace(
-        '<SpeedCondition value="0" rule="greaterThan"/>', '<EndOfRoadCondition duration="0"/>'
-    )
-    begin = {"Ego": f"{lane(700)}\n{speed(15)}"}
-    steps = run(write(tmp_path, {"Ego": CAR}, begin, stop=group(end), visibility=5000.0))
+    end = group(on('<EndOfRoadCondition duration="0"/>'))
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(700)}\n{speed(15)}"}, stop=end, visibility=5000.0))
     assert steps[-1].ending in (Ending.END_CONDITION, Ending.ARRIVED)
     # From a front bumper at 703.7 m to 10 m before the end of the road at 800 m.
     assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)
@@ -366,8 +319,7 @@ def test_the_end_of_the_road_ends_therun(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("written", "is_kept"), [("1", True), ("True", True), ("0", False), ("yes", None)])
 def test_truth_values_are_those_of_xml(tmp_path: Path, written: str, is_kept: bool | None) -> None:
-    relative = f'<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="factor" continuous="{written}"/>'
-    action = speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
+    action = speed(speed_of("Ego", more=f'continuous="{written}"'))
     begin = {"Ego": lane(30), "Lead": lane(90)}
     file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": event("like", action, after(1.0))})
     if is_kept is None:

@@ -1,6 +1,5 @@
 """Triggers as conditions of FogSim's language, and what else of a file becomes what."""
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.openscenario.parameters import evaluated
 from fogsim.scenario.loading import load_scenario
-from tests.openscenario.writing import DATA, entry
+from tests.openscenario.writing import DATA, changed, entry
 
 STANDS = '<Condition name="stands" delay="0" conditionEdge="none">'
 STAND_STILL = '<StandStillCondition duration="0.5"/>'
@@ -19,23 +18,26 @@ STAND_STILL = '<StandStillCondition duration="0.5"/>'
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
 
 
+LEAD = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+
+
 @pytest.fixture
 def read(tmp_path: Path) -> Callable[..., dict[str, Any]]:
     """Data of the slow lead vehicle's file with some texts in place of others."""
-    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
 
     def reading(*texts: tuple[str, str]) -> dict[str, Any]:
-        text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
-        for old, new in texts:
-            assert old in text, old
-            text = text.replace(old, new, 1)
-        file = tmp_path / "changed.xosc"
-        file.write_text(text, encoding="utf-8")
+        file = changed(tmp_path, DATA / "slow_lead.xosc", *texts)
         # What is made of it is a scenario that FogSim takes.
         load_scenario(file, ["renderer=none", "estimators=[]"])
         return read_openscenario(file).data
 
     return reading
+
+
+def _between(first: str, last: str, after: str = "") -> str:
+    """Part of the file, both ends included."""
+    begin = LEAD.index(first, LEAD.index(after))
+    return LEAD[begin : LEAD.index(last, begin) + len(last)]
 
 
 def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
@@ -100,30 +102,19 @@ def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
         assert told in read((STAND_STILL, condition))["end_when"]
 
 
-@pytest.mark.parametrize(
-    ("edge", "told"),
-    [
-        ("rising", "ego.speed falls below 3 m/s"),
-        ("falling", "(ego.speed < 3 m/s) delayed 0.001 s and not (ego.speed < 3 m/s)"),
-        (
-            "risingOrFalling",
-            "(ego.speed falls below 3 m/s) or ((ego.speed < 3 m/s) delayed 0.001 s and not (ego.speed < 3 m/s))",
-        ),
-    ],
-)
-def test_edges_of_comparisons(read: Callable[..., dict[str, Any]], edge: str, told: str) -> None:
-    data = read((STAND_STILL, '<SpeedCondition value="3" rule="lessThan"/>'), (STANDS, STANDS.replace("none", edge)))
-    assert told in data["end_when"]
+def test_edges_of_comparisons(read: Callable[..., dict[str, Any]]) -> None:
+    rises, falls = "ego.speed falls below 3 m/s", "(ego.speed < 3 m/s) delayed 0.001 s and not (ego.speed < 3 m/s)"
+    for edge, told in [("rising", rises), ("falling", falls), ("risingOrFalling", f"({rises}) or ({falls})")]:
+        slow, stands = '<SpeedCondition value="3" rule="lessThan"/>', STANDS.replace("none", edge)
+        assert told in read((STAND_STILL, slow), (STANDS, stands))["end_when"]
 
 
 def test_an_edge_at_equality_is_one_of_the_comparison_as_written(read: Callable[..., dict[str, Any]]) -> None:
     speed, edge = '<SpeedCondition value="3" rule="lessOrEqual"/>', STANDS.replace("none", "rising")
     rises = "(not (ego.speed <= 3 m/s)) delayed 0.001 s and (ego.speed <= 3 m/s)"
     assert rises in read((STAND_STILL, speed), (STANDS, edge))["end_when"]
-    assert (
-        "ego.speed rises above 3 m/s"
-        in read((STAND_STILL, speed), (STANDS, STANDS.replace("none", "falling")))["end_when"]
-    )
+    edge = STANDS.replace("none", "falling")
+    assert "ego.speed rises above 3 m/s" in read((STAND_STILL, speed), (STANDS, edge))["end_when"]
 
 
 def test_an_edge_of_more_than_a_comparison_compares_with_one_step_before(read: Callable[..., dict[str, Any]]) -> None:
@@ -134,9 +125,7 @@ def test_an_edge_of_more_than_a_comparison_compares_with_one_step_before(read: C
 
 def test_an_edge_is_one_of_all_triggering_entities_together(read: Callable[..., dict[str, Any]]) -> None:
     one = '<EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
-    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
-    begin = text.index('<TriggeringEntities triggeringEntitiesRule="', text.index(STANDS))
-    old = text[begin : text.index(STAND_STILL) + len(STAND_STILL)]
+    old = _between('<TriggeringEntities triggeringEntitiesRule="', STAND_STILL, STANDS)
     new = f'<TriggeringEntities triggeringEntitiesRule="all"><EntityRef entityRef="Lead"/>{one}'
     new, edge = f'{new}<SpeedCondition value="1" rule="lessThan"/>', (STANDS, STANDS.replace("none", "rising"))
     both = "(Lead.speed < 1 m/s and ego.speed < 1 m/s)"
@@ -147,18 +136,12 @@ def test_an_edge_is_one_of_all_triggering_entities_together(read: Callable[..., 
 
 
 def test_a_stop_trigger_of_a_time_is_the_duration(read: Callable[..., dict[str, Any]]) -> None:
-    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
-    group = text[
-        text.index('<ConditionGroup>\n        <Condition name="stands"') : text.index(
-            '<ConditionGroup>\n        <Condition name="long"'
-        )
-    ]
+    group = _between('<ConditionGroup>\n        <Condition name="stands"', "</ConditionGroup>")
     data = read((group, ""))
     assert data["duration_s"] == 40.0
     assert "end_when" not in data
-    assert (
-        read((group, ""), ('value="40" rule="greaterThan"', 'value="40" rule="lessThan"'))["end_when"] == "time < 40 s"
-    )
+    less = ('value="40" rule="greaterThan"', 'value="40" rule="lessThan"')
+    assert read((group, ""), less)["end_when"] == "time < 40 s"
 
 
 def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[str, Any]]) -> None:
@@ -194,16 +177,12 @@ def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[s
     ],
 )
 def test_actions(read: Callable[..., dict[str, Any]], action: str, told: dict[str, Any]) -> None:
-    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
-    begin = text.index("<SpeedAction>", text.index('<Event name="brake"'))
-    old = text[begin : text.index("</SpeedAction>", begin) + len("</SpeedAction>")]
+    old = _between("<SpeedAction>", "</SpeedAction>", '<Event name="brake"')
     assert entry(read((old, action)), "brake")["do"] == {"Ego": told}
 
 
 def test_lanes_by_number_or_beside(read: Callable[..., dict[str, Any]]) -> None:
-    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
-    begin = text.index("<LongitudinalAction>", text.index('<Event name="brake"'))
-    old = text[begin : text.index("</LongitudinalAction>", begin) + len("</LongitudinalAction>")]
+    old = _between("<LongitudinalAction>", "</LongitudinalAction>", '<Event name="brake"')
     change = (
         '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" value="2.5" '
         'dynamicsDimension="time"/><LaneChangeTarget>{}</LaneChangeTarget></LaneChangeAction></LateralAction>'
@@ -218,26 +197,19 @@ def test_lanes_by_number_or_beside(read: Callable[..., dict[str, Any]]) -> None:
 
 
 def test_night_may_fall_while_a_run_lasts(tmp_path: Path) -> None:
-    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
-    file = tmp_path / "cut_in_in_fog.xosc"
-    text = file.read_text(encoding="utf-8").replace(
-        '<Weather><Fog visualRange="60"/></Weather>',
-        '<TimeOfDay animation="false" dateTime="2026-11-20T23:00:00+01:00"/><Weather><Fog visualRange="60"/></Weather>',
-    )
-    file.write_text(text, encoding="utf-8")
+    fog, time = '<Weather><Fog visualRange="60"/></Weather>', 'animation="false" dateTime="2026-11-20T23:00:00+01:00"'
+    file = changed(tmp_path, DATA / "cut_in_in_fog.xosc", (fog, f"<TimeOfDay {time}/>{fog}"))
     light = entry(read_openscenario(file).data, "thicker_fog")["do"]["light"]
     assert 1e-5 < light["illuminance_lx"] < 1e-2
-    file.write_text(text.replace('entryName="saloon"', 'entryName="coach"', 1), encoding="utf-8")
-    with pytest.raises(InputError, match="unknown entry 'coach' of Vehicles; known: saloon, lorry"):
-        read_openscenario(file)
 
 
-def test_what_is_assigned_to_an_entry_is_one_of_its_parameters(tmp_path: Path) -> None:
-    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
-    text = (file := tmp_path / "everything.xosc").read_text(encoding="utf-8")
-    file.write_text(text.replace('parameterRef="top_speed"', 'parameterRef="topspeed"', 1), encoding="utf-8")
-    with pytest.raises(InputError, match="'saloon' has no parameter 'topspeed'; did you mean 'top_speed'"):
-        read_openscenario(file)
+def test_entries_of_catalogs_and_their_parameters_are_there(tmp_path: Path) -> None:
+    for name, old, new, told in [
+        ("cut_in_in_fog", 'entryName="saloon"', 'entryName="coach"', "unknown entry 'coach' of Vehicles; known: saloo"),
+        ("everything", 'Ref="top_speed"', 'Ref="topspeed"', "no parameter 'topspeed'; did you mean 'top_speed'"),
+    ]:
+        with pytest.raises(InputError, match=told):
+            read_openscenario(changed(tmp_path, DATA / f"{name}.xosc", (old, new)))
 
 
 def test_expressions() -> None:

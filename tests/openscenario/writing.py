@@ -1,5 +1,6 @@
 """Small OpenSCENARIO files on a country road of 800 m along x, with a lane of 3.5 m each way, and their runs."""
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,9 +30,22 @@ def box(tag: str, kind: str, length: float, width: float, height: float) -> str:
     )
 
 
-def lane(s: float, number: int = -1) -> str:
+PERSON = box("Pedestrian", "pedestrian", 0.5, 0.6, 1.8)
+HEADER = (
+    '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" '
+    'description="" author=""/>'
+)
+TIMED = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
+AT_ONCE = 'dynamicsShape="step" value="0" dynamicsDimension="time"'
+
+
+def lane(s: float, number: int = -1, more: str = "") -> str:
     """Position on a lane of the road."""
-    return f'<Position><LanePosition roadId="7" laneId="{number}" s="{s}"/></Position>'
+    return f'<Position><LanePosition roadId="7" laneId="{number}" s="{s}" {more}/></Position>'
+
+
+def world(x: float, y: float, more: str = "") -> str:
+    return f'<Position><WorldPosition x="{x}" y="{y}" {more}/></Position>'
 
 
 def after(time: float, delay: float = 0.0) -> str:
@@ -42,12 +56,58 @@ def after(time: float, delay: float = 0.0) -> str:
     )
 
 
-def speed(value: float) -> str:
-    """Action that sets a speed [m/s] at once."""
+def linear(value: float, dimension: str = "time") -> str:
+    return f'dynamicsShape="linear" value="{value}" dynamicsDimension="{dimension}"'
+
+
+def speed(target: float | str, dynamics: str = AT_ONCE) -> str:
+    """Action that changes a speed to a value [m/s] or a target."""
+    to = target if isinstance(target, str) else f'<AbsoluteTargetSpeed value="{target}"/>'
     return (
-        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" value="0" '
-        f'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget>'
-        "</SpeedAction></LongitudinalAction></PrivateAction>"
+        f"<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics {dynamics}/><SpeedActionTarget>{to}"
+        "</SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction>"
+    )
+
+
+def speed_of(other: str, value: float = 1, kind: str = "factor", more: str = "") -> str:
+    """Target of a speed relative to another vehicle's."""
+    return f'<RelativeTargetSpeed entityRef="{other}" value="{value}" speedTargetValueType="{kind}" {more}/>'
+
+
+def profile(*entries: tuple[float | None, float], limits: str = "") -> str:
+    """Action that drives through speeds [m/s] after times [s]."""
+    inner = "".join(f'<SpeedProfileEntry time="{time}" speed="{value}"/>' for time, value in entries)
+    return (
+        '<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="position">'
+        f"{limits}{inner}</SpeedProfileAction></LongitudinalAction></PrivateAction>"
+    ).replace(' time="None"', "")
+
+
+def polyline(*vertices: tuple[float | None, str]) -> str:
+    """Shape through positions at times [s]."""
+    line = "".join(f'<Vertex time="{time}">{place}</Vertex>' for time, place in vertices)
+    return f"<Polyline>{line}</Polyline>".replace(' time="None"', "")
+
+
+def trajectory(shape: str) -> str:
+    return f'<TrajectoryRef><Trajectory name="t" closed="false"><Shape>{shape}</Shape></Trajectory></TrajectoryRef>'
+
+
+def follows(shape: str, reference: str = "<None/>", more: str = "") -> str:
+    """Action that follows a trajectory."""
+    return (
+        f"<PrivateAction><RoutingAction><FollowTrajectoryAction{more}>{trajectory(shape)}<TimeReference>{reference}"
+        '</TimeReference><TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>'
+        "</PrivateAction>"
+    )
+
+
+def on(test: str, who: str = "Ego", delay: float = 0.0, edge: str = "none") -> str:
+    """Condition on a vehicle."""
+    return (
+        f'<Condition name="c" delay="{delay}" conditionEdge="{edge}"><ByEntityCondition><TriggeringEntities '
+        f'triggeringEntitiesRule="any"><EntityRef entityRef="{who}"/></TriggeringEntities><EntityCondition>{test}'
+        "</EntityCondition></ByEntityCondition></Condition>"
     )
 
 
@@ -91,8 +151,7 @@ def write(
     )
     file = folder / "small.xosc"
     file.write_text(
-        '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" '
-        'description="" author=""/><CatalogLocations><RouteCatalog><Directory path="."/></RouteCatalog>'
+        f'{HEADER}<CatalogLocations><RouteCatalog><Directory path="."/></RouteCatalog>'
         f'</CatalogLocations><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork>'
         f"<Entities>{objects}</Entities><Storyboard><Init><Actions><GlobalAction><EnvironmentAction>"
         f'<Environment name="e"><Weather><Sun illuminance="20000" azimuth="0" elevation="0.9"/>'
@@ -101,6 +160,17 @@ def write(
         f"<StopTrigger>{stop or after(10)}</StopTrigger></Storyboard></OpenSCENARIO>",
         encoding="utf-8",
     )
+    return file
+
+
+def changed(folder: Path, source: Path, *texts: tuple[str, str]) -> Path:
+    """Copy of a file and its folder in which some texts are replaced by others."""
+    shutil.copytree(source.parent, folder, dirs_exist_ok=True)
+    text = source.read_text(encoding="utf-8")
+    for old, new in texts:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    (file := folder / source.name).write_text(text, encoding="utf-8")
     return file
 
 

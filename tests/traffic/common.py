@@ -1,13 +1,15 @@
 """What tests of the traffic share: the motorway, even fog, and what is seen of a simulation."""
 
+import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from early_motorway import ROUTES
 
 from fogsim.atmosphere import FieldAccess
-from fogsim.traffic import Traffic, TrafficSetup
+from fogsim.traffic import FogAccess, Traffic, TrafficSetup, libsumo_traffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField, TrafficSnapshot, TrafficState
 
@@ -50,6 +52,28 @@ def setup_of(folder: Path, routes: str, keep_lane: Sequence[str] = (), step: flo
         advice_deceleration=2.0,
         reading_radius=6000.0,
     )
+
+
+def configured(folder: Path, net: Path, routes: str | Path, *options: str, additional: str | Path = "") -> Path:
+    """A SUMO configuration of a network and the text of a demand, or its file, with further elements."""
+    if isinstance(routes, str):
+        (folder / "mine.rou.xml").write_text(routes, encoding="utf-8")
+        routes = Path("mine.rou.xml")
+    files = f'<net-file value="{net}"/><route-files value="{routes}"/>'
+    more = f'<additional-files value="{additional}"/>' if additional else ""
+    config = folder / "mine.sumocfg"
+    config.write_text(f"<configuration>{files}{more}{''.join(options)}</configuration>", encoding="utf-8")
+    return config
+
+
+@contextlib.contextmanager
+def running(setup: TrafficSetup, fog: FogAccess | None = None, seed: int = 1) -> Iterator[Any]:
+    """Traffic in this process that has been started, in a fog if one is given."""
+    with contextlib.closing(libsumo_traffic(setup)) as traffic:
+        if fog is not None:
+            traffic.enter_fog(fog)
+        traffic.start(seed)
+        yield traffic
 
 
 def even(visibility: float) -> FieldAccess:

@@ -1,4 +1,16 @@
-from fogsim.traffic.appearance import LARGE_SECTION, PAINTS, body_kind, cross_section, lamps_from_signals, paint
+from fogsim.traffic.appearance import (
+    BODY_KINDS,
+    EYE_HEIGHTS,
+    LARGE_SECTION,
+    PAINTS,
+    SHAPE_KINDS,
+    body_kind,
+    cross_section,
+    eye_height,
+    lamps_from_many_signals,
+    lamps_from_signals,
+    paint,
+)
 from fogsim.values import Lamp
 
 
@@ -28,3 +40,22 @@ def test_signals_to_lamps() -> None:
     assert Lamp(lamps_from_signals(0b1010)) == Lamp.STOP | Lamp.INDICATOR_LEFT
     assert Lamp(lamps_from_signals(1 << 5)) == Lamp.REAR_FOG
     assert lamps_from_signals(0) == 0
+    signals = [*range(128), 1 << 13, (1 << 13) | 8]
+    assert lamps_from_many_signals(signals).tolist() == [lamps_from_signals(s) for s in signals]
+
+
+def test_published_eye_heights() -> None:
+    classes = ("passenger", "truck", "coach", "bus", "motorcycle", "bicycle")
+    assert [eye_height(one) for one in classes] == [1.08, 2.33, 1.8, 1.8, 1.35, 1.4]
+
+
+def test_a_type_that_says_only_by_its_shape_or_length_what_it_is() -> None:
+    assert eye_height("passenger", "bus/coach") == eye_height("bus")
+    assert eye_height("passenger", "", 16.5) == eye_height("trailer")
+    assert eye_height("passenger", "passenger/sedan", 4.5) == eye_height("taxi") == eye_height("custom1")
+
+
+def test_every_class_and_shape_that_is_known_has_a_height() -> None:
+    heights = [eye_height(name) for name in BODY_KINDS] + [eye_height("passenger", shape) for shape in SHAPE_KINDS]
+    assert all(1.0 < height < 3.0 for height in heights)
+    assert {*BODY_KINDS.values(), *SHAPE_KINDS.values()} <= EYE_HEIGHTS.keys()

@@ -1,19 +1,17 @@
 """A SUMO configuration of somebody else's: junctions, traffic lights, and what can go wrong with an ego in it."""
 
 import contextlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, TrafficSnapshot
-from tests.traffic.common import seen
+from tests.traffic.common import DATA, configured, seen
 
-GRID = Path(__file__).resolve().parents[1] / "data" / "grid"
+GRID = DATA / "grid"
 EGO = "veh18"
 
 
@@ -21,14 +19,6 @@ def town(config: Path = GRID / "grid.sumocfg", ego: str = EGO) -> Traffic:
     # Whoever is named: what becomes of an ego that never comes is tried here too.
     scenario = scenario_from_config(config, ego, ["fog.visibility_m=120"], others_add_vehicles=True)
     return libsumo_traffic(build.traffic_setup(scenario))
-
-
-@pytest.fixture
-def traffic() -> Iterator[Traffic]:
-    simulation = town()
-    simulation.start(1)
-    yield simulation
-    simulation.close()
 
 
 def seen_to_the_end(traffic: Traffic) -> list[TrafficSnapshot]:
@@ -42,8 +32,13 @@ def seen_to_the_end(traffic: Traffic) -> list[TrafficSnapshot]:
     pytest.fail("the ego never left the network")
 
 
-def test_the_route_is_as_long_as_the_way_across_its_junctions(traffic: Traffic) -> None:
-    snapshots = seen_to_the_end(traffic)
+def test_the_net_is_drawn_and_the_route_is_as_long_as_the_way_across_its_junctions() -> None:
+    with contextlib.closing(town()) as traffic:
+        traffic.start(1)
+        network, _ = traffic.network()
+        snapshots = seen_to_the_end(traffic)
+    assert {"C0B0_0", "C0B0_1"} <= {lane.lane_id for lane in network.lanes}
+    assert np.linalg.norm(np.diff(network.route, axis=0), axis=1).sum() == pytest.approx(590, abs=30)
     position = np.array([s.route_position for s in snapshots])
     way = np.linalg.norm(np.diff([s.state.position[s.ego] for s in snapshots], axis=0), axis=1).sum()
     assert any(s.state.lane[s.ego].startswith(":") for s in snapshots)
@@ -52,31 +47,8 @@ def test_the_route_is_as_long_as_the_way_across_its_junctions(traffic: Traffic) 
     assert position[-1] == pytest.approx(snapshots[-1].route_length, abs=5.0)
 
 
-def test_vehicles_without_a_type_have_sumos_dimensions(traffic: Traffic) -> None:
-    snapshot = seen(traffic)
-    assert set(snapshot.state.length) == {5.0}
-    assert set(snapshot.state.width) == {1.8}
-    assert set(snapshot.state.height) == {1.5}
-    assert set(snapshot.state.types) == {"car"}
-
-
-def test_the_net_of_the_configuration_is_drawn(traffic: Traffic) -> None:
-    network, _ = traffic.network()
-    lanes = {lane.lane_id for lane in network.lanes}
-    assert {"C0B0_0", "C0B0_1"} <= lanes
-    assert np.linalg.norm(np.diff(network.route, axis=0), axis=1).sum() == pytest.approx(590, abs=30)
-
-
-def test_an_ego_that_does_not_exist_is_told_with_those_that_do() -> None:
-    with pytest.raises(SimulationError, match=r"'vehicle18' did not appear within .*those that did: veh18, .* more"):
-        town(ego="vehicle18").start(1)
-
-
-def configuration(folder: Path, *options: str, routes: Path = GRID / "grid.trips.xml") -> Path:
-    file = folder / "mine.sumocfg"
-    files = f'<net-file value="{GRID / "grid.net.xml"}"/><route-files value="{routes}"/>'
-    file.write_text(f"<configuration>{files}{''.join(options)}</configuration>", encoding="utf-8")
-    return file
+def configuration(folder: Path, *options: str, routes: str | Path = GRID / "grid.trips.xml") -> Path:
+    return configured(folder, GRID / "grid.net.xml", routes, *options)
 
 
 def test_a_configuration_with_a_port_and_a_seed_of_its_own_runs_as_one_without(tmp_path: Path) -> None:
@@ -99,13 +71,6 @@ def test_a_configuration_with_a_port_and_a_seed_of_its_own_runs_as_one_without(t
     assert states(listening) == states(town())
 
 
-def test_a_configuration_without_vehicles_is_told(tmp_path: Path) -> None:
-    routes = tmp_path / "empty.rou.xml"
-    routes.write_text("<routes/>", encoding="utf-8")
-    with pytest.raises(SimulationError, match="no vehicle did"):
-        town(configuration(tmp_path, routes=routes)).start(1)
-
-
 def test_a_teleport_takes_the_ego_off_the_road(tmp_path: Path) -> None:
     """It waits at a red light, longer than this configuration lets anybody wait."""
     with contextlib.closing(town(configuration(tmp_path, '<time-to-teleport value="3"/>'))) as impatient:
@@ -117,10 +82,7 @@ def test_a_teleport_takes_the_ego_off_the_road(tmp_path: Path) -> None:
 
 def test_the_ego_may_appear_late_in_a_simulation_that_begins_late(tmp_path: Path) -> None:
     """The time that is waited for it counts from the beginning, not from SUMO's zero."""
-    routes = tmp_path / "late.rou.xml"
-    routes.write_text('<routes><trip id="veh" depart="90010" from="C0B0" to="B0A0"/></routes>', encoding="utf-8")
+    routes = '<routes><trip id="veh" depart="90010" from="C0B0" to="B0A0"/></routes>'
     with contextlib.closing(town(configuration(tmp_path, '<begin value="90000"/>', routes=routes), "veh")) as late:
         late.start(1)
-        snapshot = late.observe()
-    assert snapshot is not None
-    assert snapshot.state.time == pytest.approx(90010, abs=0.2)
+        assert seen(late).state.time == pytest.approx(90010, abs=0.2)

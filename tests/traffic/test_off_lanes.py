@@ -3,7 +3,7 @@
 import contextlib
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,10 @@ from fogsim.errors import InputError, SimulationError
 from fogsim.metrics.run_metrics import RunMetrics
 from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.recording import record_run
-from fogsim.traffic import libsumo_traffic
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Command, SpeedAdvice, Step
 from fogsim.values.script import ChangeLane, Depart
-from tests.traffic.common import DATA, driven, even
+from tests.traffic.common import DATA, configured, driven, even, running
 
 CASES = DATA / "off_lanes"
 BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=120")
@@ -78,14 +77,8 @@ def test_metrics_leave_parked_vehicles_out(tmp_path: Path) -> None:
     area = '<parkingArea id="pb" lane="we1_0" startPos="300" endPos="360" roadsideCapacity="6"/></additional>'
     (tmp_path / "park.add.xml").write_text(additional.replace("</additional>", area), encoding="utf-8")
     found = []
-    for name, left_out in (("all", None), ("alone", "parked")):
-        routes = tmp_path / f"{name}.rou.xml"
-        rows = [row for row in text.splitlines() if left_out is None or left_out not in row]
-        routes.write_text("\n".join(rows), encoding="utf-8")
-        config = tmp_path / "park.sumocfg"
-        files = f'<net-file value="{CASES / "a.net.xml"}"/><route-files value="{routes}"/>'
-        more = '<additional-files value="park.add.xml"/>'
-        config.write_text(f"<configuration><input>{files}{more}</input></configuration>", encoding="utf-8")
+    for routes in (text, "\n".join(row for row in text.splitlines() if "parked" not in row)):
+        config = configured(tmp_path, CASES / "a.net.xml", routes, additional="park.add.xml")
         metrics = RunMetrics()
         for step in fogsim.run(scenario_from_config(config, "ego", [*BLIND, "duration_s=60"])):
             metrics.update(step)
@@ -101,9 +94,8 @@ def test_the_table_has_the_flag_and_no_limit(tmp_path: Path) -> None:
     assert {(row["off_lanes"], row["speed_limit_mps"]) for row in rows} == {(False, LIMIT), (True, None)}
 
 
-def test_parked_vehicles_have_no_equipment(tmp_path: Path) -> None:
-    equipped = scenario("park", "ego", 8.0, "traffic.equipped=1.0")
-    steps = list(fogsim.run(equipped))
+def test_parked_vehicles_have_no_equipment() -> None:
+    steps = fogsim.run(scenario("park", "ego", 8.0, "traffic.equipped=1.0"))
     assert {one.vehicle_id for step in steps for one in step.equipped} == {"behind"}
 
 
@@ -120,10 +112,10 @@ def test_a_taxi_waits_takes_a_passenger_and_waits_again() -> None:
     assert {step.route_position for step in arrived} == {carrying[-1].route_position}
 
 
-def moved(api: Any, attached_to: Any) -> list[Step]:
+def moved(api: Any) -> list[Step]:
     """Steps of an ego that an outer simulator drives, from 5 s to 10 s beside the road."""
     steps = []
-    with fogsim.attach(attached_to, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
+    with fogsim.attach(api, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
         for number in range(150):
             if "ego" in api.vehicle.getIDList():
                 y = VERGE if 50 <= number < 100 else LANE
@@ -154,26 +146,28 @@ ARGUMENTS = ("-c", str(CASES / "two.sumocfg"), "--step-length", "0.1", "--no-ste
 def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
     with contextlib.closing(load_libsumo()) as library:
         library.start(["sumo", *ARGUMENTS])
-        check_moved(moved(library, library))
+        check_moved(moved(library))
 
 
-def test_it_is_read_over_a_connection_too(sumo_process: Callable[..., Any]) -> None:
+@pytest.fixture
+def connection(sumo_process: Callable[..., Any]) -> Iterator[Any]:
     with sumo_process(ARGUMENTS) as (port, _):
-        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
-        check_moved(moved(connection, connection))
-        connection.close()
+        connected = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connected
+        connected.close()
 
 
-def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_process: Callable[..., Any]) -> None:
-    with sumo_process(ARGUMENTS) as (port, _):
-        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
-        with fogsim.attach(connection, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
-            for number in range(40):
-                if number >= 20:
-                    connection.vehicle.moveToXY("lorry", "", -1, 90.0, VERGE, 90.0, 2)
-                connection.simulationStep()
-                step = session.observe()
-        connection.close()
+def test_it_is_read_over_a_connection_too(connection: Any) -> None:
+    check_moved(moved(connection))
+
+
+def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(connection: Any) -> None:
+    with fogsim.attach(connection, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
+        for number in range(40):
+            if number >= 20:
+                connection.vehicle.moveToXY("lorry", "", -1, 90.0, VERGE, 90.0, 2)
+            connection.simulationStep()
+            step = session.observe()
     assert step is not None
     assert step.traffic.ids == ("ego", "lorry")
     assert step.traffic.off_lanes.tolist() == [False, True]
@@ -183,9 +177,7 @@ def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_p
 
 def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
     command = Command(advice=SpeedAdvice(6.0), advised_speeds={"parked1": 6.0}, advice_reach=math.inf)
-    with contextlib.closing(libsumo_traffic(build.traffic_setup(scenario("park", "ego")))) as traffic:
-        traffic.enter_fog(even(60.0))
-        traffic.start(0)
+    with running(build.traffic_setup(scenario("park", "ego")), even(60.0), seed=0) as traffic:
         speeds = [float(one.state.speed[one.ego]) for one in driven(traffic, 600, command)]
         get = load_libsumo().vehicle
         assert 0.0 < get.getMaxSpeed("parked1") <= get.getMaxSpeed("behind") <= 60.0
@@ -194,18 +186,14 @@ def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
 
 
 def test_a_script_changes_no_lane_and_departs_no_vehicle_beside_a_parked_one() -> None:
-    with contextlib.closing(libsumo_traffic(build.traffic_setup(scenario("park", "ego")))) as traffic:
-        traffic.start(0)
+    with running(build.traffic_setup(scenario("park", "ego")), seed=0) as traffic:
         change = ChangeLane("parked1", 1)
         joins = Depart("new", like="parked1", gap=30.0, speed=5.0)
         assert traffic.begin([change, joins]) == (change, joins)
 
 
 def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
-    config = tmp_path / "meso.sumocfg"
-    files = f'<net-file value="{CASES / "a.net.xml"}"/><route-files value="{CASES / "two.rou.xml"}"/>'
-    meso = '<mesoscopic><mesosim value="on"/></mesoscopic>'
-    config.write_text(f"<configuration><input>{files}</input>{meso}</configuration>", encoding="utf-8")
+    config = configured(tmp_path, CASES / "a.net.xml", CASES / "two.rou.xml", '<mesosim value="on"/>')
     told = r"mesosim: vehicles of a mesoscopic simulation have no positions in lanes[^\n]*$"
     with pytest.raises(InputError, match=told):
         scenario_from_config(config, "ego", BLIND)

@@ -1,6 +1,5 @@
 """Actions of a script in SUMO: what is asked for is driven, shown and given back."""
 
-import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,9 +10,8 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.traffic import TrafficSetup, libsumo_traffic
+from fogsim.traffic import Traffic, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Lamp
 from fogsim.values.script import (
     ChangeLane,
@@ -26,7 +24,7 @@ from fogsim.values.script import (
     Stop,
     TrafficAction,
 )
-from tests.traffic.common import DATA, NET, driven, setup_of
+from tests.traffic.common import DATA, NET, driven, running, setup_of
 
 STEP = 0.1
 TYPE = '<vType id="car" sigma="0" decel="4.5" emergencyDecel="9" accel="2.6" maxSpeed="40" tau="1.0"/>'
@@ -42,17 +40,16 @@ def car(name: str, edges: str, position: float, speed: float, lane: int = 0) -> 
     return f'<vehicle id="{name}" type="car" depart="0" {place}><route edges="{edges}"/></vehicle>'
 
 
+PAIR = car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25)
+
+
 @pytest.fixture
-def motorway(tmp_path: Path) -> Iterator[SumoTraffic]:
-    ego, lead = car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25)
-    traffic = libsumo_traffic(setup_in(tmp_path, NET, ego, lead))
-    assert isinstance(traffic, SumoTraffic)
-    traffic.start(1)
-    yield traffic
-    traffic.close()
+def motorway(tmp_path: Path) -> Iterator[Traffic]:
+    with running(setup_in(tmp_path, NET, *PAIR)) as traffic:
+        yield traffic
 
 
-def drive(traffic: SumoTraffic, steps: int, vehicle: str = "lead") -> list[dict[str, Any]]:
+def drive(traffic: Traffic, steps: int, vehicle: str = "lead") -> list[dict[str, Any]]:
     """What is seen of a vehicle after each step."""
     seen = []
     for snapshot in driven(traffic, steps):
@@ -66,13 +63,12 @@ def drive(traffic: SumoTraffic, steps: int, vehicle: str = "lead") -> list[dict[
     ("action", "due", "speed"),
     [
         (ChangeSpeed("lead", 10.0, 2.0), 2.0, 10.0),  # 7.5 m/s², harder than the type's decel, within an emergency's
-        (ChangeSpeed("lead", 10.0, 6.0, Shape.SINUSOIDAL), 6.0, 10.0),
         (ChangeSpeed("lead", 35.0, 5.0), 5.0, 35.0),  # the limit is 33.3 m/s
         (ChangeSpeed("lead", 0.0, 0.0, Shape.STEP), 2.8, 0.0),  # as hard as in an emergency: 25 m/s over 9 m/s²
     ],
 )
 def test_a_speed_is_reached_in_its_time_to_the_step(
-    motorway: SumoTraffic, action: ChangeSpeed, due: float, speed: float
+    motorway: Traffic, action: ChangeSpeed, due: float, speed: float
 ) -> None:
     motorway.begin([action])
     speeds = [one["speed"] for one in drive(motorway, round(due / STEP) + 20)]
@@ -81,7 +77,7 @@ def test_a_speed_is_reached_in_its_time_to_the_step(
     assert speeds[there:] == pytest.approx([speed] * len(speeds[there:]))
 
 
-def test_who_was_held_is_free_again_and_nothing_is_left(motorway: SumoTraffic) -> None:
+def test_who_was_held_is_free_again_and_nothing_is_left(motorway: Traffic) -> None:
     get = load_libsumo().vehicle
     mode = get.getSpeedMode("lead")
     motorway.begin([ChangeSpeed("lead", 10.0, 1.0, hold=2.0), SetLamps("lead", failed=Lamp.STOP)])
@@ -92,20 +88,20 @@ def test_who_was_held_is_free_again_and_nothing_is_left(motorway: SumoTraffic) -
     assert not any(Lamp.STOP & one["lamps"] for one in seen)  # it braked
 
 
-def test_scripted_vehicles_brake_for_others(motorway: SumoTraffic) -> None:
+def test_scripted_vehicles_brake_for_others(motorway: Traffic) -> None:
     motorway.begin([ChangeSpeed("ego", 35.0), ChangeSpeed("lead", 5.0, 3.0)])
     gaps = [one["leader"].gap for one in drive(motorway, 250) if one["leader"]]
     assert len(gaps) > 200
     assert min(gaps) > 0.5
 
 
-def test_a_follower_keeps_a_headway_shorter_than_its_own(motorway: SumoTraffic) -> None:
+def test_a_follower_keeps_a_headway_shorter_than_its_own(motorway: Traffic) -> None:
     motorway.begin([ChangeSpeed("lead", 25.0), Follow("ego", "lead", 0.6)])
     last = drive(motorway, 400)[-1]
     assert last["leader"].gap == pytest.approx(0.6 * 25.0 + 2.0, abs=0.3)
 
 
-def test_a_vehicle_stops_at_a_place(motorway: SumoTraffic) -> None:
+def test_a_vehicle_stops_at_a_place(motorway: Traffic) -> None:
     odometer = load_libsumo().vehicle.getDistance
     begun = odometer("lead")
     motorway.begin([Stop("lead", 180.0, 3.0, stand=2.0)])
@@ -115,18 +111,23 @@ def test_a_vehicle_stops_at_a_place(motorway: SumoTraffic) -> None:
     assert drive(motorway, 40)[-1]["speed"] > 2.0
 
 
-def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: SumoTraffic) -> None:
+def across(traffic: Traffic, steps: int) -> tuple[list[float], list[dict[str, Any]]]:
+    """How far the lead has moved to the left of where and whither it drives now, after each step [m]; and `drive`'s."""
+    angle = math.radians(90.0 - load_libsumo().vehicle.getAngle("lead"))
+    begin, seen = np.array(load_libsumo().vehicle.getPosition("lead")), drive(traffic, steps)
+    moved = np.array([one["place"][:2] for one in seen]) - begin
+    return list(moved @ np.array([-math.sin(angle), math.cos(angle)])), seen
+
+
+def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: Traffic) -> None:
     assert motorway.begin([ChangeLane("lead", -1), ChangeLane("nobody", 1)]) != ()  # lane 0 is the rightmost
     change = ChangeLane("lead", 1, stay=20.0, duration=5.0, indicator=1.0)
-    before = drive(motorway, 1)[0]["place"]
+    drive(motorway, 1)
     assert motorway.begin([change]) == ()
-    seen = drive(motorway, 75)
-    heading = seen[1]["place"][:2] - before[:2]
-    left = np.array([-heading[1], heading[0]]) / math.hypot(*heading)
-    across = [float((one["place"][:2] - before[:2]) @ left) for one in seen]
-    width = across[-1]
+    lateral, seen = across(motorway, 75)
+    width = lateral[-1]
     assert width == pytest.approx(3.75, abs=0.3)
-    moving = [i for i, way in enumerate(across) if 0.01 * width < way < 0.99 * width]
+    moving = [i for i, way in enumerate(lateral) if 0.01 * width < way < 0.99 * width]
     assert (len(moving) - 1) * STEP == pytest.approx(5.0, rel=0.15)
     assert moving[0] * STEP == pytest.approx(1.0, abs=0.5)
     indicated = [bool(one["lamps"] & Lamp.INDICATOR_LEFT) for one in seen]
@@ -137,9 +138,7 @@ def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: SumoT
 def test_in_left_hand_traffic_lanes_count_to_the_right_and_so_does_the_indicator(tmp_path: Path) -> None:
     net = tmp_path / "left.net.xml"
     net.write_text(NET.read_text(encoding="utf-8").replace("<net ", '<net lefthand="true" ', 1), encoding="utf-8")
-    setup = setup_in(tmp_path, net, car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25))
-    with contextlib.closing(libsumo_traffic(setup)) as traffic:
-        traffic.start(1)
+    with running(setup_in(tmp_path, net, *PAIR)) as traffic:
         assert traffic.begin([ChangeLane("lead", 1, indicator=1.0)]) == ()
         (snapshot,) = driven(traffic, 1)
     lamps = int(snapshot.state.lamps[snapshot.state.ids.index("lead")])
@@ -147,7 +146,7 @@ def test_in_left_hand_traffic_lanes_count_to_the_right_and_so_does_the_indicator
 
 
 @pytest.mark.parametrize("gap", [15.0, -20.0])
-def test_a_vehicle_comes_onto_the_road_near_another(motorway: SumoTraffic, gap: float) -> None:
+def test_a_vehicle_comes_onto_the_road_near_another(motorway: Traffic, gap: float) -> None:
     get = load_libsumo().vehicle
     refused = Depart("ego", "lead", 10.0), Depart("new", "nobody", 10.0), Depart("new", "lead", -9e5)
     assert motorway.begin(refused) == refused
@@ -162,17 +161,9 @@ def test_a_vehicle_comes_onto_the_road_near_another(motorway: SumoTraffic, gap: 
     assert get.getRoute("new") == get.getRoute("lead")
 
 
-def lights(tmp_path: Path) -> SumoTraffic:
-    traffic = libsumo_traffic(
-        setup_in(tmp_path, DATA / "crossing" / "lights.net.xml", car("ego", "WC CE", 100, 10, lane=1))
-    )
-    assert isinstance(traffic, SumoTraffic)
-    return traffic
-
-
 def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:
-    with contextlib.closing(lights(tmp_path)) as traffic:
-        traffic.start(1)
+    setup = setup_in(tmp_path, DATA / "crossing" / "lights.net.xml", car("ego", "WC CE", 100, 10, lane=1))
+    with running(setup) as traffic:
         get = load_libsumo().trafficlight
         program, state = get.getProgram("C"), get.getRedYellowGreenState("C")
         traffic.begin([SetSignal("C", state="r", hold=2.0)])
@@ -196,32 +187,17 @@ def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:
                 traffic.begin([action])
 
 
-def test_without_actions_a_run_is_as_before(motorway: SumoTraffic) -> None:
-    assert motorway.begin([]) == ()
-    seen = drive(motorway, 20)
-    motorway.start(1)
-    assert [one["speed"] for one in drive(motorway, 20)] == [one["speed"] for one in seen]
-
-
-def across(traffic: SumoTraffic, steps: int) -> list[float]:
-    """How far the lead has moved to the left of where and whither it drives now, after each step [m]."""
-    angle = math.radians(90.0 - load_libsumo().vehicle.getAngle("lead"))
-    begin = np.array(load_libsumo().vehicle.getPosition("lead"))
-    moved = np.array([one["place"][:2] for one in drive(traffic, steps)]) - begin
-    return list(moved @ np.array([-math.sin(angle), math.cos(angle)]))
-
-
-def test_a_vehicle_moves_within_its_lane_along_half_a_cosine_and_stays_there(motorway: SumoTraffic) -> None:
+def test_a_vehicle_moves_within_its_lane_along_half_a_cosine_and_stays_there(motorway: Traffic) -> None:
     drive(motorway, 1)
     motorway.begin([ChangeLane("lead", 0, duration=2.0, offset=0.8)])
-    lateral = across(motorway, 40)
+    lateral, _ = across(motorway, 40)
     wave = [0.4 - 0.4 * math.cos(math.pi * (i + 1) / 20) for i in range(20)]
     assert lateral == pytest.approx([*wave, *[0.8] * 20], abs=0.01)
 
 
-def test_a_change_of_lane_may_end_off_the_lanes_middle(motorway: SumoTraffic) -> None:
+def test_a_change_of_lane_may_end_off_the_lanes_middle(motorway: Traffic) -> None:
     drive(motorway, 1)
     motorway.begin([ChangeLane("lead", 1, duration=2.0, offset=-0.5)])
-    lateral = across(motorway, 40)
+    lateral, _ = across(motorway, 40)
     assert np.abs(np.diff([0.0, *lateral])).max() < 0.3
     assert lateral[-1] == pytest.approx(3.75 - 0.5, abs=0.02)

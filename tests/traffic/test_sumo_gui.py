@@ -14,10 +14,10 @@ import sumo
 from early_motorway import EARLY
 
 from fogsim.scenario import build, load_scenario
-from fogsim.traffic import TraciLink, Traffic, libsumo_traffic, traci_traffic
+from fogsim.traffic import TraciLink, Traffic, traci_traffic
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, SpeedAdvice, TrafficSnapshot
-from tests.traffic.common import driven
+from tests.traffic.common import driven, running
 
 SETUP = replace(build.traffic_setup(load_scenario("motorway_fog_bank", [EARLY])), reading_radius=500.0)
 HOST = "127.0.0.1"
@@ -100,8 +100,7 @@ def test_sumo_gui_runs_the_same_traffic_begins_anew_and_closes_at_the_end(
     again = drive(traffic)
     traffic.close()
     assert process.wait(60) == 0
-    with contextlib.closing(libsumo_traffic(SETUP)) as here:
-        here.start(1)
+    with running(SETUP) as here:
         expected = drive(here)
     assert alike(first, expected)
     assert alike(again, expected)

@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -52,14 +51,6 @@ CLASSES = ("passenger", "delivery", "truck", "passenger", "motorcycle", "bus", "
 """SUMO's classes of the same vehicles."""
 
 
-class Told(NamedTuple):
-    """What the device wrote of a follower and its leader: speeds at that time are the run's own."""
-
-    time_to_collision: float
-    drac: float
-    mdrac: float
-
-
 @dataclasses.dataclass(frozen=True)
 class Run:
     """States of one run, its collisions, and the folder of SUMO's outputs."""
@@ -69,13 +60,14 @@ class Run:
     emitted: Sequence[NDArray[np.float64]]
     folder: Path
 
-    def watched(self, metric: TrafficMetric) -> Mapping[str, JsonValue]:
-        """What a metric says of the run."""
+    def watched(self, metric: TrafficMetric, route: NDArray[np.float64] | None = None) -> Mapping[str, JsonValue]:
+        """What a metric says of the run; without an ego on a route, if one is given."""
         gathering = TrafficGathering()
         for number, state in enumerate(self.states):
             hits = tuple(hit for hit in self.collisions if hit.time == state.time)
-            step = dataclasses.replace(make_step(number, collisions=hits), traffic=state)
-            gathering.add(step, STEP if number else 0.0)
+            step = make_step(number, collisions=hits) if route is None else make_traffic_step(number)
+            truth = step.truth if route is None else replace(step.truth, route=route)
+            gathering.add(replace(step, traffic=state, truth=truth), STEP if number else 0.0)
         span = gathering.take()
         assert span is not None
         metric.add(span)
@@ -164,9 +156,8 @@ def emissions(api: Api, state: TrafficState) -> NDArray[np.float64]:
     return np.array([sum(get(vehicle) for vehicle in state.ids) for get in getters])
 
 
-@pytest.fixture(scope="module")
-def told(run: Run) -> dict[tuple[float, str, str], Told]:
-    """What the device wrote, by time, follower and leader."""
+def written_conflicts(run: Run) -> dict[tuple[float, str, str], tuple[float, ...]]:
+    """What the device wrote, TTC [s], DRAC and MDRAC [m/s²], by time, follower and leader."""
     found = {}
     for conflict in ET.parse(run.folder / "ssm.xml").getroot().iter("conflict"):  # noqa: S314 - the test's own run
         spans = [
@@ -179,14 +170,15 @@ def told(run: Run) -> dict[tuple[float, str, str], Told]:
             if kind == "2":
                 # The device names a step by its beginning, the simulation's clock after it by its end.
                 key = (round(float(time) + STEP, 1), conflict.get("ego", ""), conflict.get("foe", ""))
-                found[key] = Told(*(float(x) if x != "NA" else y for x, y in ((ttc, math.inf), (drac, 0), (mdrac, 0))))
+                found[key] = tuple(
+                    float(x) if x != "NA" else y for x, y in ((ttc, math.inf), (drac, 0.0), (mdrac, 0.0))
+                )
     return found
 
 
-def test_conflicts_are_those_of_the_ssm_device(run: Run, told: dict[tuple[float, str, str], Told]) -> None:
-    """Sums over the same steps; the device writes nine digits."""
-    found = run.watched(TrafficConflicts(threshold=3.0))
-    rows = []
+def test_conflicts_are_those_of_the_ssm_device(run: Run) -> None:
+    """Sums over the same steps; the device writes nine digits; speeds are the run's own."""
+    found, told, rows = run.watched(TrafficConflicts(threshold=3.0)), written_conflicts(run), []
     for state in run.states[1:]:
         order = np.argsort(state.position[:, 0])
         for follower, leader in itertools.pairwise(order.tolist()):
@@ -226,19 +218,11 @@ def test_way_and_delay_are_those_of_the_trips(run: Run) -> None:
 def test_flow_is_that_of_induction_loops(run: Run) -> None:
     """Of all vehicles, as without an ego."""
     road = np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]])
-    gathering, metric = TrafficGathering(), TrafficThroughput()
-    for number, state in enumerate(run.states):
-        step = make_traffic_step(number)
-        truth = dataclasses.replace(step.truth, route=road)
-        gathering.add(dataclasses.replace(step, traffic=state, truth=truth), STEP if number else 0.0)
-    span = gathering.take()
-    assert span is not None
-    metric.add(span)
     loops = [loop.attrib for loop in ET.parse(run.folder / "loops.xml").getroot()]  # noqa: S314 - the test's own run
     passed = sum(int(loop["nVehEntered"]) for loop in loops)
     assert passed > len(SPEEDS)
     hours = len(loops) * (STEPS - 1) * STEP / 3600.0
-    assert metric.result()["traffic_flow_vehicles_per_h"] == pytest.approx(passed / hours)
+    assert run.watched(TrafficThroughput(), road)["traffic_flow_vehicles_per_h"] == pytest.approx(passed / hours)
 
 
 def test_collisions_are_those_of_sumos_output(tmp_path: Path) -> None:

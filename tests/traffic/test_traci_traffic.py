@@ -15,13 +15,21 @@ from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, libsumo_traffic, traci_traffic
 from fogsim.traffic.drivers.speed_choice import too_fast
-from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
+from fogsim.values import (
+    Command,
+    FogField,
+    Lamp,
+    SpeedAdvice,
+    TrafficSnapshot,
+    TrafficState,
+)
 from tests.traffic.common import DATA, SETUP, seen
 
 GRID = DATA / "grid" / "grid.sumocfg"
 HOST = "127.0.0.1"
+FOG = FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0)))
 
 
 def equal(one: TrafficState, other: TrafficState) -> bool:
@@ -58,10 +66,9 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
 ) -> None:
     """What drivers see comes with the steps: far less than a message a vehicle and step."""
     setup = replace(SETUP, sight=DriverSight(10_000.0), drivers=DriverSetup(too_fast))
-    fog = FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0)))
 
     def in_fog(traffic: Traffic) -> list[TrafficSnapshot]:
-        traffic.enter_fog(fog)
+        traffic.enter_fog(FOG)
         return drive(traffic, 1, steps=120)
 
     with contextlib.closing(libsumo_traffic(setup)) as here:
@@ -88,52 +95,51 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
     assert messages < 25 * steps
 
 
-def test_beginning_anew_loads_the_scenario_with_the_seed(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:
+def test_beginning_anew_loads_the_scenario_with_the_seed_and_nothing_is_printed(
+    link: TraciLink, in_process: list[TrafficSnapshot], capfd: pytest.CaptureFixture[str]
+) -> None:
     traffic = traci_traffic(SETUP, link)
     drive(traffic, 1, steps=5)
     other = drive(traffic, 2)
     again = drive(traffic, 1)
     assert not equal(other[-1].state, in_process[-1].state)
     assert equal(again[-1].state, in_process[-1].state)
+    assert capfd.readouterr() == ("", "")
 
 
-def test_getters_and_subscriptions_read_the_same_over_a_connection(link: TraciLink) -> None:
-    api = link.begin(())
-    while "ego" not in api.vehicle.getIDList():
-        link.step()
-    readers: list[VehicleReader] = [kind(api, "ego", 300.0) for kind in (VehicleReader, SubscribedReader)]
-    for _ in range(30):
-        plain, subscribed = (reader.state(Lamp.REAR_FOG) for reader in readers)
-        assert equal(plain, subscribed)
-        link.step()
+@contextlib.contextmanager
+def stepping(traffic: Traffic, port: int, order: int, each: Callable[[Api], None]) -> Iterator[None]:
+    """Another client that only steps, and does something before each step; closes the traffic at the end."""
+    other, done = TraciLink(HOST, port, order=order), threading.Event()
+
+    def keep_stepping() -> None:
+        api = other.begin(())
+        # The last step may wait for a client that has left.
+        with contextlib.suppress(SimulationError), other.translated_errors():
+            while not done.is_set():
+                each(api)
+                other.step()
+        other.end()
+
+    thread = threading.Thread(target=keep_stepping, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        traffic.close()
+        thread.join(10)
+    assert not thread.is_alive()
 
 
 def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: list[TrafficSnapshot]) -> None:
     """The other client only steps; each step waits for both."""
     with sumo_process(command_line(SETUP, 1), clients=2) as (port, _):
-        other = TraciLink(HOST, port, order=2)
-        done = threading.Event()
-
-        def keep_stepping() -> None:
-            other.begin(())
-            # The last step may wait for a client that has left.
-            with contextlib.suppress(SimulationError), other.translated_errors():
-                while not done.is_set():
-                    other.step()
-            other.end()
-
-        thread = threading.Thread(target=keep_stepping, daemon=True)
-        thread.start()
         traffic = traci_traffic(SETUP, TraciLink(HOST, port, order=1))
-        try:
+        with stepping(traffic, port, 2, lambda _: None):
             seen = drive(traffic, 1)
             with pytest.raises(SimulationError, match=r"has 2 clients.*start SUMO again"):
                 traffic.start(2)
-        finally:
-            done.set()
-            traffic.close()
-            thread.join(10)
-    assert not thread.is_alive()
     for here, there in zip(in_process, seen, strict=True):
         assert equal(here.state, there.state)
 
@@ -141,37 +147,23 @@ def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: l
 @pytest.mark.parametrize("order", [1, 2])
 def test_another_client_may_take_the_ego_away(sumo_process: Callable, order: int) -> None:
     """Before or after FogSim's own messages of the same step."""
-    town = build.traffic_setup(scenario_from_config(GRID, "veh0", ["fog.visibility_m=75"]))
+
+    def take_away(api: Api) -> None:
+        if "veh0" in api.vehicle.getIDList() and api.vehicle.getDistance("veh0") > 40.0:
+            api.vehicle.remove("veh0")
+
+    town, seen = build.traffic_setup(scenario_from_config(GRID, "veh0", ["fog.visibility_m=75"])), []
     with sumo_process(["-c", str(GRID), "--step-length", "0.1", "--no-step-log"], clients=2) as (port, _):
-        other = TraciLink(HOST, port, order=3 - order)
-        done = threading.Event()
-
-        def take_away() -> None:
-            api = other.begin(())
-            with contextlib.suppress(SimulationError), other.translated_errors():
-                while not done.is_set():
-                    if "veh0" in api.vehicle.getIDList() and api.vehicle.getDistance("veh0") > 40.0:
-                        api.vehicle.remove("veh0")
-                    other.step()
-            other.end()
-
-        thread = threading.Thread(target=take_away, daemon=True)
-        thread.start()
         traffic = traci_traffic(town, TraciLink(HOST, port, order=order))
-        traffic.enter_fog(FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0))))
-        try:
+        with stepping(traffic, port, 3 - order, take_away):
+            traffic.enter_fog(FOG)
             traffic.start(1)
-            seen = []
             while traffic.observe() is not None:
                 seen.append(traffic.observe())
                 traffic.advance(Command(SpeedAdvice(18.0)))
             for _ in range(3):
                 traffic.advance(Command(SpeedAdvice(18.0)))
                 assert traffic.observe() is None
-        finally:
-            done.set()
-            traffic.close()
-            thread.join(10)
     assert 5 < len(seen) < 100
 
 
@@ -199,8 +191,3 @@ def test_no_sumo_at_all_is_told_with_what_to_do(free_port: Callable[[], int]) ->
 def test_another_step_length_is_told(link: TraciLink) -> None:
     with pytest.raises(SimulationError, match=r"steps of 0\.1 s, but clocks\.traffic_step_s is 0\.5"):
         traci_traffic(replace(SETUP, step_length=0.5), link).start(1)
-
-
-def test_nothing_is_printed(link: TraciLink, capfd: pytest.CaptureFixture[str]) -> None:
-    drive(traci_traffic(SETUP, link), 1, steps=1)
-    assert capfd.readouterr() == ("", "")

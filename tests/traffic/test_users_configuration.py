@@ -12,20 +12,17 @@ from fogsim.simulation.traffic_run import run_traffic
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Ending
+from tests.traffic import common
+from tests.traffic.common import configured
 
-DATA = Path(__file__).resolve().parents[1] / "data" / "off_lanes"
+DATA = common.DATA / "off_lanes"
 BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=5000")
 CAR = '<vType id="car" vClass="passenger" sigma="0" speedDev="0"/>'
 
 
 def configuration(folder: Path, vehicles: str, *, net: str = "a.net.xml", options: str = "") -> Path:
-    (folder / "mine.rou.xml").write_text(f"<routes>{CAR}{vehicles}</routes>", encoding="utf-8")
-    config = folder / "mine.sumocfg"
-    files = f'<net-file value="{DATA / net}"/><route-files value="mine.rou.xml"/>'
-    more = f'<additional-files value="{DATA / "park.add.xml"}"/>' if net == "a.net.xml" else ""
-    text = f"<configuration><input>{files}{more}</input>{options}</configuration>"
-    config.write_text(text, encoding="utf-8")
-    return config
+    additional = DATA / "park.add.xml" if net == "a.net.xml" else ""
+    return configured(folder, DATA / net, f"<routes>{CAR}{vehicles}</routes>", options, additional=additional)
 
 
 def vehicle(name: str, depart: float, edges: str, kind: str = "car", inner: str = "") -> str:
@@ -36,6 +33,7 @@ def loaded(config: Path, ego: str = "ego", *settings: str) -> Scenario:
     return scenario_from_config(config, ego, [*BLIND, *settings], others_add_vehicles=True)
 
 
+WAY = "we1 we2"
 UNSORTED = vehicle("other", 20.0, "we1 we2") + vehicle("ego", 1.0, "we1 we2")
 
 
@@ -91,42 +89,23 @@ def test_a_run_ends_when_the_configuration_does(tmp_path: Path) -> None:
         next(fogsim.run(loaded(config)))
 
 
-def chosen(scenario: Scenario) -> str:
-    with pytest.warns(UserWarning, match="ego: any: the ego is"):
-        step = next(fogsim.run(scenario))
-    return step.traffic.ids[step.ego]
-
-
 TYPES = '<vType id="bike" vClass="bicycle"/><vType id="train" vClass="rail"/>'
 PARKS = '<stop parkingArea="pa" duration="1000"/>'
 
 
-def test_any_ego_is_the_first_vehicle_that_drives_far(tmp_path: Path) -> None:
-    vehicles = (
-        TYPES
-        + vehicle("cyclist", 0.0, "we1 we2", "bike")
-        + vehicle("parks", 5.0, "we1 we2", inner=PARKS)
-        + vehicle("short", 10.0, "ew1")
-        + vehicle("far", 15.0, "we1 we2")
-        + vehicle("later", 20.0, "we1 we2")
-    )
-    scenario = loaded(configuration(tmp_path, vehicles), "any")
-    assert chosen(scenario) == "far"
-    # Where the files name all vehicles, `any` is not missed among them.
-    assert chosen(override(scenario, ["duration_s=2"])) == "far"
-
-
-def test_any_ego_is_the_one_with_the_longest_way_where_none_drives_far(tmp_path: Path) -> None:
-    vehicles = vehicle("parks", 0.0, "we1 we2", inner=PARKS) + vehicle("short", 5.0, "ew1")
-    assert chosen(loaded(configuration(tmp_path, vehicles), "any")) == "short"
-    alone = tmp_path / "alone"
-    alone.mkdir()
-    assert chosen(loaded(configuration(alone, vehicle("parks", 0.0, "we1 we2", inner=PARKS)), "any")) == "parks"
-
-
-def test_a_vehicle_called_any_is_meant(tmp_path: Path) -> None:
-    vehicles = vehicle("far", 0.0, "we1 we2") + vehicle("any", 0.5, "ew1")
-    assert chosen(loaded(configuration(tmp_path, vehicles), "any")) == "any"
+def test_any_ego_is_the_first_vehicle_that_drives_far_or_the_one_with_the_longest_way(tmp_path: Path) -> None:
+    cyclist, parks = vehicle("cyclist", 0.0, "we1 we2", "bike"), vehicle("parks", 5.0, "we1 we2", inner=PARKS)
+    short, far, later = (vehicle(*one) for one in (("short", 10.0, "ew1"), ("far", 15.0, WAY), ("later", 20.0, WAY)))
+    for vehicles, ego, *settings in [
+        (TYPES + cyclist + parks + short + far + later, "far"),
+        (TYPES + cyclist + parks + short + far + later, "far", "duration_s=2"),  # `any` is not missed in the files
+        (parks + short, "short"),
+        (parks, "parks"),
+        (vehicle("far", 0.0, WAY) + vehicle("any", 0.5, "ew1"), "any"),  # one that is called so is meant
+    ]:
+        with pytest.warns(UserWarning, match="ego: any: the ego is"):
+            step = next(fogsim.run(override(loaded(configuration(tmp_path, vehicles), "any"), settings)))
+        assert step.traffic.ids[step.ego] == ego
 
 
 def test_where_nobody_suits_any_ego_is_refused(tmp_path: Path) -> None:

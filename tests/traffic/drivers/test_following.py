@@ -30,10 +30,9 @@ def around(visibility: float, speed: float, sight: DriverSight = DAY) -> Surroun
 def test_in_clear_air_everybody_follows_as_before() -> None:
     for name in sorted(FOLLOWING_MODELS):
         model = FOLLOWING_MODELS[name]
-        for surroundings in (around(math.inf, 40.0), around(5000.0, 40.0), Surroundings(30.0, CLEAR, 0.0, GAP)):
-            if surroundings.visibility > 200.0:
-                assert model.headway(1.3, surroundings) == 1.3
-                assert model.top_speed(surroundings.reach) >= 40.0
+        for surroundings in (around(math.inf, 40.0), around(5000.0, 40.0)):
+            assert model.headway(1.3, surroundings) == 1.3
+            assert model.top_speed(surroundings.reach) >= 40.0
         assert misjudged_headway(1.3, around(math.inf, 40.0, NIGHT), 0.6) == 1.3
 
 

@@ -35,11 +35,6 @@ def test_lamps_at_v_100_and_a_threshold_of_one_microlux() -> None:
         assert reach(DARK, 100.0, (1.0, as_bright, 0.0)) == pytest.approx(metres, abs=0.6)
 
 
-def test_lamps_are_seen_less_far_by_day() -> None:
-    fog = 0.0, rear_intensity(int(Lamp.REAR_FOG)), 0.0
-    assert reach(DAY, 60.0, fog) < reach(NIGHT, 60.0, fog)
-
-
 def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility() -> None:
     """But for what the own head lamps light of the fog, 0.2 % of the airlight at 1000 lx."""
     for illuminance in [1000.0, 1e4, 1e5]:
@@ -48,12 +43,6 @@ def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility() ->
             assert by_head_lamps < 1e-3
             lost = visibility * (1.0 - by_head_lamps)
             assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 0.0)) == pytest.approx(lost, rel=1e-5)
-
-
-def test_a_light_vehicle_is_lost_sooner() -> None:
-    black, white = inherent_contrast((0.02, 0.02, 0.02)), inherent_contrast((0.8, 0.8, 0.8))
-    assert 0.3 < white < black <= 1.0
-    assert reach(DAY, 100.0, (white, 0.0, 1.0)) < 0.9 * reach(DAY, 100.0, (black, 0.0, 1.0))
 
 
 def test_before_darker_airlight_paint_stands_out_less() -> None:

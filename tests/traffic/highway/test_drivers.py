@@ -14,9 +14,7 @@ from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
 from fogsim.traffic.drivers.sight import leader_reach
 from fogsim.traffic.drivers.speed_choice import (
-    HeardAdvice,
     SpeedChoice,
-    desired_speed,
     driver_traits,
     too_fast,
     unaffected,
@@ -28,7 +26,6 @@ from tests.traffic.common import even, heard, seen
 
 DAY = 10_000.0
 FAST = 30.0
-MPH = 0.44704
 # Far apart, so that nobody is held up by anybody.
 CONFIG = {"vehicles_count": 12, "lanes_count": 4, "vehicles_density": 0.3}
 
@@ -78,18 +75,11 @@ def test_uninformed_drivers_are_faster_than_their_sight_allows() -> None:
     hasty = Road(exact(too_fast), 100.0).drive(15.0).speeds()
     assert max(hasty) == pytest.approx(1.4 * safe, abs=0.3)
     assert min(hasty) > safe
-    careful = Road(exact(within_sight), 100.0).drive(15.0).speeds()
-    assert max(careful) == pytest.approx(safe, abs=0.3)
 
 
 def test_the_unaffected_drive_as_in_clear_air() -> None:
-    def positions(setup: DriverSetup, visibility: float) -> Any:
-        return [v.position for v in Road(setup, visibility).drive(10.0).others]
-
-    in_clear_air = positions(exact(), math.inf)
-    assert np.array_equal(positions(exact(), 100.0), in_clear_air)
-    assert np.array_equal(positions(exact(too_fast), 250.0), in_clear_air)
-    assert not np.array_equal(positions(exact(too_fast), 100.0), in_clear_air)
+    clear, foggy = ([v.position for v in Road(exact(), v).drive(6.0).others] for v in (math.inf, 100.0))
+    assert np.array_equal(foggy, clear)
 
 
 def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
@@ -107,25 +97,23 @@ def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
 
 
 def test_every_driver_has_a_factor_of_their_own() -> None:
-    setup = DriverSetup(too_fast, spread=0.2)
-    targets = Road(setup, 60.0).drive(25.0).targets()
-    assert len(set(targets)) > 6
+    assert len(set(Road(DriverSetup(too_fast, spread=0.2), 80.0).drive(9.0).targets())) > 6
 
 
 def advised(road: Road, speed: float = 15.0) -> Command:
     return Command(advised_speeds=dict.fromkeys(road.ids, speed))
 
 
-@pytest.mark.parametrize("nobody", [{"rate": 0.0}, {"reached_share": 0.0}, {"strength": 0.0}])
+@pytest.mark.parametrize("nobody", [{"rate": 0.0}, {"reached_share": 0.0}])
 def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, float]) -> None:
     road = Road(exact(**nobody))
-    assert road.drive(10.0, advised(road)).targets() == [FAST] * len(road.others)
+    assert road.drive(4.0, advised(road)).targets() == [FAST] * len(road.others)
     assert heard(seen(road.traffic).state) == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
 
 
 def test_advice_that_all_follow_sets_every_target_speed() -> None:
     road = Road(exact(rate=1.0, strength=1.0))
-    assert road.drive(20.0, advised(road)).targets() == pytest.approx([15.0] * len(road.others))
+    assert road.drive(12.0, advised(road)).targets() == pytest.approx([15.0] * len(road.others))
     # And who is no longer advised drives as before.
     assert road.drive(1.5).targets() == [FAST] * len(road.others)
 
@@ -135,20 +123,8 @@ def test_those_whom_it_reaches_and_who_follow_are_the_share_that_is_asked_for() 
     road = Road(setup)
     followers = [driver_traits(setup, name, 3).follows(setup.compliance) for name in road.ids]
     assert 0 < sum(followers) < len(followers)
-    targets = road.drive(20.0, advised(road)).targets()
+    targets = road.drive(12.0, advised(road)).targets()
     assert targets == pytest.approx([15.0 if follows else FAST for follows in followers])
-
-
-def test_the_field_result_that_advice_of_30_mph_gave_61() -> None:
-    setup = exact(strength=4.0 / 35.0)
-    driver = driver_traits(setup, "any", 1)
-    assert desired_speed(
-        setup, driver, 65.0 * MPH, math.inf, [HeardAdvice(Display.IN_CAR, 30.0 * MPH, 60.0)]
-    ) == pytest.approx(61.0 * MPH)
-    road = Road(setup)
-    for vehicle in road.others:
-        vehicle.target_speed = 65.0 * MPH
-    assert road.drive(20.0, advised(road, 30.0 * MPH)).targets() == pytest.approx([61.0 * MPH] * len(road.others))
 
 
 def test_advice_to_all_on_a_stretch_is_heard_there() -> None:
@@ -205,12 +181,6 @@ def test_advice_is_followed_after_the_delay() -> None:
     assert max(road.drive(1.4, command).targets()) < FAST
 
 
-def test_advice_never_makes_anybody_faster() -> None:
-    road = Road(exact(within_sight), 60.0).drive(20.0)
-    own = road.targets()
-    assert road.drive(6.0, advised(road, 28.0)).targets() == pytest.approx(own)
-
-
 def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
     setup = DriverSetup(unaffected, spread=0.0, misjudgement=0.6)
     sight = DriverSight(0.1)
@@ -234,7 +204,7 @@ def test_the_same_seed_gives_the_same_run_and_another_other_drivers() -> None:
 
     def run(seed: int) -> Any:
         road = Road(setup, 60.0, seed)
-        return np.array([(*v.position, v.speed) for v in road.drive(6.0, advised(road, 12.0)).others])
+        return np.array([(*v.position, v.speed) for v in road.drive(4.0, advised(road, 12.0)).others])
 
     first, again, other = (run(seed) for seed in (5, 5, 6))
     assert np.array_equal(first, again)

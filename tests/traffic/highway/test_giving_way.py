@@ -1,6 +1,7 @@
 """Right of way at highway-env's junctions, as far as drivers see who comes."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -31,17 +32,15 @@ def crossing(apart: float) -> tuple[Any, Any, Any]:
     return road, main, minor
 
 
-class _Environment:
+def stepped(road: Any) -> Any:
     """What a fleet asks of an environment."""
-
-    def __init__(self, road: Any) -> None:
-        self.road, self.steps, self.config = road, 0, {"simulation_frequency": 15}
+    return SimpleNamespace(road=road, steps=0, config={"simulation_frequency": 15})
 
 
 def gives_way(apart: float, visibility: float, waited: int = 0) -> bool:
     """Whether the vehicle on the minor road gives way, having looked some steps ago."""
     road, main, minor = crossing(apart)
-    environment = _Environment(road)
+    environment = stepped(road)
     limit_sight(even(visibility), Fleet(environment, main), DriverSight(DAY))
     assert RegulatedRoad.respect_priorities(main, minor) is minor
     road.respect_priorities(main, minor)
@@ -59,7 +58,7 @@ def test_nobody_gives_way_to_whom_they_do_not_see() -> None:
 
 def test_who_comes_into_view_is_given_way_to_after_the_reaction_time() -> None:
     road, main, minor = crossing(30.0)
-    environment = _Environment(road)
+    environment = stepped(road)
     limit_sight(even(20.0), Fleet(environment, main), DriverSight(DAY))
     assert road.respect_priorities(main, minor) is None
     main.position, minor.position = np.array([-5.0, 0.0]), np.array([0.0, 5.0])
@@ -90,5 +89,4 @@ def test_who_crosses_unseen_is_hit(visibility: float, collides: bool) -> None:
         snapshot = traffic.observe()
         assert snapshot is not None
         hits += snapshot.collisions
-    traffic.close()
     assert bool(hits) == collides

@@ -7,24 +7,19 @@ import gymnasium
 import numpy as np
 import pytest
 from highway_env.road.lane import CircularLane, StraightLane
-from highway_env.road.road import Road
-from highway_env.road.road import RoadNetwork as HighwayRoads
-from highway_env.vehicle.kinematics import Vehicle
 
-from fogsim.traffic.highway import HighwayTraffic, RouteProgress, road_network
+from fogsim.traffic.highway import HighwayTraffic, RouteProgress
 from fogsim.traffic.highway.network import FASTEST_GAIN
 from fogsim.values import Command, SpeedAdvice
+from tests.traffic.highway.test_traffic import network_of
 
-FEW = {"vehicles_count": 4}
 # Each with a seed, and a configuration that makes it quick.
 ENVIRONMENTS: dict[str, tuple[int, dict[str, Any]]] = {
-    "highway-v0": (1, FEW),
-    "highway-fast-v0": (1, FEW),
     "merge-v1": (1, {}),
     "roundabout-v1": (2, {}),
     "intersection-v1": (3, {"initial_vehicle_count": 6}),
     "racetrack-v0": (2, {}),
-    "exit-v0": (1, FEW),
+    "exit-v0": (1, {"vehicles_count": 4}),
     "two-way-v0": (1, {}),
     "u-turn-v0": (1, {}),
     "lane-keeping-v0": (1, {}),
@@ -70,28 +65,20 @@ def test_a_place_gains_and_loses_no_more_than_was_driven() -> None:
     assert second.update(back, backwards=True) == pytest.approx(20.0)
 
 
-def route_of(*lanes: tuple[str, str, Any]) -> Any:
-    roads = HighwayRoads()
-    for start, end, lane in lanes:
-        roads.add_lane(start, end, lane)
-    road = Road(roads)
-    return road_network(road, Vehicle(road, lanes[0][2].position(0.0, 0.0))).route
-
-
 def test_a_way_goes_on_where_the_next_lane_is_reached() -> None:
     first, second = StraightLane((0.0, 0.0), (100.0, 0.0)), StraightLane((60.0, 4.0), (200.0, 4.0))
-    assert route_of(("a", "b", first), ("b", "c", second)) == pytest.approx(
+    assert network_of(("a", "b", first), ("b", "c", second)).route == pytest.approx(
         np.array([(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, -4.0, 0.0), (200.0, -4.0, 0.0)])
     )
 
 
 def test_a_way_does_not_turn_back() -> None:
     out, back = StraightLane((0.0, 0.0), (100.0, 0.0)), StraightLane((100.0, -4.0), (0.0, -4.0))
-    assert route_of(("a", "b", out), ("b", "c", back))[-1] == pytest.approx((100.0, 0.0, 0.0))
+    assert network_of(("a", "b", out), ("b", "c", back)).route[-1] == pytest.approx((100.0, 0.0, 0.0))
     # But it follows a lane that does.
     bend = CircularLane((100.0, -10.0), 10.0, math.pi / 2, -math.pi / 2, clockwise=False)
     back = StraightLane((100.0, -20.0), (0.0, -20.0))
-    assert route_of(("a", "b", out), ("b", "c", bend), ("c", "d", back))[-1] == pytest.approx((0.0, 20.0, 0.0))
+    assert network_of(("a", "b", out), ("b", "c", bend), ("c", "d", back)).route[-1] == pytest.approx((0.0, 20.0, 0.0))
 
 
 @pytest.mark.filterwarnings("ignore:.*is out of date. You should consider upgrading:DeprecationWarning")
@@ -116,6 +103,5 @@ def test_the_egos_place_moves_as_it_drives() -> None:
         route = traffic.network()[0].route
         steps = np.diff(route, axis=0)
         turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
-        traffic.close()
         # Some lanes go on beside where they ended, but none behind.
         assert (np.abs(turns) < math.radians(100.0)).all()

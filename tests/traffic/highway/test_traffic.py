@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from highway_env.road.lane import CircularLane, LineType, SineLane
+from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
 from highway_env.road.road import Road
 from highway_env.road.road import RoadNetwork as HighwayRoads
 from highway_env.vehicle.behavior import IDMVehicle
@@ -18,6 +18,7 @@ from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
+from fogsim.traffic.highway.network import speed_limit, upright
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, Lamp, LaneMarking, SpeedAdvice
 from tests.traffic.common import even, seen
@@ -47,7 +48,6 @@ def test_a_straight_road_with_y_up() -> None:
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)
     network, signs = traffic.network()
-    traffic.close()
     assert signs.signs == ()
     assert [lane.lane_id for lane in network.lanes] == ["0>1_0", "0>1_1", "0>1_2", "0>1_3"]
     for index, lane in enumerate(network.lanes):
@@ -63,6 +63,13 @@ def test_a_straight_road_with_y_up() -> None:
     assert environment.vehicle.lane_index == ("0", "1", 2)
 
 
+def test_points_are_level_and_a_lane_without_a_limit_has_the_highest_speed_of_vehicles() -> None:
+    assert upright([[1.0, 2.0], [3.0, -4.0]]).tolist() == [[1.0, -2.0, 0.0], [3.0, 4.0, 0.0]]
+    assert not np.signbit(upright([0.0, 0.0])).any()
+    lanes = (StraightLane([0, 0], [100, 0], speed_limit=limit) for limit in (20.0, None))
+    assert [speed_limit(lane) for lane in lanes] == pytest.approx([20.0, 40.0])
+
+
 def test_front_bumpers_and_headings() -> None:
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)
@@ -72,7 +79,6 @@ def test_front_bumpers_and_headings() -> None:
     other.action["acceleration"] = -3.0
     environment.road.vehicles.append(other)
     snapshot = seen(traffic)
-    traffic.close()
     state, row = snapshot.state, 1 - snapshot.ego
     assert state.position[snapshot.ego] == pytest.approx((ego.position[0] + 2.5, -8.0, 0.0))
     assert state.position[row] == pytest.approx((ego.position[0] + 50.0, -8.0 - 2.5, 0.0))
@@ -116,17 +122,15 @@ def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
         hits += seen(traffic).collisions
     state = seen(traffic).state
     contrast, lamps = inherent_contrast(tuple(state.paint[2])), rear_intensity(int(state.lamps[2]))
-    traffic.close()
     assert driver.speed < 1.0
     return hits, DriverSight(DAY).seen_distance(extinction_from_visibility(visibility), contrast, lamps)
 
 
-def test_drivers_stop_in_clear_air() -> None:
-    assert collisions_of_a_driver(10_000.0)[0] == []
+def test_in_thin_fog_drivers_stop() -> None:
     assert collisions_of_a_driver(300.0)[0] == []
 
 
-@pytest.mark.parametrize("visibility", [30.0, 45.0, 60.0])
+@pytest.mark.parametrize("visibility", [30.0, 60.0])
 def test_in_fog_they_hit_what_they_see_too_late(visibility: float) -> None:
     (hit,), shows = collisions_of_a_driver(visibility)
     assert hit.collider.startswith("IDMVehicle")
@@ -148,7 +152,6 @@ def test_collisions_are_those_that_the_library_knows() -> None:
         traffic.advance(Command())
         hits += seen(traffic).collisions
     names = seen(traffic).state.ids
-    traffic.close()
     crashed = {name for name, vehicle in zip(names, vehicles, strict=True) if vehicle.crashed}
     assert len(crashed) > 2
     assert {name for hit in hits for name in (hit.collider, hit.victim)} == crashed
@@ -156,21 +159,15 @@ def test_collisions_are_those_that_the_library_knows() -> None:
 
 
 def test_the_egos_driver_is_as_blind_as_the_others() -> None:
-    def ends_in_collision(visibility: float) -> bool:
-        traffic, environment = traffic_on(EMPTY)
-        traffic.enter_fog(even(visibility))
-        traffic.start(1)
-        ego = environment.vehicle
-        environment.road.vehicles.append(Vehicle(environment.road, beside(ego, 200.0, 0.0)))
-        hits = []
-        for _ in range(12 * 15):
-            traffic.advance(Command())
-            hits += seen(traffic).collisions
-        traffic.close()
-        return any("ego" in (hit.collider, hit.victim) for hit in hits)
-
-    assert ends_in_collision(40.0)
-    assert not ends_in_collision(10_000.0)
+    traffic, environment = traffic_on(EMPTY)
+    traffic.enter_fog(even(40.0))
+    traffic.start(1)
+    environment.road.vehicles.append(Vehicle(environment.road, beside(environment.vehicle, 200.0, 0.0)))
+    hits: list[Collision] = []
+    for _ in range(12 * 15):
+        traffic.advance(Command())
+        hits += seen(traffic).collisions
+    assert any("ego" in (hit.collider, hit.victim) for hit in hits)
 
 
 @pytest.mark.parametrize(("visibility", "pulls_out"), [(2000.0, False), (15.0, True)])
@@ -187,7 +184,6 @@ def test_who_comes_from_behind_unseen_holds_no_overtaker_back(visibility: float,
     lane = driver.lane_index
     for _ in range(20):
         traffic.advance(Command())
-    traffic.close()
     assert (driver.target_lane_index != lane) == pulls_out
 
 
@@ -204,8 +200,6 @@ def test_fog_of_one_environment_stays_there() -> None:
     assert in_clear_air.road.neighbour_vehicles(in_clear_air.vehicle)[0] is not None
     # What is hidden from the driver is still there for the snapshot.
     assert seen(foggy).leader is not None
-    foggy.close()
-    clear.close()
 
 
 def test_a_copied_environment_keeps_its_fog() -> None:
@@ -220,7 +214,6 @@ def test_a_copied_environment_keeps_its_fog() -> None:
     copied.road.vehicles.append(near)
     assert copied.road.neighbour_vehicles(copied.vehicle)[0] is near
     assert len(environment.road.vehicles) == 1
-    traffic.close()
 
 
 def test_advice_sets_the_speed_gently_and_lets_go() -> None:
@@ -234,40 +227,29 @@ def test_advice_sets_the_speed_gently_and_lets_go() -> None:
         speeds.append(snapshot.state.speed[0])
         hardest = min(hardest, snapshot.state.acceleration[0])
         assert snapshot.state.lamps[0] & ~Lamp.STOP == command.lamps
-    traffic.close()
     assert speeds[299] == pytest.approx(15.0, abs=0.3)
     assert hardest == pytest.approx(-2.0, abs=0.05)
     assert speeds[-1] == pytest.approx(25.0, abs=0.5)
 
 
 def test_advice_to_drive_faster_changes_nothing() -> None:
-    speeds = []
-    for advised in (math.inf, 30.0):
-        traffic, environment = traffic_on(EMPTY)
-        traffic.start(1)
-        environment.vehicle.target_speed = 20.0
-        for _ in range(150):
-            traffic.advance(Command(SpeedAdvice(advised)))
-        speeds.append(seen(traffic).state.speed[0])
-        traffic.close()
-    assert speeds == pytest.approx([20.0, 20.0], abs=0.2)
-
-
-def test_an_ego_that_is_removed_is_gone() -> None:
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)
-    environment.road.vehicles.remove(environment.vehicle)
-    assert traffic.observe() is None
-    traffic.close()
+    environment.vehicle.target_speed = 20.0
+    for _ in range(150):
+        traffic.advance(Command(SpeedAdvice(30.0)))
+    assert seen(traffic).state.speed[0] == pytest.approx(20.0, abs=0.2)
 
 
-def test_misuse() -> None:
+def test_misuse_and_an_ego_that_is_gone() -> None:
     with pytest.raises(InputError, match="environment of highway-env"):
         HighwayTraffic(gymnasium.make("CartPole-v1"), None)
     traffic, environment = traffic_on(EMPTY)
     with pytest.raises(SimulationError, match="not been started"):
         traffic.advance(Command())
     traffic.start(1)
+    environment.road.vehicles.remove(environment.vehicle)
+    assert traffic.observe() is None
     environment.configure({"lanes_count": 5})
     with pytest.raises(OtherRoadsError, match="HighwayEnv has built other roads"):
         traffic.start(2)

@@ -5,10 +5,9 @@ import pytest
 from fogsim.traffic.road import map_cache, network
 from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net
+from tests.traffic.common import DATA, NET
 
-ROOT = Path(__file__).resolve().parents[3]
-GRID = ROOT / "tests" / "data" / "grid" / "grid.net.xml"
-MOTORWAY = ROOT / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+GRID = DATA / "grid" / "grid.net.xml"
 
 
 @pytest.fixture
@@ -41,7 +40,7 @@ def told(roads: RoadMap) -> list[object]:
     return [roads.edges, lanes, painted, areas, chosen, roads.limit_signs, roads.location]
 
 
-@pytest.mark.parametrize("net", [GRID, MOTORWAY])
+@pytest.mark.parametrize("net", [GRID, NET])
 @pytest.mark.usefixtures("cache")
 def test_a_network_is_parsed_once_and_comes_back_as_it_was(net: Path, parsed: list[Path]) -> None:
     first, second = read_net(net), read_net(net)
@@ -73,7 +72,7 @@ def test_a_changed_network_is_another_and_the_oldest_maps_go(
     cache: Path, parsed: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(map_cache, "_MOST_FILES", 2)
-    net, text = tmp_path / "net.net.xml", MOTORWAY.read_text(encoding="utf-8")
+    net, text = tmp_path / "net.net.xml", NET.read_text(encoding="utf-8")
     for number in range(4):
         net.write_text(f"{text}<!-- {number} -->", encoding="utf-8")
         read_net(net)

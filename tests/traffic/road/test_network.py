@@ -12,9 +12,9 @@ from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.signs import sign_map
 from fogsim.values import LaneEnd, LaneKind, LaneMarking, SignMap
+from tests.traffic.common import DATA, NET
 
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
-NET = FOLDER / "motorway.net.xml"
+GRID = DATA / "grid" / "grid.net.xml"
 
 
 def test_lanes_of_the_motorway() -> None:
@@ -53,9 +53,6 @@ def test_what_is_no_network(tmp_path: Path) -> None:
         read_net(file)
 
 
-GRID = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
-
-
 def test_a_town_has_junctions_stop_lines_and_double_lines_between_directions() -> None:
     network = road_network(read_net(GRID), ["A0B0"])
     lanes = {lane.lane_id: lane for lane in network.lanes}
@@ -70,11 +67,9 @@ def test_a_town_has_junctions_stop_lines_and_double_lines_between_directions() -
     assert {lane.left for lane in inside} == {LaneMarking.NONE}
 
 
-@pytest.mark.parametrize(("lane", "count"), [("e_0", 0), ("f_0", 1)])
-def test_a_lane_without_a_shape_is_named(tmp_path: Path, lane: str, count: int) -> None:
-    file = tmp_path / "bare.net.xml"
-    shape = {0: "", 1: ' shape="0,0"'}[count]
-    edge = lane.removesuffix("_0")
+@pytest.mark.parametrize(("edge", "shape", "count"), [("e", "", 0), ("f", ' shape="0,0"', 1)])
+def test_a_lane_without_a_shape_is_named(tmp_path: Path, edge: str, shape: str, count: int) -> None:
+    file, lane = tmp_path / "bare.net.xml", f"{edge}_0"
     file.write_text(
         '<net version="1.20"><location netOffset="0,0" convBoundary="0,0,1,1" origBoundary="0,0,1,1" '
         f'projParameter="!"/><edge id="{edge}" from="a" to="b">'

@@ -6,9 +6,8 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.signs import geographic_position, sign_map
+from tests.traffic.common import MOTORWAY, NET
 
-FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
-NET = FOLDER / "motorway.net.xml"
 ONE_EDGE = """<net version="1.20">{location}
 <edge id="e" from="a" to="b" priority="1">
 <lane id="e_0" index="0" speed="30" length="100" shape="0,0 100,0"/></edge>
@@ -23,7 +22,7 @@ def additional(folder: Path, content: str) -> Path:
 
 
 def test_signs_stand_where_limits_change_and_where_pois_say() -> None:
-    signs = {sign.sign_id: sign for sign in sign_map(read_net(NET), [FOLDER / "signs.add.xml"]).signs}
+    signs = {sign.sign_id: sign for sign in sign_map(read_net(NET), [MOTORWAY / "signs.add.xml"]).signs}
     assert {"limit.approach", "limit.bank", "limit.exit", "limit.opposite", "bank.600"} <= set(signs)
     assert signs["limit.bank"].value == pytest.approx(110 / 3.6, abs=0.01)
     assert signs["bank.600"].value == pytest.approx(110 / 3.6)

@@ -69,14 +69,10 @@ def test_a_headway_grows_and_shrinks_and_comes_back(api: Any) -> None:
     assert not any(api.vehicle.parameters.values())
 
 
-def test_a_claim_above_the_own_value_changes_nothing(api: Any) -> None:
-    claims = Claims(api, TOP_SPEED, "1")
-    claims.claim("v", 50.0)
-    assert api.vehicle.top_speed == OWN
-
-
 def test_a_value_that_somebody_else_sets_is_the_own_one_from_then_on(api: Any) -> None:
     claims = Claims(api, TOP_SPEED, "1")
+    claims.claim("v", 50.0)  # which is above the vehicle's own
+    assert api.vehicle.top_speed == OWN
     claims.claim("v", 20.0)
     api.vehicle.top_speed = 25.0
     claims.claim("v", 18.0)

@@ -2,18 +2,16 @@
 
 import itertools
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fogsim.traffic import AttachedTraffic
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState
+from fogsim.values import Command, SpeedAdvice, TrafficState
 from tests.helpers.vehicles import vehicles
 from tests.traffic.common import MOTORWAY, SETUP, seen
 
@@ -22,56 +20,33 @@ LARGEST_STEP = 0.2
 """Farther than this nobody is to move sideways within 0.1 s [m]."""
 
 
-def to_the_left(
-    before: NDArray[np.float64], now: NDArray[np.float64], heading: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    moved = now - before
-    return np.asarray(moved[..., 1] * np.cos(heading) - moved[..., 0] * np.sin(heading))
-
-
-def steps_to_the_side(states: list[tuple[TrafficState, TrafficState]]) -> tuple[NDArray[np.float64], ...]:
-    """Sideways movements of everybody between states that follow each other, as shown and as SUMO has them."""
-    shown_steps, true_steps = [], []
-    for (last, last_true), (now, now_true) in itertools.pairwise(states):
-        both = [(last.ids.index(v), i) for i, v in enumerate(now.ids) if v in last.ids]
-        old, new = (list(rows) for rows in zip(*both, strict=True))
-        heading = now_true.heading[new]
-        shown_steps.append(to_the_left(last.position[old], now.position[new], heading))
-        true_steps.append(to_the_left(last_true.position[old], now_true.position[new], heading))
-    return np.concatenate(shown_steps), np.concatenate(true_steps)
-
-
-def assert_smooth(states: list[tuple[TrafficState, TrafficState]]) -> None:
-    shown, true = np.abs(steps_to_the_side(states))
-    assert np.count_nonzero(true > 3.0) >= 10
-    assert shown.max() < LARGEST_STEP
-    for state, unmoved in states:
-        for name in ("ids", "lane", "speed", "acceleration", "lamps"):
-            assert np.array_equal(getattr(state, name), getattr(unmoved, name)), name
-
-
-def attached_run(api: Any, steps: int) -> list[tuple[TrafficState, TrafficState]]:
+def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> None:
     """Shown and true states in a simulation that its owner steps."""
+    api = link.begin(command_line(BUSY, 1))
     while "ego" not in api.vehicle.getIDList():
         api.simulationStep()
     traffic = AttachedTraffic(BUSY, api)
     traffic.start(1)
-    truth = VehicleReader(api, "ego", BUSY.reading_radius)
-    states = []
-    for _ in range(steps):
+    truth, states = VehicleReader(api, "ego", BUSY.reading_radius), []
+    for _ in range(500):
         traffic.obey(Command(SpeedAdvice(28.0)))
         api.simulationStep()
         traffic.look()
         states.append((seen(traffic).state, truth.state(Command().lamps)))
     traffic.release()
-    return states
-
-
-def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> None:
-    states = attached_run(link.begin(command_line(BUSY, 1)), 500)
-    assert_smooth(states)
-    arrived = 0
-    longest = round(DURATION / BUSY.step_length) + 3
+    aside: list[list[float]] = []
+    for (last, now), (last_true, true) in zip(*map(itertools.pairwise, zip(*states, strict=True)), strict=True):
+        for name in ("ids", "lane", "speed", "acceleration", "lamps"):
+            assert np.array_equal(getattr(now, name), getattr(true, name)), name
+        for new, vehicle in enumerate(now.ids):
+            if (old := last.row(vehicle)) is not None:
+                heading = true.heading[new]
+                moved = [b.position[new] - a.position[old] for a, b in ((last, now), (last_true, true))]
+                aside.append([abs(way[1] * np.cos(heading) - way[0] * np.sin(heading)) for way in moved])
+    shown, sumos = np.array(aside).T
+    assert np.count_nonzero(sumos > 3.0) >= 10
+    assert shown.max() < LARGEST_STEP
+    arrived, longest = 0, round(DURATION / BUSY.step_length) + 3
     for i in range(longest, len(states)):
         now, true = states[i]
         for row, vehicle in enumerate(now.ids):
@@ -82,27 +57,6 @@ def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> Non
                 assert now.heading[row] == true.heading[row]
                 arrived += indices[0] != indices[1]
     assert arrived >= 10
-
-
-def test_without_changes_of_lane_states_are_untouched(link: LibsumoLink) -> None:
-    api = link.begin(command_line(BUSY, 1))
-    while "ego" not in api.vehicle.getIDList():
-        step_without_changes(api)
-    smoothing, reader = LaneChangeSmoothing(), VehicleReader(api, "ego", 800.0)
-    lanes: set[str] = set()
-    for _ in range(300):
-        step_without_changes(api)
-        state = reader.state(Lamp.NONE)
-        assert smoothing.smoothed(state) is state
-        lanes.update(state.lane)
-    # From edge to edge, that is, but never to the side.
-    assert len(lanes) > 3
-
-
-def step_without_changes(api: Any) -> None:
-    for vehicle in api.simulation.getDepartedIDList():
-        api.vehicle.setLaneChangeMode(vehicle, 0)
-    api.simulationStep()
 
 
 def ego_at(time: float, x: float, y: float, lane: str, heading: float = 0.0) -> TrafficState:

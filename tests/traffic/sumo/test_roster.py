@@ -1,7 +1,9 @@
-"""The roster is the set of vehicles on the road."""
+"""The roster is the set of vehicles on the road; they are updated in time and once."""
+
+import pytest
 
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
-from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.roster import Roster, UpdateSchedule, closing_speed_bound
 from tests.traffic.common import CROWD
 
 
@@ -21,3 +23,29 @@ def test_the_roster_is_who_is_on_the_road(link: LibsumoLink) -> None:
             api.vehicle.remove(min(roster.present))
     assert roster.present < came
     assert roster.removals > 0
+
+
+def test_who_is_scheduled_is_due_in_time_and_once() -> None:
+    schedule = UpdateSchedule(0.1, 3.0)
+    schedule.add(["now"], 3.0)
+    schedule.add(["soon"], 3.27)
+    schedule.add(["later"], 3.74)
+    seen = {}
+    for step in range(1, 12):
+        time = 3.0 + 0.1 * step
+        for vehicle in schedule.pop_due(time):
+            seen[vehicle] = time
+    assert seen["now"] == pytest.approx(3.1)
+    assert seen["soon"] == pytest.approx(3.2)
+    assert 3.1 < seen["later"] <= 3.74
+    schedule.add(["a", "b"], 4.5)
+    assert schedule.unscheduled(["c", "a", "c"]) == ["c"]
+    assert schedule.pop_due(9.0) == ["a", "b"]
+    assert schedule.unscheduled(["a", "c"]) == ["a", "c"]
+    assert schedule.pop_due(10.0) == []
+
+
+def test_a_gap_closes_no_faster_than_its_bound() -> None:
+    """Over 0.5 s an emergency stop of the leader at 20 m/s² adds a mean of 5 m/s."""
+    assert closing_speed_bound(30.0, 20.0, 0.5) == closing_speed_bound(20.0, 30.0, 0.5) == 15.0
+    assert closing_speed_bound(30.0, 20.0, 0.0) == 10.0

@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
-from fogsim.traffic.appearance import body_kind, lamps_from_many_signals, lamps_from_signals, paint
+from fogsim.traffic.appearance import body_kind, lamps_from_signals, paint
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
-from fogsim.traffic.sumo.vehicle_reader import OTHERS_LAMPS, SubscribedReader, VehicleBodies, VehicleReader
+from fogsim.traffic.sumo.vehicle_reader import OTHERS_LAMPS, SubscribedReader, VehicleReader
 from fogsim.values import Lamp, TrafficState
 from tests.traffic.common import CROWD, MOTORWAY
 
@@ -59,17 +58,20 @@ def assert_same(one: TrafficState, other: TrafficState) -> None:
             assert mine == expected, name
 
 
-@pytest.mark.parametrize("radius", [60.0, 800.0])
-def test_reading_those_near_gives_what_reading_everything_gives(link: LibsumoLink, radius: float) -> None:
+def test_reading_those_near_gives_what_reading_everything_gives(link: LibsumoLink) -> None:
+    """With a table of bodies that grows on the way."""
     api = begun(link)
-    reader = VehicleReader(api, "ego", radius)
-    met: set[str] = set()
-    for _ in range(400):
+    readers = {radius: VehicleReader(api, "ego", radius) for radius in (60.0, 6000.0)}
+    met: dict[float, set[str]] = {radius: set() for radius in readers}
+    for step in range(600):
         link.step()
-        state = reader.state(Lamp.LOW_BEAM)
-        assert_same(state, read_everything(api, Lamp.LOW_BEAM, radius))
-        met.update(state.ids)
-    assert len(met) > len(state.ids)
+        for radius, reader in readers.items():
+            state = reader.state(Lamp.LOW_BEAM)
+            met[radius].update(state.ids)
+            if step % 3 == 0:
+                assert_same(state, read_everything(api, Lamp.LOW_BEAM, radius))
+    assert len(met[60.0]) > len(readers[60.0].state(Lamp.LOW_BEAM).ids)
+    assert len(met[6000.0]) > max(64, len(state.ids))
 
 
 def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_path: Path) -> None:
@@ -148,21 +150,3 @@ def test_a_vehicle_that_is_moved_by_hand_is_found_within_a_second(link: LibsumoL
         link.step()
         found = far in reader.state(Lamp.NONE).ids
     assert found
-
-
-def test_the_table_of_bodies_grows(link: LibsumoLink) -> None:
-    api = begun(link)
-    bodies = VehicleBodies(api)
-    for _ in range(600):
-        link.step()
-        ids = api.vehicle.getIDList()
-        kinds, numbers = bodies.look_up(ids)
-        assert numbers.shape == (len(ids), 8)
-    assert len(bodies._numbers) > 64
-    assert numbers[:, 0].tolist() == [api.vehicle.getLength(v) for v in ids]
-    assert list(kinds) == [body_kind(api.vehicle.getVehicleClass(v)) for v in ids]
-
-
-def test_lamps_of_many() -> None:
-    signals = [*range(128), 1 << 13, (1 << 13) | 8]
-    assert lamps_from_many_signals(signals).tolist() == [lamps_from_signals(s) for s in signals]

@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 import fogsim
+from fogsim.scenario import scenario_from_config
 from fogsim.traffic.sumo_behaviour.scripted_actions import LampPublisher
 from fogsim.values import Lamp
+from tests.traffic.common import DATA
 
 
 def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
@@ -36,15 +38,6 @@ def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
         found.append(self._api.vehicle.getParameter("ego", "fogsim-lamps"))
 
     monkeypatch.setattr(LampPublisher, "publish", spied)
-    settings = [
-        "duration_s=1",
-        "expect={}",
-        "vary={}",
-        "renderer=none",
-        "estimators=[]",
-        "demand.same_way_vph=0",
-        "demand.oncoming_vph=0",
-    ]
-    scenario = fogsim.load_scenario("clear_day", [*settings, "lighting=always_high"])
-    list(fogsim.run(scenario, seed=1))
+    settings = ["duration_s=1", "renderer=none", "estimators=[]", "fog.visibility_m=9000", "lighting=always_high"]
+    list(fogsim.run(scenario_from_config(DATA / "off_lanes" / "two.sumocfg", "ego", settings), seed=1))
     assert found[-1] == "position+high_beam"

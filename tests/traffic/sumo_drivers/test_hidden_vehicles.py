@@ -1,8 +1,7 @@
 """Whom obstructions hide from drivers: by hand, and on a bend where the driver brakes later than without them."""
 
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.values import FogField, Structure, StructureKind
 from fogsim.values.obstruction import Obstructions, obstructions_of
+from tests.traffic.sumo_drivers.test_vehicle_sight import two_vehicles
 
 PAIRS = [("me", "other"), ("other", "me")]
 BEND = """
@@ -46,23 +46,6 @@ def across(y: tuple[float, float], height: float) -> Obstructions:
     return obstructions_of([Structure("wall", StructureKind.WALL, line, 0.3, 0.0, height)])
 
 
-def two_vehicles(top: float) -> Any:
-    """I am at the origin and bound for the east; the other, 40 m long with me, is 2 m wide and so high."""
-    vehicle = SimpleNamespace(
-        getPosition3D={"me": (0.0, 0.0, 0.0), "other": (45.0, 0.0, 0.0)}.__getitem__,
-        getAngle=lambda _: 90.0,
-        getSignals=lambda _: 0,
-        getColor=lambda _: (0, 0, 0, 255),
-        getLength=lambda _: 5.0,
-        getWidth=lambda _: 2.0,
-        getHeight=lambda _: top,
-        getMinGap=lambda _: 2.5,
-        getVehicleClass=lambda _: "passenger",
-        getShapeClass=lambda _: "",
-    )
-    return SimpleNamespace(vehicle=vehicle)
-
-
 def test_a_vehicle_is_hidden_when_every_corner_is() -> None:
     for y, height, top, hidden in [
         ((-9.0, 9.0), 2.0, 1.5, True),
@@ -71,7 +54,8 @@ def test_a_vehicle_is_hidden_when_every_corner_is() -> None:
         ((-9.0, 0.3), 2.0, 1.5, False),  # its left side stands out
         ((-9.0, 0.7), 2.0, 1.5, True),
     ]:
-        api, wall = two_vehicles(top), across(y, height)
+        # The other's front is 45 m ahead of mine.
+        api, wall = two_vehicles(45.0, 0.0, 0.0, top=top), across(y, height)
         clear = FieldAccess(FogField(0.0, (3000.0,) * 3))
         view = DriversView(api, clear, DriverSight(10_000.0), cast("Roster", None), obstructions=wall)
         assert view.hidden_vehicles is not None

@@ -3,7 +3,6 @@
 import contextlib
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from fogsim.traffic.sumo_drivers.junction_sight import JunctionFoes, unregulated
 CROSSING_WAYS = (("A1B1", "B1C1"), ("B0B1", "B1B2"), ("C1B1", "B1A1"))
 
 
-@contextmanager
+@contextlib.contextmanager
 def crossing(folder: Path, kind: str) -> Iterator[Any]:
     """Cars that meet at junctions of a kind."""
     net, routes = folder / "cross.net.xml", folder / "cross.rou.xml"

@@ -1,6 +1,5 @@
 """Drivers at junctions in a real SUMO: they yield to whom they see, and obey the lights that they see."""
 
-import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator
@@ -24,7 +23,7 @@ from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, SignalAhead, SignalColour
+from fogsim.values import Collision, Command
 from tests.traffic.common import DATA, even, setup_of
 
 Cars = Callable[..., TrafficSetup]
@@ -122,7 +121,7 @@ def test_drivers_who_see_too_late_meet_on_the_crossing(cars: Cars) -> None:
     assert drive(crossing(cars, 140.0), CLEAR).hits == []
 
 
-@pytest.mark.parametrize("visibility", [17.0, 20.0, 22.0])
+@pytest.mark.parametrize("visibility", [17.0, 22.0])
 def test_a_driver_with_priority_hits_who_stands_on_the_crossing_as_physics_says(cars: Cars, visibility: float) -> None:
     """v² = v₀² − 2 a (d − v₀ t), with the distance d at which a black side is seen, and SUMO's emergency braking."""
     stand = BrakeEvent("stuck", Trigger(at_position=143.2), to_speed=0.0, deceleration=9.0)
@@ -143,44 +142,28 @@ def show_red(step: int) -> None:
         lights.setRedYellowGreenState("C", "r" * len(lights.getRedYellowGreenState("C")))
 
 
-@pytest.mark.parametrize(("visibility", "overruns"), [(8.0, True), (12.0, True), (20.0, False), (60.0, False)])
+@pytest.mark.parametrize(("visibility", "overruns"), [(8.0, True), (12.0, True), (20.0, False)])
 def test_a_red_light_is_overrun_in_dense_fog_as_physics_says_and_obeyed_in_thin(
     cars: Cars, visibility: float, overruns: bool
 ) -> None:
     """A signal of 200 cd is seen by day at d with 200 e^(−k d) / d² = 10⁻³ lx; then v² = v₀² − 2 a (d − v₀ t)."""
-    setup = at_red(cars)
-    entered = drive(setup, visibility, each=show_red).entered
+    speeds: list[float] = []
+
+    def watch(step: int) -> None:
+        show_red(step)
+        if "ego" in load_libsumo().vehicle.getIDList():
+            speeds.append(load_libsumo().vehicle.getSpeed("ego"))
+
+    entered = drive(at_red(cars), visibility, each=watch).entered
     assert bool(entered) == overruns
     if overruns:
         k = extinction_from_visibility(visibility)
         seen = max(d for d in (0.1 * n for n in range(1, 1000)) if 200.0 * math.exp(-k * d) / d**2 >= 1e-3)
         left = math.sqrt(13.89**2 - 2 * EMERGENCY_DECELERATION * max(seen - 13.89 * DAY.reaction_time, 0.0))
         assert entered["ego"][1] == pytest.approx(left, abs=1.2)
-
-
-def test_the_light_ahead_of_the_ego_is_told(cars: Cars) -> None:
-    with contextlib.closing(libsumo_traffic(at_red(cars))) as traffic:
-        traffic.start(1)
-        show_red(0)
-        first = traffic.observe()
-        assert first is not None
-        assert first.signal_ahead == SignalAhead("C", SignalColour.RED, first.signal_ahead.distance)
-        traffic.advance(Command())
-        second = traffic.observe()
-        way = second.route_position - first.route_position
-        assert 0.0 < way == pytest.approx(first.signal_ahead.distance - second.signal_ahead.distance)
-
-
-def test_nobody_stops_at_a_line_in_one_step(cars: Cars) -> None:
-    speeds: list[float] = []
-
-    def watch(step: int) -> None:
-        show_red(step)
-        speeds.append(load_libsumo().vehicle.getSpeed("ego"))
-
-    drive(at_red(cars), 12.0, steps=230, each=watch)
-    slowest = min(after - before for before, after in itertools.pairwise(speeds))
-    assert slowest == pytest.approx(-0.1 * EMERGENCY_DECELERATION, abs=1e-6)
+        # Nobody stops at a line in one step.
+        hardest = min(after - before for before, after in itertools.pairwise(speeds))
+        assert hardest == pytest.approx(-0.1 * EMERGENCY_DECELERATION, abs=1e-6)
 
 
 def test_vehicles_on_rails_obey_signals_that_their_drivers_do_not_see(cars: Cars) -> None:
@@ -223,7 +206,7 @@ def test_in_clear_air_every_step_is_that_of_sumo_alone(cars: Cars, net: str) -> 
 
 
 @pytest.fixture
-def running(cars: Cars) -> Iterator[tuple[Api, TrafficSetup]]:
+def started(cars: Cars) -> Iterator[tuple[Api, TrafficSetup]]:
     """A simulation that somebody else has started."""
     setup = busy(cars, "lights.net.xml")
     api = load_libsumo()
@@ -245,8 +228,8 @@ def settings(api: Api) -> dict[str, tuple[int, str]]:
     return {v: (get.getSpeedMode(v), get.getParameter(v, IGNORED)) for v in get.getIDList()}
 
 
-def test_two_sessions_end_and_every_driver_yields_and_stops_as_before(running: tuple[Api, TrafficSetup]) -> None:
-    api, setup = running
+def test_two_sessions_end_and_every_driver_yields_and_stops_as_before(started: tuple[Api, TrafficSetup]) -> None:
+    api, setup = started
     api.vehicle.setParameter("v1", IGNORED, "v2")
     api.vehicle.setSpeedMode("v3", 30)
     before = settings(api)

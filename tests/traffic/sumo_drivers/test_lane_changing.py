@@ -20,7 +20,7 @@ from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
 from tests.traffic.common import CROWD, NET, QUIET
-from tests.traffic.sumo_drivers.test_perception import Fog, SeesFrom
+from tests.traffic.sumo_drivers.test_perception import SeesFrom, fog_of
 
 FREE, IN_LANE = 1621, 0
 CLEAR = 1000.0
@@ -71,7 +71,7 @@ class Road:
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
         self.roster = Roster(api)
-        view = DriversView(api, Fog(0.05), (NeverSure if blind else SeesFrom)(reach), self.roster)
+        view = DriversView(api, fog_of(0.05), (NeverSure if blind else SeesFrom)(reach), self.roster)
         leaders = Perception(view)
         self.parts = [leaders, LaneChanging(view, leaders, SeesNobody(view, blind))]
         return api
@@ -151,10 +151,9 @@ def test_so_does_an_overtaker_of_the_sublane_model(road: Road) -> None:
     assert is_ahead == [False, True]
 
 
-@pytest.mark.parametrize("place", [320.0, 350.0])
-def test_an_overtaker_meets_who_stands_unseen_in_the_other_lane(road: Road, place: float) -> None:
+def test_an_overtaker_meets_who_stands_unseen_in_the_other_lane(road: Road) -> None:
     """Ahead is a slower vehicle in sight, and out of sight in the other lanes somebody stands."""
-    leader = vehicle("ego", 200, 30, 0, top=33) + vehicle("slow", 230, 24, 0)
+    leader, place = vehicle("ego", 200, 30, 0, top=33) + vehicle("slow", 230, 24, 0), 320.0
     vehicles = leader + standing("wreck", place, 1) + standing("wreck2", place, 2)
     api = road.enter(vehicles, CLEAR)
     assert road.until(lambda: api.vehicle.getLanePosition("ego") > place)
@@ -225,22 +224,21 @@ def test_nobody_makes_room_for_whom_they_do_not_see(road: Road) -> None:
     assert speeds[1] > 28.0
 
 
-@pytest.mark.parametrize("reach", [5.0, 30.0])
-def test_who_keeps_the_lane_keeps_it(road: Road, reach: float) -> None:
-    api = road.enter(OVERTAKER + standing("wreck", 300, 1) + vehicle("fast", 150, 33, 1), reach, free=())
+def test_who_keeps_the_lane_keeps_it(road: Road) -> None:
+    api = road.enter(OVERTAKER + standing("wreck", 300, 1) + vehicle("fast", 150, 33, 1), 30.0, free=())
     assert not road.until(lambda: api.vehicle.getLaneIndex("ego") != 0, 100)
 
 
-@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
-def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road, illuminance: float) -> None:
+def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road) -> None:
     """To the last bit, by night too, when nothing is sure to be seen before it is looked at."""
 
-    def drive(parts: bool) -> list[tuple[str, str, float]]:
+    def drive(illuminance: float | None) -> list[tuple[str, str, float]]:
         api = road.link.begin(CROWD)
         for _ in range(300):
             road.link.step()
-        sight, roster = DriverSight(illuminance), Roster(api)
-        perception = DriversPerception(DriversView(api, Fog(0.0), sight, roster)) if parts else None
+        perception = None
+        if illuminance is not None:
+            perception = DriversPerception(DriversView(api, fog_of(0.0), DriverSight(illuminance), Roster(api)))
         for _ in range(200):
             if perception is not None:
                 perception.update({"ego": Lamp.POSITION | Lamp.LOW_BEAM}, Lamps())
@@ -248,7 +246,7 @@ def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road, illuminance: flo
         get = api.vehicle
         return [(v, get.getLaneID(v), get.getLanePosition(v)) for v in get.getIDList()]
 
-    assert drive(True) == drive(False)
+    assert drive(0.1) == drive(10_000.0) == drive(None)
 
 
 def test_everything_is_given_back(road: Road) -> None:

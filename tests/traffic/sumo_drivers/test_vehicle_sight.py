@@ -22,10 +22,13 @@ EAST = 90.0
 PAIR = [("me", "other")]
 
 
-def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0, observer: str = "passenger") -> Any:
+def two_vehicles(
+    ahead: float, left: float, turned: float, height: float = 0.0, observer: str = "passenger", top: float = 1.5
+) -> Any:
     """What SUMO tells of me at the origin, bound for the east, and of a black vehicle.
 
-    Its front bumper is so far ahead and to the left of mine; it is turned to the left by an angle [°].
+    Its front bumper is so far ahead and to the left of mine; it is turned to the left by an angle [°], 2 m wide and so
+    high (`top` [m]).
     """
     positions = {"me": (0.0, 0.0, 0.0), "other": (ahead, left, height)}
     angles = {"me": EAST, "other": EAST - turned}
@@ -36,7 +39,7 @@ def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0, 
         getColor=lambda _: (0, 0, 0, 255),
         getLength=lambda _: LENGTH,
         getWidth=lambda _: WIDTH,
-        getHeight=lambda _: 1.5,
+        getHeight=lambda _: top,
         getMinGap=lambda _: 2.5,
         getVehicleClass=lambda vehicle: observer if vehicle == "me" else "passenger",
         getShapeClass=lambda _: "",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import fogsim
 from fogsim.scenario import scenario_from_config
 from fogsim.scenario.build import traffic_setup
-from fogsim.traffic import DriverSight, libsumo_traffic
+from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.sight_kernels import LINE
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
@@ -20,11 +20,11 @@ from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, VehicleSight
 from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, sections
 from fogsim.traffic.sumo_lanes.street import LightsAhead
-from fogsim.values import Collision, Command, Lamp, SignalColour, TrafficState
+from fogsim.values import Command, Lamp, SignalColour, TrafficState
 from fogsim.values.command import EgoControl
 from fogsim.values.scene import Instance
 from fogsim.values.traffic import with_pieces
-from tests.traffic.common import DATA, QUIET, even, seen
+from tests.traffic.common import DATA, QUIET, configured, driven, even, running
 
 CASES = DATA / "sumo_cases"
 RAILS = CASES / "rails.sumocfg"
@@ -89,13 +89,14 @@ def check_pieces(state: TrafficState, line: NDArray[np.float64], vehicle: str) -
     return len(own)
 
 
-def test_a_train_lies_on_its_track(link: LibsumoLink) -> None:
+def test_a_train_lies_on_its_track_and_shorter_bodies_are_in_one_piece(link: LibsumoLink) -> None:
     api = begun(link, "-c", str(RAILS))
-    bodies, found = LongBodies(api), 0
+    bodies = LongBodies(api)
     for _ in range(60):
         link.step()
-        found += check_pieces(state_of(api, bodies), line_of(api, TRACK), "train") == 7
-    assert found == 60
+        state = state_of(api, bodies)
+        assert check_pieces(state, line_of(api, TRACK), "train") == 7
+        assert (state.length[state.pieces.row] > LONGEST_RIGID).all()  # shorter ones are in one piece
 
 
 def test_road_vehicles_bend_with_the_road(link: LibsumoLink, tmp_path: Path) -> None:
@@ -178,23 +179,15 @@ def test_every_letter_that_is_no_light_is_none(link: LibsumoLink) -> None:
 
 def alone(folder: Path) -> Path:
     """A configuration with a car and a train that arrive at the crossing at about the same time."""
-    (folder / "a.rou.xml").write_text(ALONE)
-    inputs = f'<net-file value="{CASES / "rails.net.xml"}"/><route-files value="a.rou.xml"/>'
-    (folder / "a.sumocfg").write_text(f"<configuration><input>{inputs}</input></configuration>")
-    return folder / "a.sumocfg"
+    return configured(folder, CASES / "rails.net.xml", ALONE)
 
 
 def test_who_drives_into_a_train_has_a_collision(tmp_path: Path) -> None:
     """An agent at the wheel is not stopped; the train's front is 130 m past the crossing, and it lies in a bend."""
     scenario = scenario_from_config(alone(tmp_path), "ego", ("renderer=none", "estimators=[]", "fog.visibility_m=500"))
-    traffic, hits = libsumo_traffic(traffic_setup(scenario)), list[Collision]()
-    try:
-        traffic.start(1)
-        for _ in range(230):
-            traffic.advance(Command(control=EgoControl(acceleration=0.0)))
-            hits += seen(traffic).collisions
-    finally:
-        traffic.close()
+    with running(traffic_setup(scenario)) as traffic:
+        snapshots = driven(traffic, 230, Command(control=EgoControl(acceleration=0.0)))
+    hits = [hit for snapshot in snapshots for hit in snapshot.collisions]
     assert [(hit.collider, hit.victim) for hit in hits] == [("ego", "train")]
     # Its front bumper reaches the side of the train at 10 m/s from 150 m on; their ways are at a right angle.
     assert hits[0].time - 1.0 == pytest.approx((351.6 - 1.42 - 150.0) / 10.0, abs=0.3)
@@ -207,10 +200,11 @@ def test_a_car_stops_before_a_closed_crossing_and_sees_the_train_on_it(tmp_path:
         f"fog.visibility_m={visibility}",
         "duration_s=45",
         "advice=none",
+        "estimators=[lead_contrast]",
         "clocks.camera_period_s=0.5",
         "renderer=cpu",
-        "camera.width=160",
-        "camera.height=120",
+        "camera.width=64",
+        "camera.height=48",
     )
     closed = passed = seen = 0
     for step in fogsim.run(scenario_from_config(alone(tmp_path), "ego", settings), seed=1):
@@ -232,12 +226,3 @@ def test_a_car_stops_before_a_closed_crossing_and_sees_the_train_on_it(tmp_path:
     assert closed > 20
     assert passed > 0
     assert seen > 5
-
-
-def test_shorter_bodies_are_in_one_piece(link: LibsumoLink) -> None:
-    api = begun(link, "-c", str(RAILS))
-    for _ in range(20):
-        link.step()
-    state = state_of(api, LongBodies(api))
-    assert set(state.pieces.row.tolist()) <= set(np.flatnonzero(state.length > LONGEST_RIGID).tolist())
-    assert state.ids.index("ego") not in state.pieces.row

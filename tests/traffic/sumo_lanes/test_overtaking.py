@@ -17,11 +17,10 @@ from fogsim.traffic.sumo_lanes.route_position import GapToEgo
 from fogsim.traffic.sumo_lanes.street import LightsAhead
 from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
 from fogsim.values import Step, Stretch
+from tests.traffic.common import DATA, QUIET, configured
 
-CASES = Path(__file__).resolve().parents[2] / "data" / "sumo_cases"
-FROM_WEST = {"we1", "we2"}
-LENGTH = 600.0
-"""Of each edge [m]; the junction between them, of 0.1 m in SUMO's reckoning, is a point at x = 600 m."""
+CASES = DATA / "sumo_cases"
+# Edges are 600 m long; the junction between them, of 0.1 m in SUMO's reckoning, is a point at x = 600 m.
 
 
 def routes(lorry: float, ego: float, oncoming: str = "") -> str:
@@ -37,11 +36,7 @@ ONCOMING = '<vehicle id="oncoming" type="car" route="back" depart="1" departPos=
 
 
 def config(folder: Path, demand: str, net: str = "overtaking.net.xml") -> Path:
-    (folder / "other.rou.xml").write_text(demand)
-    written = folder / "other.sumocfg"
-    names = f'<net-file value="{CASES / net}"/><route-files value="other.rou.xml"/>'
-    written.write_text(f"<configuration><input>{names}</input></configuration>")
-    return written
+    return configured(folder, CASES / net, demand)
 
 
 def steps_of(path: Path, ego: str = "ego", *settings: str) -> Iterator[Step]:
@@ -53,7 +48,7 @@ def steps_of(path: Path, ego: str = "ego", *settings: str) -> Iterator[Step]:
 def simulation(path: Path) -> Iterator[Any]:
     """SUMO itself, as long as the ego overtakes and after it; each step is a value of the iterator."""
     link = LibsumoLink()
-    api = link.begin(["-c", str(path), "--step-length", "0.5", "--no-step-log", "true", "--no-warnings", "true"])
+    api = link.begin(["-c", str(path), "--step-length", "0.5", *QUIET])
     try:
         yield link, api
     finally:

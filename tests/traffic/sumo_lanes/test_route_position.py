@@ -1,6 +1,5 @@
 """Gaps to the ego from bumper to bumper, and the events that wait for them."""
 
-import contextlib
 import math
 from dataclasses import replace
 
@@ -9,9 +8,9 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
-from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger, libsumo_traffic
+from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from tests.traffic.common import DATA, SETUP, driven
+from tests.traffic.common import DATA, SETUP, driven, running
 
 GRID = DATA / "grid" / "grid.sumocfg"
 
@@ -40,8 +39,7 @@ def test_gaps_are_those_that_sumo_keeps_to_its_leaders_on_roads_and_junctions() 
 def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:
     slow = BrakeEvent("lead", Trigger(at_time=0.0), to_speed=15.0)
     event = LampFailureEvent("lead", Trigger(at_gap_to_ego=60.0))
-    with contextlib.closing(libsumo_traffic(replace(SETUP, events=(slow, event)))) as traffic:
-        traffic.start(1)
+    with running(replace(SETUP, events=(slow, event))) as traffic:
         gaps = [math.inf]
         for _ in range(150):
             (snapshot,) = driven(traffic, 1)

@@ -1,18 +1,18 @@
 """Traffic lights and persons of a real SUMO at a crossing, and where the heads stand."""
 
-import contextlib
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from fogsim.traffic import libsumo_traffic
 from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, read_net, signal_heads
 from fogsim.values import Command, SignalColour, TrafficSnapshot
-from tests.traffic.common import DATA, setup_of
+from tests.traffic.common import DATA, running, setup_of
 
 NET = DATA / "crossing" / "lights.net.xml"
 DEMAND = """<routes>
@@ -27,9 +27,8 @@ DEMAND = """<routes>
 
 def snapshots(folder: Path, steps: int, demand: str = DEMAND) -> list[TrafficSnapshot]:
     setup = replace(setup_of(folder, demand, step=0.5), net=NET)
-    with contextlib.closing(libsumo_traffic(setup)) as traffic:
-        seen = []
-        traffic.start(0)
+    seen = []
+    with running(setup, seed=0) as traffic:
         for _ in range(steps):
             traffic.advance(Command())
             snapshot = traffic.observe()
@@ -60,6 +59,9 @@ def test_lights_and_walkers_near_the_ego_are_told(tmp_path: Path) -> None:
     colours = dict(zip(signals.lane, signals.colour, strict=True))
     ahead = seen[0].signal_ahead
     assert ahead is not None
+    assert ahead.signal_id == "C"
+    way = seen[1].route_position - seen[0].route_position
+    assert ahead.distance - seen[1].signal_ahead.distance == pytest.approx(way)
     assert colours["WC_1"] is colours["EC_1"] is ahead.colour
     assert colours["SC_1"] is colours["NC_1"] is not ahead.colour
     # Persons cross the road that has red.
@@ -112,43 +114,20 @@ def test_crossings_with_lights_have_heads_for_persons_beyond_either_end() -> Non
             assert off @ (ahead[1], -ahead[0]) > 0.5 * lanes[there.lane_id].width
 
 
-class FakeWay:
-    """A way across a junction, as sumolib has it."""
-
-    def __init__(self, link: int) -> None:
-        self._link = link
-
-    def getTLSID(self) -> str:  # noqa: N802 - sumolib's name
-        return "J"
-
-    def getTLLinkIndex(self) -> int:  # noqa: N802 - sumolib's name
-        return self._link
-
-
-class FakeLane:
-    """A lane that leads east, as sumolib has it."""
-
-    def __init__(self, name: str, y: float, links: tuple[int, ...]) -> None:
-        self._name, self._y, self._links = name, y, links
-
-    def getID(self) -> str:  # noqa: N802 - sumolib's name
-        return self._name
-
-    def getShape3D(self) -> list[tuple[float, float, float]]:  # noqa: N802 - sumolib's name
-        return [(0.0, self._y, 1.0), (100.0, self._y, 1.0)]
-
-    def getWidth(self) -> float:  # noqa: N802 - sumolib's name
-        return 3.2
-
-    def getSpeed(self) -> float:  # noqa: N802 - sumolib's name
-        return 13.9
-
-    def getOutgoing(self) -> list[FakeWay]:  # noqa: N802 - sumolib's name
-        return [FakeWay(link) for link in self._links]
+def lane_east(name: str, y: float, links: tuple[int, ...]) -> Any:
+    """A lane that leads east, as sumolib has it, with its ways across a junction."""
+    ways = [SimpleNamespace(getTLSID=lambda: "J", getTLLinkIndex=lambda link=link: link) for link in links]
+    return SimpleNamespace(
+        getID=lambda: name,
+        getShape3D=lambda: [(0.0, y, 1.0), (100.0, y, 1.0)],
+        getWidth=lambda: 3.2,
+        getSpeed=lambda: 13.9,
+        getOutgoing=lambda: ways,
+    )
 
 
 def test_on_wider_roads_further_lanes_have_theirs_above_them() -> None:
-    lanes = [FakeLane(f"a_{n}", 3.2 * n, links) for n, links in enumerate([(0, 1), (2,), (4, 3)])]
+    lanes = [lane_east(f"a_{n}", 3.2 * n, links) for n, links in enumerate([(0, 1), (2,), (4, 3)])]
     first, second, third = signal_heads(lanes, side=-1.0)
     assert first.post == second.post == third.post == pytest.approx((100.0, -2.2, 1.0))
     assert first.position == pytest.approx((100.0, -2.2, 1.0 + POST_HEIGHT))
@@ -156,6 +135,6 @@ def test_on_wider_roads_further_lanes_have_theirs_above_them() -> None:
     assert third.position == pytest.approx((100.0, 6.4, 1.0 + ARM_HEIGHT))
     assert third.links == (3, 4)
     assert second.diameter == LARGE_DIAMETER
-    mirrored = [FakeLane(f"a_{n}", -3.2 * n, (n,)) for n in range(2)]
+    mirrored = [lane_east(f"a_{n}", -3.2 * n, (n,)) for n in range(2)]
     assert next(signal_heads(mirrored, side=1.0)).post == pytest.approx((100.0, 2.2, 1.0))
-    assert not list(signal_heads([FakeLane("a_0", 0.0, ())], side=-1.0))
+    assert not list(signal_heads([lane_east("a_0", 0.0, ())], side=-1.0))

@@ -1,12 +1,10 @@
 """Route files: the road is full at first, and free around the actors."""
 
 import itertools
-import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-import sumo
 
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
@@ -19,6 +17,7 @@ from fogsim.traffic.templates import (
     routes_text,
     usual_mix,
 )
+from tests.traffic.templates.common import play
 
 RATE = 0.3  # [1/s]
 PLACED = place_actors((Actor("ego", place=500.0, speed=25.0), Actor("slow", place=Relation("ego", 600.0), speed=20.0)))
@@ -34,12 +33,8 @@ def written(name: str, flows: tuple[tuple[str, float], ...], turning: float = 0.
 
 def departures(name: str, folder: Path, seed: int) -> list[tuple[str, str, float]]:
     """Vehicles at the run's beginning: id, lane and position [m]."""
-    net, routes = written(name, (("same_way", RATE), ("oncoming", RATE)))
-    (folder / "net.xml").write_text(net, encoding="utf-8")
-    (folder / "rou.xml").write_text(routes, encoding="utf-8")
-    out = ["--fcd-output", "fcd.xml", "--end", "0.1", "--step-length", "0.1", "--no-step-log", "true"]
-    arguments = ["-n", "net.xml", "-r", "rou.xml", "--seed", str(seed), *out]
-    subprocess.run([Path(sumo.SUMO_HOME, "bin", "sumo"), *arguments], cwd=folder, check=True, capture_output=True)
+    files = written(name, (("same_way", RATE), ("oncoming", RATE)))
+    play(folder, *files, "--seed", str(seed), "--fcd-output", "fcd.xml", "--end", "0.1", "--step-length", "0.1")
     (first, *_) = ET.parse(folder / "fcd.xml").getroot().iter("timestep")  # noqa: S314 - our own file
     return [(v.get("id", ""), v.get("lane", ""), float(v.get("pos", ""))) for v in first]
 

@@ -41,7 +41,7 @@ def converted(plan: NetPlan, folder: Path) -> ET.Element:
     edges = [
         f'<edge id="{edge.name}" from="{edge.start}" to="{edge.end}" numLanes="{edge.lanes}" width="{edge.lane_width}"'
         f' speed="{edge.limit}" priority="{edge.priority}" spreadType="right" shape="{shape(edge.axis.points)}"'
-        f"{sidewalk(edge.footway)}/>"
+        f' sidewalkWidth="{edge.footway or -1}"/>'
         for edge in plan.edges
     ]
     on_foot = int(any(edge.footway for edge in plan.edges))
@@ -64,10 +64,6 @@ def converted(plan: NetPlan, folder: Path) -> ET.Element:
     return ET.parse(out).getroot()  # noqa: S314 - our own file
 
 
-def sidewalk(width: float) -> str:
-    return f' sidewalkWidth="{width}"' if width else ""
-
-
 def shape(points: Points) -> str:
     return " ".join(f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in points.tolist())
 
@@ -86,8 +82,10 @@ def right_of_way(net: ET.Element) -> dict[Link, tuple[frozenset[Link], frozenset
         requests = list(junction.iter("request"))
         if not requests:
             continue
-        at = [one for lane in (junction.get("incLanes") or "").split() for one in in_order(by_lane.get(lane, []))]
-        links = [tuple(names.get(part, part) for part in link_of(one)) for one in at]
+        lanes = (by_lane.get(lane, []) for lane in (junction.get("incLanes") or "").split())
+        at = [one for lane in lanes for one in sorted(lane, key=lambda one: TURNS[one.get("dir") or ""])]
+        parts = ([one.get(key) or "" for key in ("from", "to", "fromLane", "toLane")] for one in at)
+        links = [tuple(names.get(part, part) for part in link) for link in parts]
         assert len(links) == len(requests)
         for link, one, request in zip(links, at, requests, strict=True):
             met, first = (
@@ -112,19 +110,6 @@ def names_on_foot(net: ET.Element) -> dict[str, str]:
     return names
 
 
-def in_order(connections: list[ET.Element]) -> list[ET.Element]:
-    return sorted(connections, key=lambda one: TURNS[one.get("dir") or ""])
-
-
-def link_of(one: ET.Element) -> Link:
-    return tuple(one.get(key) or "" for key in ("from", "to", "fromLane", "toLane"))  # type: ignore[return-value]
-
-
-def lanes_of(net: ET.Element) -> dict[str, Points]:
-    edges = [edge for edge in net.iter("edge") if edge.get("function") is None]
-    return {lane.get("id") or "": points_of(lane) for edge in edges for lane in edge.iter("lane")}
-
-
 def points_of(lane: ET.Element) -> Points:
     points = [[float(number) for number in point.split(",")] for point in (lane.get("shape") or "").split()]
     return np.array([[*point, 0.0][:3] for point in points])
@@ -145,6 +130,9 @@ def test_right_of_way_and_lanes_are_netconverts(tmp_path: Path) -> None:
         ours = ET.fromstring(net_text(plan))  # noqa: S314 - our own text
         theirs = converted(plan, tmp_path)
         assert right_of_way(ours) == right_of_way(theirs)
-        lanes, others = lanes_of(ours), lanes_of(theirs)
+        edges = ([edge for edge in net.iter("edge") if edge.get("function") is None] for net in (ours, theirs))
+        lanes, others = (
+            {lane.get("id"): points_of(lane) for edge in net for lane in edge.iter("lane")} for net in edges
+        )
         assert lanes.keys() == others.keys()
         assert max(off(others[lane], line) for lane, line in lanes.items()) < 0.06

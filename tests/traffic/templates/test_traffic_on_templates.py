@@ -1,10 +1,7 @@
 """Traffic on every template: SUMO says nothing against the files, and nobody collides in clear air."""
 
-import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
-
-import sumo
 
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
@@ -19,6 +16,7 @@ from fogsim.traffic.templates import (
     routes_text,
     usual_mix,
 )
+from tests.traffic.templates.common import play
 
 FLOWS = tuple((way, 0.1) for way in ("same_way", "oncoming", "ramp", "north", "south"))
 
@@ -38,28 +36,20 @@ def test_sumo_plays_it_without_a_warning(tmp_path: Path) -> None:
         share = 0.3 if on_foot else 1.0
         flows = tuple((way, share * rate) for way, rate in FLOWS if layout.way(way))
         demand = Demand(flows, usual_mix(name))
-        (tmp_path / "net.xml").write_text(net_text(layout.net), encoding="utf-8")
         walkers = [Walker("child", position=200.0, crosses_at=292.0)] if name == "crossing" else [Walker("child")]
         on_feet = (walkers, Footfall(0.01, 0.01, 60.0)) if on_foot else ((), Footfall())
-        (tmp_path / "rou.xml").write_text(routes_text(layout, demand, placed, *on_feet), encoding="utf-8")
-        arguments = ["-n", "net.xml", "-r", "rou.xml", "--end", "60", "--step-length", "0.2", "--no-step-log", "true"]
+        files = net_text(layout.net), routes_text(layout, demand, placed, *on_feet)
         strict = ["--collision.action", "warn", "--collision.check-junctions", "true", "--time-to-teleport", "30"]
-        program = Path(sumo.SUMO_HOME, "bin", "sumo")
-        done = subprocess.run([program, *arguments, *strict], cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
+        assert play(tmp_path, *files, "--end", "60", "--step-length", "0.2", *strict) == ""
 
 
 def test_persons_are_there_from_the_beginning_and_come_by_the_seed(tmp_path: Path) -> None:
     layout = ROAD_TEMPLATES["crossing"](footways=True, lights=True).layout()  # type: ignore[call-arg]
-    (tmp_path / "net.xml").write_text(net_text(layout.net), encoding="utf-8")
     text = routes_text(layout, Demand((), usual_mix("crossing")), (), (), Footfall(0.05, 0.05, 60.0))
-    (tmp_path / "rou.xml").write_text(text, encoding="utf-8")
-    program, told = Path(sumo.SUMO_HOME, "bin", "sumo"), list[list[tuple[str, str, str]]]()
-    for number, seed in enumerate((1, 1, 2)):
-        out = tmp_path / f"fcd{number}.xml"
-        arguments = ["-n", "net.xml", "-r", "rou.xml", "--end", "60", "--fcd-output", out.name, "--seed", str(seed)]
-        subprocess.run([program, *arguments], cwd=tmp_path, check=True, capture_output=True)
-        persons = ET.parse(out).getroot().iter("person")  # noqa: S314 - our own file
+    told = list[list[tuple[str, str, str]]]()
+    for seed in "112":
+        play(tmp_path, net_text(layout.net), text, "--end", "60", "--fcd-output", "fcd.xml", "--seed", seed)
+        persons = ET.parse(tmp_path / "fcd.xml").getroot().iter("person")  # noqa: S314 - our own file
         told.append([(one.get("id") or "", one.get("x") or "", one.get("edge") or "") for one in persons])
     same, again, other = told
     assert same == again != other

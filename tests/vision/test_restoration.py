@@ -92,21 +92,17 @@ def test_noise_rises_by_no_more_than_the_bound() -> None:
                 assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
 
 
-@pytest.mark.parametrize("image", [image_of(np.full((120, 160, 3), 0.4)), image_of(np.full((120, 160), 0.4))])
-def test_without_fog_the_image_comes_back(image: NDArray[np.uint8]) -> None:
-    done = restore_contrast(image, CAMERA, extinction_from_visibility(math.inf))
-    assert np.array_equal(done.image, image)
-    assert done.image is not image
-    assert (done.transmission == 1.0).all()
-
-
-def test_fog_that_is_hardly_there_changes_hardly_anything() -> None:
+def test_without_fog_the_image_comes_back_and_fog_that_is_hardly_there_changes_hardly_anything() -> None:
+    for image in (image_of(np.full((120, 160, 3), 0.4)), image_of(np.full((120, 160), 0.4))):
+        done = restore_contrast(image, CAMERA, extinction_from_visibility(math.inf))
+        assert np.array_equal(done.image, image)
+        assert done.image is not image
+        assert (done.transmission == 1.0).all()
     image = image_of(road(np.random.default_rng(3)))
     done = restore_contrast(image, CAMERA, 1e-7, airlight())
     below = road_distance(CAMERA)[0] < 100.0
-    assert (
-        np.abs(done.image[below].astype(int) - image[below]).max() <= 4
-    )  # the soft bound: 2 % of what is not airlight
+    # The soft bound: 2 % of what is not airlight.
+    assert np.abs(done.image[below].astype(int) - image[below]).max() <= 4
 
 
 def test_every_kind_of_image_keeps_its_kind() -> None:
@@ -184,11 +180,7 @@ GREY = np.zeros((120, 160), np.uint8)
 def test_mistakes_say_what_is_allowed() -> None:
     for image, arguments, told in [
         (np.zeros((12, 16), np.uint8), {"extinction": K}, r"16 × 12 pixels, the camera 160 × 120"),
-        (
-            np.zeros((120, 160, 4), np.uint8),
-            {"extinction": K},
-            r"expected a grey or colour image .* got \(120, 160, 4\)",
-        ),
+        (np.zeros((120, 160, 4), np.uint8), {"extinction": K}, r"a grey or colour image .* got \(120, 160, 4\)"),
         (np.zeros((120, 160)), {"extinction": K}, r"uint8 or uint16, got .* float64"),
         (GREY, {}, r"none is given"),
         (GREY, {"extinction": -1.0}, r"extinction must be a finite number .* got -1.0"),
@@ -201,9 +193,6 @@ def test_mistakes_say_what_is_allowed() -> None:
     ]:
         with pytest.raises(InputError, match=told):
             restore_contrast(image, CAMERA, **arguments)
-
-
-def test_images_must_have_the_cameras_bits() -> None:
     with pytest.raises(InputError, match="the image has 8 bits, the camera 12"):
         restore_contrast(GREY, DEEP, K)
     with pytest.raises(InputError, match="of 12 bits are 0 … 4095, got 5000"):

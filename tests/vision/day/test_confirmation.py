@@ -72,14 +72,11 @@ def test_a_day_model_with_other_fog_or_without_any_refuses(looked, own):
     assert reasons == {UNCONFIRMED if own is OWN else NOT_CLEAR, UNCONFIRMED}
 
 
-def test_clear_air_is_not_confirmed_by_fog(looked):
-    assert once(looked, replace(NO_FOG, standard_deviation=0.5), FOG).diagnostics["reason"] == DISAGREE
-
-
 def test_clear_air_needs_contrast_far_away(looked):
     # The day model's road shows it from 1500 m on, and things at the horizon that fog of 1000 m would hide.
     assert once(looked, NO_FOG, CLEAR).visibility_interval == (pytest.approx(1500.0, rel=0.02), math.inf)
     assert once(looked, NO_FOG, SILENT, far=True).visibility_interval == (pytest.approx(1000.0), math.inf)
+    assert once(looked, replace(NO_FOG, standard_deviation=0.5), FOG).diagnostics["reason"] == DISAGREE
 
 
 def test_what_stands_out_refuses_fog(looked):

@@ -1,12 +1,16 @@
-"""The day model's posterior on images that nothing explains."""
+"""The day model's posterior, the vehicles that it leaves out, drawn by hand, and curves that cameras may have."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
+from fogsim.values.camera import Response
 from fogsim.vision.day.day_fit import fit_day
+from fogsim.vision.day.row_data import MOST_SLOPE, STATED, curves_of, free_depth, row_bins
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
 
 
@@ -26,3 +30,66 @@ def test_an_image_that_is_black_but_for_little_sky_is_dark():
     fit = fit_day(image, Camera(128, 96, 110.0, (63.5, 47.5), 1.35), Horizon(47.5, 0.2))
     assert math.isfinite(fit.contrast)
     assert 0.0 < fit.brightest < 0.01
+
+
+CAMERA = Camera(512, 384, 400.0, (255.5, 160.0), 1.3, response=Response.LINEAR)
+HORIZON = Horizon(160.0, 0.7)
+
+
+def picture(visibility: float, depth: float = math.inf, aside: float = 0.0) -> np.ndarray:
+    """A dark vehicle of 1.8 × 1.5 m at a depth, in fog of a visibility."""
+    rows, columns = np.mgrid[: CAMERA.height, : CAMERA.width].astype(float)
+    below = rows - HORIZON.row
+    distance = np.where(below > 0, CAMERA.row_distance / np.maximum(below, 1e-6), math.inf)
+    scene = np.full(distance.shape, 0.3)
+    if depth < math.inf:
+        right = (columns - CAMERA.principal_point[0]) * depth / CAMERA.focal_length - aside
+        height = CAMERA.mount_height - below * depth / CAMERA.focal_length
+        vehicle = (abs(right) < 0.9) & (height > 0.0) & (height < 1.5)
+        scene, distance = np.where(vehicle, 0.05, scene), np.where(vehicle, depth, distance)
+    clear = np.exp(-extinction_from_visibility(visibility) * distance)
+    noise = np.random.default_rng(1).normal(0.0, 0.8, distance.shape)
+    return np.rint(200.0 * (scene * clear + 1.0 - clear) + noise).clip(0, 255).astype(np.uint8)
+
+
+def free(image: np.ndarray) -> float:
+    bins = row_bins(CAMERA, HORIZON.standard_deviation, round(HORIZON.row))
+    return free_depth(image[:, :, None], bins, CAMERA, HORIZON.row)
+
+
+@pytest.mark.parametrize("visibility", [50.0, 100.0, 300.0])
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize("aside", [-0.3, 0.0])
+def test_a_vehicle_stands_where_the_lane_differs_from_both_sides(visibility, share, aside):
+    depth = share * min(visibility, 120.0)
+    assert free(picture(visibility, depth, aside)) == pytest.approx(depth, rel=0.25)
+
+
+def test_of_a_mirrored_image_it_is_the_same_and_an_empty_road_has_none():
+    image = picture(100.0, 40.0, 0.3)
+    assert free(image) == free(np.ascontiguousarray(image[:, ::-1]))
+    assert free(picture(100.0)) == math.inf
+
+
+@pytest.mark.parametrize("visibility", [50.0, 100.0])
+def test_the_fog_before_it_is_read_all_the_same(visibility):
+    fit = fit_day(picture(visibility, 0.6 * visibility), CAMERA, HORIZON)
+    assert fit.quantile(0.05) < visibility < fit.quantile(0.95)
+
+
+@pytest.mark.parametrize("response", list(Response))
+@pytest.mark.parametrize("black_level", [0.0, 0.05])
+def test_the_stated_curve_comes_first_and_all_rise_from_dark_to_full(response, black_level):
+    curves = curves_of(replace(CAMERA, response=response, black_level=black_level))
+    assert curves.chance[0] == STATED
+    assert curves.chance.sum() == pytest.approx(1.0)
+    assert np.all(np.diff(curves.light, axis=1) >= 0.0)
+    assert curves.light[:, -1] == pytest.approx(1.0, abs=0.01)
+    assert np.all((curves.slope >= 1.0 / MOST_SLOPE) & (curves.slope <= MOST_SLOPE))
+
+
+def test_no_curve_is_there_twice():
+    for response in Response:
+        light = curves_of(replace(CAMERA, response=response)).light
+        apart = np.abs(light[:, None] - light[None]).max(axis=2) + np.eye(len(light))
+        assert apart.min() > (0.01 if response is not Response.GAMMA else 0.005)

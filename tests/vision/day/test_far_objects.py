@@ -13,8 +13,6 @@ from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(320, 240, 300.0, (159.5, 100.0), 1.4, bits=12)
 HORIZON = Horizon(100.0, 0.5)
-
-
 MAST = replace(CAMERA, mount_height=6.0)
 
 
@@ -45,11 +43,8 @@ def test_a_wood_in_clear_air_contradicts_fog(claimed):
     assert share_of_far_objects(image, CAMERA, HORIZON, extinction_from_visibility(claimed)) == 1.0
 
 
-def test_crowns_that_overhang_the_ground_below_them_say_nothing_to_a_camera_on_a_mast():
+def test_neither_crowns_that_overhang_the_ground_before_a_mast_nor_a_hedge_close_by_are_far_objects():
     extinction = extinction_from_visibility(400.0)
     image = picture(400.0, 120.0, camera=MAST, open_to=5.0)
     assert share_of_far_objects(image, MAST, HORIZON, extinction) == 0.0
-
-
-def test_a_hedge_close_by_does_not():
     assert share_of_far_objects(picture(math.inf, 4.0), CAMERA, HORIZON, extinction_from_visibility(100.0)) == 0.0

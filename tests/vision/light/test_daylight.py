@@ -85,19 +85,17 @@ def test_an_image_that_shows_little_of_sky_or_road_is_no_trouble(height: int) ->
 
 
 def test_under_a_ceiling_that_is_darker_than_the_road_there_is_no_daylight() -> None:
-    """As in a tunnel: bright walls reach up to the height of the sky, and lamps shine under the ceiling."""
+    """As in a tunnel: bright walls reach up to the height of the sky, and lamps shine under the ceiling.
+
+    The dark rear of a truck right ahead is no ceiling.
+    """
     picture = np.full((240, 320, 3), 190, np.uint8)
     picture[130:] = 110
-    open_air = picture.copy()
+    open_air, truck = picture.copy(), picture.copy()
     picture[:110, 130:190] = 50
     picture[40:44, 150:170] = 255
     assert "lamps" in lit_by_lamps(picture, CAMERA)
     assert "lamps" in lit_by_lamps(picture, CAMERA, LeadMeasurement(60.0, 0.0))
     assert not lit_by_lamps(open_air, CAMERA)
-
-
-def test_the_dark_rear_of_a_truck_right_ahead_is_no_ceiling() -> None:
-    picture = np.full((240, 320, 3), 190, np.uint8)
-    picture[130:] = 110
-    picture[:120, 110:210] = 50
-    assert not lit_by_lamps(picture, CAMERA, LeadMeasurement(6.0, 0.0))
+    truck[:120, 110:210] = 50
+    assert not lit_by_lamps(truck, CAMERA, LeadMeasurement(6.0, 0.0))

@@ -6,21 +6,10 @@ import pytest
 from fogsim.vision.light.medians import median, quantile, row_medians
 
 
-@pytest.mark.parametrize(
-    ("kind", "count"),
-    [
-        (np.float32, 1),
-        (np.float64, 2),
-        (np.float32, 3),
-        (np.float64, 4),
-        (np.float32, 11),
-        (np.float64, 100),
-        (np.float32, 1001),
-    ],
-)
-def test_medians_are_those_of_numpy(count: int, kind: type[np.float32] | type[np.float64]) -> None:
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 100, 1001])
+def test_medians_are_those_of_numpy(count: int) -> None:
     """Of odd and even numbers of values, in one dimension and row by row; what is given is left as it is."""
-    values = np.random.default_rng(count).normal(size=(5, count)).astype(kind)
+    values = np.random.default_rng(count).normal(size=(5, count)).astype(np.float32 if count % 2 else np.float64)
     before = values.copy()
     assert row_medians(values) == pytest.approx(np.median(values, axis=1), rel=1e-6)
     assert median(values) == pytest.approx(float(np.median(values)), rel=1e-6)

@@ -61,11 +61,8 @@ def test_the_farther_lines_are_seen_the_surer_is_the_course():
     assert far[2] < 0.6 * near[2]
 
 
-def test_without_lines_there_is_no_course():
+def test_without_lines_or_where_they_meet_too_far_from_the_supposed_horizon_there_is_no_course():
     assert course_of(pitched(0.0, marks=False), 1) is None
-
-
-def test_lines_that_meet_too_far_from_the_told_horizon_are_no_road():
     assert course_of(pitched(1.0, visibility=200.0), 1) is None
 
 

@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.values import Camera
 from fogsim.vision.lines.edges import edge_map, smoothed
-from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.road_region import (
     Band,
@@ -14,7 +12,6 @@ from fogsim.vision.region.road_region import (
     region_medians,
 )
 
-CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
 EVEN = np.ones((50, 60), np.float32)
 NARROW = np.ones((50, 20), np.float32)
 
@@ -103,10 +100,6 @@ def test_short_gaps_are_stepped_over_and_long_ones_end_the_band():
     region[30:32] = 0
     assert crossing_band(region, NARROW, 9.5, 3, 20, hole=2).top == 0
     assert crossing_band(region, NARROW, 9.5, 3, 20, hole=1).top == 32
-
-
-def test_no_band_without_a_bottom():
-    region = np.ones((50, 20), np.uint8)
     region[40:] = 0
     assert crossing_band(region, NARROW, 9.5, 3, 20) is None
 
@@ -122,20 +115,3 @@ def test_fog_draws_no_edges_but_a_mark_does():
     image[60:, 48:52] += 60
     edges = edge_map(smoothed(image), slope).pixels > 0
     assert edges[70:190, 46:54].any(axis=1).all()
-
-
-def test_horizon_is_that_of_the_calibration():
-    horizon = calibrated_horizon(CAMERA, np.radians(0.1))
-    assert horizon.row == pytest.approx(239.5 - 577 * np.tan(np.radians(2.0)))
-    below = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.1))
-    assert horizon.standard_deviation == pytest.approx(horizon.row - below.horizon_row, rel=0.01)
-
-
-def test_levelling_undoes_a_roll():
-    rolled = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, 0.0, roll=np.radians(4.0))
-    rows, cols = np.mgrid[:480, :640]
-    # Positive roll turns the right side down, so the sky's edge falls to the right.
-    image = np.where(rows - 239.5 < np.tan(rolled.roll) * (cols - 319.5), 200, 50).astype(np.uint8)
-    level = levelled(image, rolled)
-    assert np.all(level[:238, 30:610] == 200)
-    assert np.all(level[242:, 30:610] == 50)

@@ -1,17 +1,27 @@
 """Airlight that darkens toward the road: its table is that of the atmosphere, and strips drawn with it come back."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogsim.atmosphere import Droplets
-from fogsim.atmosphere.fog.layer_airlight import layer_table, path_means, sines, slant_airlight, slant_share
+from fogsim.atmosphere.fog.layer_airlight import slant_airlight, slant_share
 from fogsim.values import FogField
+from fogsim.vision.lines.horizon import calibrated_horizon
 from fogsim.vision.strips.airlight_slopes import (
     DROPLET_CHANCES,
+    LASTS,
+    MOST,
+    MOST_CLOUD,
+    OTHER_ROAD,
+    OVEREXPOSURE,
+    SKY_DEVIATION,
+    DropletMemory,
     darkening_of_bins,
     darkening_priors,
+    joint_prior,
     row_airlight,
     slope_table,
 )
@@ -167,13 +177,83 @@ def test_derivative_by_row_is_that_of_the_table():
     assert close.mean() > 0.95
 
 
-def test_the_tool_makes_the_table_from_that_of_the_atmosphere():
-    table, depth = layer_table(Droplets.MODERATE_RADIATION), 0.04
-    index = int(np.argmin(np.abs(table.thickness - 7.5)))
-    means = path_means(table, table.black[index], float(table.thickness[index]), depth)
-    ours = slope_table()
-    level = float(means[sines().size // 2, -1])
-    at = np.interp(math.log(depth), np.log(ours.depth), np.arange(ours.depth.size))
-    above = np.interp(0.1, ours.angle, ours.above[0][int(at)])
-    upward = float(np.interp(math.sin(0.1), sines(), means[:, -1]))
-    assert (upward - level) / (1.0 - level) == pytest.approx(above, abs=0.02)
+HORIZON = calibrated_horizon(CAMERA, np.radians(0.1))
+SKY = Sky(200.0, 1.5, 3.0, 1.0, 0.0, 0.0, 0.4, 0.05)
+
+
+def clipped(saturated, share=0.5, luminance=254.0):
+    return joint_prior(SKY._replace(luminance=luminance, saturated=saturated, clipped=share), CAMERA, HORIZON)
+
+
+def test_an_open_sky_is_the_airlight_within_its_deviation():
+    prior = joint_prior(SKY, CAMERA, HORIZON)
+    assert prior.airlight == SKY.luminance
+    assert prior.below == pytest.approx(np.hypot(SKY_DEVIATION * 200.0, 1.5))
+    assert prior.above == pytest.approx(np.hypot(SKY_DEVIATION * 200.0, 3.0))
+    assert (prior.shift, prior.shift_deviation) == (0.0, HORIZON.standard_deviation)
+    assert (prior.vignetting, prior.vignetting_deviation) == (0.4, 0.05)
+    assert joint_prior(SKY, CAMERA, replace(HORIZON, row=HORIZON.row + 1.7)).shift == pytest.approx(1.7)
+
+
+def test_airlight_is_as_uneven_as_a_sky_that_trees_and_rounding_do_not_explain():
+    cloud = [joint_prior(SKY._replace(unevenness=uneven), CAMERA, HORIZON).cloud for uneven in (0.0, 0.015, 0.025, 0.5)]
+    assert cloud[:2] == [0.0, 0.0]
+    assert 0.0 < cloud[2] < cloud[3] == MOST_CLOUD
+
+
+def test_of_a_clipped_sky_half_of_whose_pixels_are_saturated_the_mean_is_half_a_level_below_the_end():
+    assert clipped(0.5).airlight == pytest.approx(254.5)
+    brightness = [clipped(share).airlight for share in (0.1, 0.3, 0.5, 0.9, 0.97)]
+    assert brightness == sorted(brightness)
+
+
+def test_a_wholly_saturated_sky_may_be_much_brighter_and_hardly_darker():
+    prior = clipped(1.0)
+    assert prior.airlight >= 255.0
+    assert prior.above == pytest.approx(OVEREXPOSURE * 255.0)
+    assert prior.below < 3.0
+    # Where but one colour is clipped, the others still show how bright it is.
+    assert clipped(0.0).above < 0.5 * prior.above
+
+
+LARGE = (-2.0, -1.0, 0.0)
+"""What a picture says of droplets that are large."""
+
+
+def learnt(*pictures, speed=20.0, period=1.0):
+    """Chances after pictures."""
+    memory = DropletMemory()
+    for number, picture in enumerate(pictures):
+        memory.learn(picture, number * period, speed)
+    return memory.chances
+
+
+def test_before_and_after_pictures_that_say_nothing_chances_are_those_beforehand():
+    assert DropletMemory().chances == pytest.approx(DROPLET_CHANCES)
+    assert learnt((), (), ()) == pytest.approx(DROPLET_CHANCES)
+    assert learnt(*[(0.0, 0.0, 0.0)] * 5) == pytest.approx(DROPLET_CHANCES)
+
+
+def test_a_picture_counts_by_the_road_in_it_that_is_new():
+    standing = learnt(*[LARGE] * 50, speed=0.0)
+    assert standing == pytest.approx(DROPLET_CHANCES)
+    far = learnt(LARGE, LARGE, speed=2.0 * OTHER_ROAD)
+    expected = np.array(DROPLET_CHANCES) * np.exp(LARGE)
+    assert far == pytest.approx(expected / expected.sum(), rel=0.2)
+    # As often as one likes: the way decides.
+    often, seldom = learnt(*[LARGE] * 101, period=0.05), learnt(*[LARGE] * 6, period=1.0)
+    assert often == pytest.approx(seldom, abs=0.02)
+
+
+def test_over_a_way_pictures_overrule_what_is_usual_and_one_alone_cannot():
+    assert learnt(*[LARGE] * 12)[2] > 0.9
+    alone = learnt(LARGE, (0.0, -50.0, -90.0), speed=2.0 * OTHER_ROAD)
+    assert alone[1] / alone[0] >= DROPLET_CHANCES[1] / DROPLET_CHANCES[0] * np.exp(-MOST) * 0.9
+
+
+def test_what_was_learnt_is_forgotten_over_the_way():
+    memory = DropletMemory()
+    for number in range(20):
+        memory.learn(LARGE, float(number), 20.0)
+    memory.learn((0.0, 0.0, 0.0), 20.0 + 10.0 * LASTS / 20.0, 20.0)
+    assert memory.chances == pytest.approx(DROPLET_CHANCES, abs=0.01)

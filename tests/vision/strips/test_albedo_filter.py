@@ -106,17 +106,6 @@ def test_constants_are_the_posterior_mean_of_the_strips_albedo():
         assert out.constants[strip, 0] == pytest.approx(cross @ np.linalg.solve(covariance, values), abs=1e-4)
 
 
-def test_without_scale_the_residuals_are_divided_by_their_noise():
-    residuals = drawn()
-    residuals.scale[:], residuals.veil[:] = 0.0, 0.0
-    out = room(residuals)
-    matt = ALBEDO._replace(sheen=0.0, sheen_deviation=0.0)
-    changes = albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, matt)
-    logarithm = whiten(residuals, changes, matt, AIRLIGHT, False, out)
-    assert out.innovations == pytest.approx(residuals.columns / np.sqrt(residuals.noise)[:, :, None])
-    assert logarithm == pytest.approx(np.log(residuals.noise).sum())
-
-
 def test_of_an_outlier_nothing_is_learnt_and_it_costs_what_is_said():
     residuals = drawn()
     residuals.columns[0, 10, 0] = 80.0

@@ -11,10 +11,6 @@ from fogsim.vision.strips.joint_start_kernels import fit_constant_albedo
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves, fit_lanes
 
 
-def bins(seen):
-    return strip_bins(seen, GEOMETRY, PRIOR)
-
-
 @pytest.mark.parametrize("visibility", [20.0, 60.0, 200.0, 600.0])
 def test_extinction_and_airlight_come_back_within_the_stated_deviation(visibility):
     k = 3.0 / visibility
@@ -53,14 +49,8 @@ def test_less_noise_and_more_strips_are_surer():
 
 def test_too_few_bins_give_no_answer():
     seen = curves(0.03)
-    assert (
-        fit_jointly(
-            seen._replace(variance=np.where(np.arange(seen.variance.shape[1]) < 7, 1.0, 0.0) * np.ones((3, 1))),
-            GEOMETRY,
-            (PRIOR,),
-        )
-        is None
-    )
+    few = np.where(np.arange(seen.variance.shape[1]) < 7, 1.0, 0.0) * np.ones((3, 1))
+    assert fit_jointly(seen._replace(variance=few), GEOMETRY, (PRIOR,)) is None
     assert fit_own(seen._replace(variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
 
 
@@ -88,11 +78,9 @@ def test_neighbours_that_agree_are_taken_and_others_left_out():
         assert kept.extinction == pytest.approx(0.03, rel=0.04)
         assert len(kept.used) < 3 or kept.used[1].mean() < 0.7
     # Agreement is a matter of the deviations that are stated: the sharper the answers, the less may they differ.
-    assert not agree(
-        own, replace(own, extinction=1.2 * own.extinction, extinction_deviation=0.5 * own.extinction_deviation)
-    )
-    unsure = replace(own, extinction_deviation=0.2 * own.extinction)
-    assert agree(unsure, replace(own, extinction=1.2 * own.extinction))
+    other = replace(own, extinction=1.2 * own.extinction)
+    assert not agree(own, replace(other, extinction_deviation=0.5 * own.extinction_deviation))
+    assert agree(replace(own, extinction_deviation=0.2 * own.extinction), other)
 
 
 def test_a_neighbour_of_patchy_albedo_does_not_make_an_answer_less_sure():
@@ -132,7 +120,6 @@ def test_transmittance_has_its_limits():
 def test_the_search_starts_near_the_truth(visibility):
     k = 3.0 / visibility
     grid = k * np.geomspace(0.25, 4.0, 29)
-    seen = bins(curves(k, 6))
-    found, airlight = fit_constant_albedo(seen, grid, PRIOR)
+    found, airlight = fit_constant_albedo(strip_bins(curves(k, 6), GEOMETRY, PRIOR), grid, PRIOR)
     assert abs(np.log(found / k)) < 0.3
     assert airlight == pytest.approx(AIRLIGHT, rel=0.02)

@@ -51,16 +51,13 @@ def test_the_lens_shows_in_the_corners_of_an_even_sky(vignetting):
     assert sky.luminance == pytest.approx(190.0, abs=3.0)
 
 
-def test_a_wood_along_the_horizon_leaves_the_sky_above_it_and_a_wall_none():
+def test_a_wood_leaves_the_sky_above_it_and_between_its_trees_and_a_wall_none():
     tall = np.where(CAMERA.horizon_row - 0.06 * 288.0 < ROWS, 40.0, 180.0)
     sky = sky_above(photographed(tall), CAMERA, 3.0)
     assert sky.luminance == pytest.approx(180.0, abs=4.0)
     assert sky.deviation > sky_above(photographed(np.full(ROWS.shape, 180.0)), CAMERA, 3.0).deviation
     assert sky_above(photographed(np.where(CAMERA.horizon_row - 0.18 * 288.0 < ROWS, 40.0, 180.0)), CAMERA, 3.0) is None
     assert sky_above(photographed(np.full(ROWS.shape, 180.0)), replace(CAMERA, pitch=0.45), 3.0) is None
-
-
-def test_trees_before_most_of_the_sky_leave_its_bright_part():
     trees = np.where(np.isin(COLS // 8 % 4, (0, 1, 2)), 30.0, 180.0)
     assert sky_above(photographed(trees), CAMERA, 3.0).luminance == pytest.approx(180.0, abs=3.0)
 
@@ -72,9 +69,7 @@ def test_saturated_and_clipped_pixels_are_counted():
     paired = linear_pixels(image, CAMERA)
     assert saturation(paired, np.arange(120), 40) == (0.25, 0.5)
     assert pixel_noise(paired, np.arange(120)) == 0.0
-
-
-def test_noise_that_comes_after_clipping_leaves_each_channel_saturated_in_most_pixels():
+    # Noise that comes after clipping leaves each channel saturated in most pixels.
     noise = np.random.default_rng(3).normal(0.0, 1.5, (240, 320, 3))
     noisy = np.clip(np.rint(255.0 + noise), 0, 255).astype(np.uint8)
     least, some = saturation(linear_pixels(noisy, CAMERA), np.arange(120), 40)

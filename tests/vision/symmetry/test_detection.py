@@ -4,7 +4,17 @@ import cv2
 import numpy as np
 import pytest
 
-from fogsim.vision.symmetry.detection import OUTLINES, SearchRegion, SignDetection, detect_signs, polygon_outline
+from fogsim.vision.symmetry.detection import (
+    OUTLINES,
+    Floats,
+    SearchRegion,
+    SignDetection,
+    detect_signs,
+    fitted,
+    polygon_outline,
+    support,
+)
+from fogsim.vision.symmetry.edge_kernels import NX, NY, X, Y
 
 FINE = 8
 CORNERS = {
@@ -38,14 +48,7 @@ def nearest(found: tuple[SignDetection, ...], u: float, v: float) -> SignDetecti
 
 @pytest.mark.parametrize(
     ("radius", "contrast", "shape"),
-    [
-        (5.0, 40.0, "disc"),
-        (8.0, 8.0, "octagon"),
-        (25.0, 40.0, "square"),
-        (8.0, 8.0, "diamond"),
-        (5.0, 40.0, "square"),
-        (25.0, 40.0, "disc"),
-    ],
+    [(5.0, 40.0, "disc"), (8.0, 8.0, "octagon"), (8.0, 8.0, "diamond"), (5.0, 40.0, "square"), (25.0, 40.0, "square")],
 )
 def test_middle_and_size_are_found_between_pixels(shape: str, radius: float, contrast: float) -> None:
     (found, *others) = detect_signs(picture(shape, 82.3, 57.6, radius, contrast), [SearchRegion(86, 54, 9, 9, radius)])
@@ -88,7 +91,7 @@ def test_noise_and_texture_are_no_signs(seed: int) -> None:
         assert detect_signs(even, [SearchRegion(80, 60, 30, 30, radius) for radius in (4.0, 8.0, 16.0)]) == ()
 
 
-def test_pixels_of_any_kind_are_read_alike() -> None:
+def test_pixels_of_any_kind_are_read_alike_and_a_sign_is_seen_by_its_colour() -> None:
     grey = picture("disc", 82.0, 57.0, 8.0)
     region = SearchRegion(80, 60, 9, 9, 8.0)
     (found,) = detect_signs(grey, [region])
@@ -99,12 +102,9 @@ def test_pixels_of_any_kind_are_read_alike() -> None:
     ):
         (same,) = detect_signs(image, [region])
         assert math.dist((same.u, same.v), (found.u, found.v)) < 0.02
-
-
-def test_a_sign_as_bright_as_what_is_behind_it_is_seen_by_its_colour() -> None:
-    red = picture("disc", 82.0, 57.0, 8.0)
-    image = np.stack((400.0 - red, red, red), axis=2).astype(np.float32) - 80.0
-    (found,) = detect_signs(image, [SearchRegion(80, 60, 9, 9, 8.0)])
+    # As bright as what is behind it.
+    image = np.stack((400.0 - grey, grey, grey), axis=2).astype(np.float32) - 80.0
+    (found,) = detect_signs(image, [region])
     assert math.dist((found.u, found.v), (82.0, 57.0)) < 0.3
 
 
@@ -122,3 +122,38 @@ def test_outlines_are_even_and_their_normals_point_outward() -> None:
     assert ((OUTLINES[:, :, :2] * OUTLINES[:, :, 2:]).sum(axis=2) > 0.2).all()
     square = polygon_outline([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     assert np.allclose(np.abs(square[:, :2]).max(axis=1), 1.0)
+
+
+MIDDLE, RADIUS = 20.0, 6.0
+
+
+def edges_of(outline: Floats, shift: float = 0.0) -> tuple[Floats, np.ndarray]:
+    """Points of edges on an outline, and their numbers in a picture of 40 × 40 px."""
+    points = np.zeros((len(outline), 5), np.float32)
+    points[:, X], points[:, Y] = (MIDDLE + RADIUS * outline[:, :2]).T
+    points[:, X] += shift
+    points[:, NX], points[:, NY] = outline[:, 2], outline[:, 3]
+    number = np.full((40, 40), -1, np.int32)
+    for i, point in enumerate(points):
+        number[round(float(point[Y])), round(float(point[X]))] = i
+    return points, number
+
+
+@pytest.mark.parametrize("outline", OUTLINES)
+def test_an_outline_of_edges_is_borne_out_and_found_beside_its_supposed_place(outline: Floats) -> None:
+    points, number = edges_of(outline, shift=0.4)
+    share, right, _, larger = support(points, number, outline, MIDDLE, MIDDLE, RADIUS, 2)
+    assert share > 0.7
+    assert right == pytest.approx(0.4, abs=0.2)
+    assert abs(larger) < 0.4
+
+
+@pytest.mark.parametrize("triangle", OUTLINES[3:])
+def test_a_level_side_alone_is_no_outline(triangle: Floats) -> None:
+    points, number = edges_of(triangle)
+    level = np.flatnonzero(triangle[:, 2] == 0.0)
+    number[~np.isin(number, level)] = -1
+    assert (number >= 0).sum() >= 6
+    assert support(points, number, triangle, MIDDLE, MIDDLE, RADIUS, 1)[0] == 0.0
+    candidate, radii = np.full(2, MIDDLE, np.float32), np.full(1, RADIUS, np.float32)
+    assert fitted(points, number, triangle[None], candidate, radii).tolist() == [0.0] * 5

@@ -76,6 +76,10 @@ def test_a_bank_ahead_is_found_where_it_begins(start):
     # Where 95 % of the light is lost, and the mean extinction up to there.
     sight = start + (np.log(20.0) - 0.0015 * start) / 0.05
     assert found.fit.extinction == pytest.approx(np.log(20.0) / sight, rel=0.12)
+    # Nor is it a crest that lines do not show.
+    unseen = fitted(drawn(bank(start)), UNSEEN)
+    assert unseen.even < 0.1
+    assert unseen.denser is not None
 
 
 def test_the_optical_depth_is_that_of_the_fog_within_its_deviations():
@@ -116,27 +120,16 @@ def test_where_lines_show_a_level_road_no_sag_explains_what_is_seen():
     assert fitted(seen, LEVEL).even < 0.1
 
 
-@pytest.mark.parametrize("start", [60.0, 90.0, 120.0])
-def test_a_bank_ahead_is_no_crest_that_lines_do_not_show(start):
-    found = fitted(drawn(bank(start)), UNSEEN)
-    assert found.even < 0.1
-    assert found.denser is not None
-
-
-def test_fog_that_thins_ahead_is_no_denser_fog():
+def test_neither_fog_that_thins_ahead_nor_an_obstacle_in_one_lane_is_a_bank():
     thins = lambda path: 0.03 * np.minimum(path, 50.0) + 0.004 * np.maximum(path - 50.0, 0.0)  # noqa: E731 - likewise
     found = fitted(drawn(thins))
     assert found.even < 0.1
     assert found.denser is None
     assert found.fit.extinction < 0.026
-
-
-def test_an_obstacle_in_one_lane_is_no_bank():
     seen = curves(0.002, 3)
     hidden = GEOMETRY.distance > 60.0
     seen.luminance[0, hidden] = 70.0 + 40.0 * (np.arange(hidden.sum()) % 3)
-    found = fitted(seen)
-    assert found.denser is None
+    assert fitted(seen).denser is None
 
 
 def test_optical_depth_over_nodes_is_the_integral_of_straight_pieces():

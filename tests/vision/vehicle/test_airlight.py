@@ -19,42 +19,32 @@ def test_the_light_of_an_even_sky_whatever_it_was_thought_to_be(about):
     assert np.abs(errors).max() < 5e-4
 
 
-def test_trees_however_faint_are_no_sky():
+def test_neither_trees_nor_branches_everywhere_nor_a_high_vehicle_are_sky():
     light = sky()
     light[:, :400] -= 1.0  # in dense fog
     assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
     light[:, :400] -= 60.0 * (np.random.default_rng(1).random((60, 400)) < 0.8)  # in thin fog
     assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
-
-
-def test_branches_with_a_little_sky_between_them_everywhere():
     light = sky()
     light[np.random.default_rng(1).random(light.shape) < 0.8] -= 60.0
     assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
-
-
-def test_a_high_vehicle_before_the_axis_is_no_sky():
     light = sky()
     light[:, 270:330] += 5.0
     assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
-
-
-def test_nothing_of_that_light_leaves_what_it_was_thought_to_be():
+    # Without any of that light it is what it was supposed to be.
     assert neighbouring_airlight(sky(90.0), 180.0, NOISE, 300.0, 30.0) == 180.0
 
 
 @pytest.mark.parametrize(("extinction", "reflectance"), [(0.003, 0.05), (0.03, 0.5), (0.1, 0.05)])
 def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
-    camera = CAMERA
-
     def row(beam):
         def luminance_of(rows, cols):
-            d = camera.row_distance / (np.arange(camera.height)[rows] - camera.horizon_row)
+            d = CAMERA.row_distance / (np.arange(CAMERA.height)[rows] - CAMERA.horizon_row)
             light = reflectance * (1.0 + beam * (6.0 / d) ** 2)
             seen = 200.0 * (1.0 - (1.0 - light) * np.exp(-extinction * d))
             return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
 
-        return road_fall(luminance_of, camera, 40.0, 200.0)
+        return road_fall(luminance_of, CAMERA, 40.0, 200.0)
 
     day, lit = row(0.0), row(0.8)
     assert -day.rise(0.0) == pytest.approx(extinction * np.ptp(day.way), rel=0.03)
@@ -67,25 +57,23 @@ def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
 
 @pytest.mark.parametrize("extinction", [0.01, 0.06])
 def test_before_airlight_that_darkens_downward_a_road_by_day_is_not_lit(extinction):
-    camera = CAMERA
-    share = 1.0 - 0.5 * np.clip(np.arange(camera.height) - camera.horizon_row, 0.0, 200.0) / 200.0
+    share = 1.0 - 0.5 * np.clip(np.arange(CAMERA.height) - CAMERA.horizon_row, 0.0, 200.0) / 200.0
 
     def luminance_of(rows, cols):
-        d = camera.row_distance / (np.arange(camera.height)[rows] - camera.horizon_row)
+        d = CAMERA.row_distance / (np.arange(CAMERA.height)[rows] - CAMERA.horizon_row)
         seen = 200.0 * (share[rows] - (share[rows] - 0.25) * np.exp(-extinction * d)) / share[rows]
         return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
 
-    found = road_fall(luminance_of, camera, 40.0, 200.0, share)
+    found = road_fall(luminance_of, CAMERA, 40.0, 200.0, share)
     assert not found.is_lit(extinction, 0.0)
     assert found.is_lit(3.0 * extinction, 0.0)
-    assert road_fall(luminance_of, camera, 40.0, 200.0).is_lit(extinction, 0.0)
+    assert road_fall(luminance_of, CAMERA, 40.0, 200.0).is_lit(extinction, 0.0)
 
 
 def test_where_little_road_is_seen_nothing_is_lit():
-    camera = CAMERA
     for depth, light in ((10.0, 50.0), (60.0, 200.0), (60.0, 250.0)):
-        even = np.full((camera.height, camera.width), light, np.float32)
-        found = road_fall(lambda *where, even=even: even[where], camera, depth, 200.0)
+        even = np.full((CAMERA.height, CAMERA.width), light, np.float32)
+        found = road_fall(lambda *where, even=even: even[where], CAMERA, depth, 200.0)
         assert not found.way.size
         assert not found.is_lit(1.0, 0.0)
 

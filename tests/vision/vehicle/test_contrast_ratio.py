@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.contrast_ratio import RearPicture, contrast_ratio
+from fogsim.vision.vehicle.contrast_ratio import RearPicture, box_means, contrast_ratio
 from fogsim.vision.vehicle.registration import RoadBehind, register_rear
 
 CELLS = np.random.default_rng(3).uniform(0.4, 0.9, (12, 12))
@@ -31,15 +31,13 @@ def test_the_ratio_of_contrasts_is_found_at_any_size(scale, faded):
     assert fading.kept > 0.9
 
 
-def test_a_reference_that_is_smaller_serves_as_well():
+def test_a_smaller_reference_serves_as_well_and_lit_lamps_are_left_out():
     fading = contrast_ratio(picture(10.0, 0.5), picture(28.0, 1.0, seed=1))
     assert fading.ratio == pytest.approx(2.0, rel=0.03)
-
-
-def test_lamps_that_were_lit_are_left_out():
     fading = contrast_ratio(picture(28.0), picture(16.0, 0.5, seed=1, lamp=True))
     assert fading.ratio == pytest.approx(0.5, rel=0.04)
     assert fading.kept < 1.0
+    assert contrast_ratio(picture(28.0, faded=0.0), picture(14.0)) is None
 
 
 @pytest.mark.parametrize(("right", "up"), [(0.0, 0.0), (0.21, -0.06), (-0.37, 0.1)])
@@ -58,5 +56,28 @@ def test_another_thing_does_not_look_alike():
     assert likeness < 0.8
 
 
-def test_what_has_no_contrast_cannot_be_compared():
-    assert contrast_ratio(picture(28.0, faded=0.0), picture(14.0)) is None
+PICTURE = np.random.default_rng(5).uniform(0.0, 1.0, (30, 40))
+
+
+def test_boxes_are_plain_means_and_share_pixels_by_area():
+    means, noise = box_means(PICTURE, np.array([7.0, 12.0]), np.array([10.0, 21.0, 30.0]), 3.0)
+    assert means[1, 0] == pytest.approx(PICTURE[11:14, 9:12].mean())
+    assert means[0, 2] == pytest.approx(PICTURE[6:9, 29:32].mean())
+    assert noise == pytest.approx(1.0 / 9.0)
+    means, noise = box_means(PICTURE, np.array([7.25]), np.array([10.0]), 1.0)
+    assert means[0, 0] == pytest.approx(0.75 * PICTURE[7, 10] + 0.25 * PICTURE[8, 10])
+    assert noise == pytest.approx(0.75**2 + 0.25**2)
+
+
+def test_a_slope_is_seen_at_the_middle_of_a_box_of_any_width():
+    slope = np.arange(30.0)[:, None] + 2.0 * np.arange(40.0)
+    means, _ = box_means(slope, np.array([11.0]), np.array([17.0]), 4.6)
+    assert means[0, 0] == pytest.approx(11.0 + 2.0 * 17.0)
+
+
+def test_the_border_is_not_shared_with_what_is_beyond():
+    means, _ = box_means(np.full((30, 40), 0.7), np.array([-0.5, 29.4]), np.array([-1.0, 40.0]), 4.0)
+    assert means == pytest.approx(np.full((2, 2), 0.7))
+    outside, noise = box_means(PICTURE, np.array([-9.0, 50.0]), np.array([-9.0, 60.0]), 4.0)
+    assert not outside.any()
+    assert noise == 0.0

@@ -11,10 +11,13 @@ from fogsim.vision.vehicle.patch import (
     Patch,
     Placement,
     box_weights,
+    correlations,
     downsample_to,
+    match_cost,
     pixel_grid,
     rescale_position,
     shrink,
+    vertex,
 )
 
 SKY = 200.0
@@ -36,23 +39,18 @@ def fogged(luminance: np.ndarray, left: float) -> np.ndarray:
     return SKY - left * (SKY - luminance)
 
 
-def fallen(near: np.ndarray, far: np.ndarray, noise: float = 0.5) -> float:
-    there = patch(far)
-    light = mean_luminances(patch(near), there, Placement(there.column, there.row, 1.0), (SKY, SKY), noise)
+def fallen(near: np.ndarray, far: np.ndarray, noise: float = 0.5, exposure: float = 1.0) -> float:
+    there = patch(exposure * far)
+    light = mean_luminances(patch(near), there, Placement(there.column, there.row, 1.0), (SKY, exposure * SKY), noise)
     assert light is not None
     assert light.deviation > 0.0
     return (1.0 - light.far) / (1.0 - light.near)
 
 
 @pytest.mark.parametrize("left", [0.9, 0.3, 0.05])
-def test_contrast_to_the_sky_falls_by_one_factor(left):
+def test_contrast_to_the_sky_falls_by_one_factor_at_any_exposure(left):
     assert fallen(rear(), fogged(rear(), left)) == pytest.approx(left, rel=1e-6)
-
-
-def test_another_exposure_changes_nothing():
-    there = patch(0.5 * fogged(rear(), 0.4))
-    light = mean_luminances(patch(rear()), there, Placement(there.column, there.row, 1.0), (SKY, 0.5 * SKY), 0.5)
-    assert (1.0 - light.far) / (1.0 - light.near) == pytest.approx(0.4)
+    assert fallen(rear(), fogged(rear(), left), exposure=0.5) == pytest.approx(left, rel=1e-6)
 
 
 def test_lit_lamps_and_repainted_parts_do_not_count():
@@ -112,9 +110,6 @@ def test_shrinking_averages_noise_away():
 def test_boxes_share_the_near_pixels_out(scale):
     far = np.arange(3.0, 9.0)
     weights = box_weights(60, 29.4, far, 5.5, scale)
-    assert weights.sum(axis=1) == pytest.approx(1.0)
-    # The middle of what a far pixel covers is where the placement says.
-    assert weights @ np.arange(60.0) == pytest.approx(29.4 + (far - 5.5) / scale, abs=0.5)
     half, middle, near = 0.5 * math.sqrt(max(scale**-2 - 1.0, 0.25)), 29.4 + (far[:, None] - 5.5) / scale, np.arange(60)
     overlap = np.minimum(middle + half, near + 0.5) - np.maximum(middle - half, near - 0.5)
     assert weights == pytest.approx(np.maximum(overlap, 0.0) / (2.0 * half), abs=1e-15)
@@ -129,3 +124,42 @@ def test_an_even_patch_is_even_however_it_is_seen():
     even = patch(np.full((40, 48), 70.0))
     grid = pixel_grid(even, even, Placement(23.5, 19.5, 0.6))
     assert downsample_to(even, grid, Placement(23.5, 19.5, 0.6)) == pytest.approx(70.0)
+
+
+RNG = np.random.default_rng(5)
+IMAGE, TEMPLATE = RNG.normal(100.0, 20.0, (19, 23)), RNG.normal(50.0, 10.0, (6, 7))
+
+
+def test_correlations_are_pearsons_and_nothing_looks_like_an_even_surface():
+    found = correlations(IMAGE, TEMPLATE)
+    assert found.shape == (14, 17)
+    for row, col in ((0, 0), (5, 9), (13, 16)):
+        part = IMAGE[row : row + 6, col : col + 7]
+        assert found[row, col] == pytest.approx(np.corrcoef(part.ravel(), TEMPLATE.ravel())[0, 1], abs=1e-12)
+    assert not correlations(np.full((9, 9), 80.0), TEMPLATE).any()
+    assert not correlations(IMAGE, np.full((6, 7), 3.0)).any()
+
+
+@pytest.mark.parametrize(("gain", "offset", "sign"), [(1.0, 0.0, 1.0), (0.1, 180.0, 1.0), (-0.5, 30.0, -1.0)])
+def test_brightness_and_contrast_do_not_matter_but_their_sign_does(gain, offset, sign):
+    image = np.full((12, 13), offset)
+    image[3:9, 4:11] = gain * TEMPLATE + offset
+    assert correlations(image, TEMPLATE)[3, 4] == pytest.approx(sign, abs=1e-12)
+
+
+def test_of_two_places_that_look_alike_the_expected_one_is_taken():
+    image = np.zeros((8, 30))
+    image[1:7, 2:9] = image[1:7, 20:27] = TEMPLATE
+    near_left, near_right = (np.abs(np.arange(24.0) - at)[None, :] * np.ones((3, 1)) * 1e-3 for at in (2, 20))
+    assert match_cost(image, TEMPLATE, near_left)[2:] == (1, 2)
+    assert match_cost(image, TEMPLATE, near_right)[2:] == (1, 20)
+    prior = np.abs(np.arange(17.0) - 12.0)[None, :] + np.abs(np.arange(14.0) - 3.0)[:, None]
+    assert match_cost(np.full_like(IMAGE, 7.0), TEMPLATE, prior)[2:] == (3, 12)
+
+
+def test_vertex_of_a_parabola_and_none_at_the_border_or_on_a_line():
+    for middle in (2.6, 3.0, 3.45):
+        assert 3 + vertex(2.0 * (np.arange(7.0) - middle) ** 2 - 5.0, 3) == pytest.approx(middle)
+    assert vertex(np.array([0.0, 1.0, 2.0]), 0) == 0.0
+    assert vertex(np.array([2.0, 1.0, 0.0]), 2) == 0.0
+    assert vertex(np.array([0.0, 1.0, 2.0]), 1) == 0.0

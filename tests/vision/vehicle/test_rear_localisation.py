@@ -72,12 +72,9 @@ def test_empty_roads_hold_no_vehicle(visibility):
     assert wrong <= 1
 
 
-def test_what_the_fog_hides_is_not_found():
+def test_what_fog_hides_is_not_found_and_regions_lie_in_the_image():
     image, _, _ = road(90.0, 1.8, 30.0, 1.0, 3)
     assert found(image, 90.0) is None
-
-
-def test_regions_lie_in_the_image_or_there_is_none():
     rows, cols = search_window(CAMERA, 20.0)
     assert 0 <= rows.start < rows.stop <= CAMERA.height
     assert 0 <= cols.start < cols.stop <= CAMERA.width

@@ -30,24 +30,20 @@ def test_places_in_metres_and_in_pixels_are_the_same(depth, aside):
     assert (again.column, again.foot, again.width) == pytest.approx((picture.column, picture.foot, picture.width))
 
 
-def test_contrast_is_to_the_sky():
+def test_contrast_is_to_the_sky_and_noise_has_a_least_value():
     assert crop(30.0, light=50.0, road=50.0).expected(0.0, 1.8).contrast == pytest.approx(0.75)
-
-
-def test_noise_has_a_least_value():
     assert crop(30.0).noise == pytest.approx(SKY.noise)
     assert crop(30.0, least_noise=4.0).noise == 4.0
 
 
-@pytest.mark.parametrize("depth", [0.8, 800.0])
-def test_what_is_too_near_or_too_far_cannot_be_looked_for(depth):
-    with pytest.raises(CannotTellError, match="too small in the image, or outside it"):
-        crop(depth)
-
-
-def test_a_road_brighter_than_the_sky_is_refused():
+def test_what_is_too_near_or_too_far_and_roads_brighter_than_the_sky_are_refused():
+    for depth in (0.8, 800.0):
+        with pytest.raises(CannotTellError, match="too small in the image, or outside it"):
+            crop(depth)
     with pytest.raises(CannotTellError, match="brighter than the sky"):
         crop(30.0, road=230.0)
+    with pytest.raises(CannotTellError, match="no vehicle stands out"):
+        crop(30.0).localise()
 
 
 def test_a_sky_that_is_nowhere_as_bright_as_beside_the_vehicle_is_told(monkeypatch):
@@ -58,11 +54,6 @@ def test_a_sky_that_is_nowhere_as_bright_as_beside_the_vehicle_is_told(monkeypat
     monkeypatch.setattr("fogsim.vision.vehicle.vehicle_crop.neighbouring_airlight", lambda *_: 150.0)
     with pytest.raises(CannotTellError, match="no part of the sky is as bright"):
         daytime_crop(image, CAMERA, 30.0, 0.002)
-
-
-def test_an_even_picture_shows_no_vehicle():
-    with pytest.raises(CannotTellError, match="no vehicle stands out"):
-        crop(30.0).localise()
 
 
 @pytest.mark.parametrize(("light", "expected"), [(180.0, 1.0), (45.0, 0.25 ** (1.2 / 2.2))])

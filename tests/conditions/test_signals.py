@@ -32,7 +32,7 @@ from fogsim.values import (
 )
 from fogsim.values.fault import Outage
 from tests.helpers.vehicles import vehicles
-from tests.recorders.synthetic import estimate, make_step, traffic
+from tests.recorders.synthetic import estimate, make_step
 
 ROUTE = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [500.0, 1000.0, 0.0]])
 CARRIAGEWAYS = {"motorway": ("motorway_1", "motorway_2"), "wide": ("wide_0", "wide_1", "wide_2")}
@@ -282,12 +282,6 @@ def test_signals_of_a_run() -> None:
     assert read("time", step) == 3.0
     assert read("ending", step) is None
     assert read("limit", step) == pytest.approx(130 / 3.6)
-
-
-def test_traffic_is_of_the_synthetic_kind() -> None:
-    """The lane ids and sizes that the tests above go by."""
-    assert traffic(0.0, 1.0).lane[0] == "motorway_1"
-    assert traffic(0.0, 1.0).length[0] == 4.6
 
 
 def test_times_to_who_is_ahead_count_from_other_points() -> None:

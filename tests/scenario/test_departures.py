@@ -37,16 +37,14 @@ def scenario_of(folder: Path, text: str) -> fogsim.Scenario:
 
 def row_of(step: Step, vehicle: str) -> tuple[str, float, float, str]:
     row = step.traffic.row(vehicle)
-    assert row is not None
     state = step.traffic
     return state.types[row], float(state.length[row]), float(state.speed[row]), state.lane[row]
 
 
 def test_they_come_as_they_are_to(tmp_path: Path) -> None:
-    step, first = None, {}
+    first: dict[str, float] = {}
     for step in fogsim.run(scenario_of(tmp_path, ROAD)):
         first.update({v: step.time for v in step.traffic.ids if v not in first})
-    assert step is not None
     assert step.unplayed is None or not step.unplayed
     assert {first[vehicle] for vehicle in ("lorry", "merging", "near")} <= {1.1, 1.2}
     kind, length, speed, lane = row_of(step, "lorry")
@@ -57,14 +55,9 @@ def test_they_come_as_they_are_to(tmp_path: Path) -> None:
 
 
 def test_of_a_network_edges_are_given_and_the_way_between_them_is_found() -> None:
-    settings = [
-        "renderer=none",
-        "estimators=[]",
-        "duration_s=3",
-        EARLY,
-        MOTORWAY.format("edges: [approach, exit], lane: 2"),
-    ]
-    scenario = fogsim.load_scenario("motorway_fog_bank", settings)
+    settings = ["renderer=none", "estimators=[]", "duration_s=3", EARLY]
+    depart = MOTORWAY.format("edges: [approach, exit], lane: 2")
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*settings, depart])
     assert list(entering_vehicles(scenario).values()) == [Enter("new", "car", ("approach", "exit"), 4.6, 2)]
     *_, step = fogsim.run(scenario)
     assert row_of(step, "new")[3] == "approach_2"
@@ -79,11 +72,7 @@ def test_python_says_the_same(tmp_path: Path) -> None:
 
 def test_mistakes_are_told_at_their_place(tmp_path: Path) -> None:
     for old, new, told in [
-        (
-            "type: lorry",
-            "type: lory",
-            "depart.type: unknown vehicle type 'lory'; did you mean 'lorry'",
-        ),
+        ("type: lorry", "type: lory", "depart.type: unknown vehicle type 'lory'; did you mean 'lorry'"),
         ("on: ramp", "on: rampe", "timeline.0.do.merging.depart: the road has no way 'rampe'; did you mean 'ramp'"),
         ("position: 300 m", "position: 30 km", "timeline.0.do.lorry.depart: must begin within 9.2 …"),
         ("lane: left", "lane: 5", "timeline.0.do.lorry.depart: there are lanes 0 to 1, got 5"),

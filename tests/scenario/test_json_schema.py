@@ -113,13 +113,18 @@ def test_files_that_lie_elsewhere_are_named_by_their_place(tmp_path):
     assert (tmp_path / "second" / "first" / "motorway.net.xml").is_file()
 
 
-def test_files_of_a_configuration_are_copied_or_refused(tmp_path):
-    old = tmp_path / "old"
-    old.mkdir()
+@pytest.fixture
+def old(tmp_path):
+    """A scenario of a configuration, in a folder."""
+    (folder := tmp_path / "old").mkdir()
     for file in GRID.glob("grid.*"):
-        shutil.copy(file, old)
+        shutil.copy(file, folder)
     text = "name: old\nduration_s: 5\ntraffic: {config: grid.sumocfg, ego: veh5}\nfog: {visibility_m: 100}\n"
-    (old / "scenario.yaml").write_text(text)
+    (folder / "scenario.yaml").write_text(text)
+    return folder
+
+
+def test_files_of_a_configuration_are_copied_or_refused(tmp_path, old):
     begin_scenario("new", str(old), tmp_path)
     assert load_scenario(tmp_path / "new").traffic.config is not None
     moved = (old / "grid.sumocfg").read_text().replace("grid.net.xml", "../grid.net.xml")
@@ -130,11 +135,7 @@ def test_files_of_a_configuration_are_copied_or_refused(tmp_path):
     assert not (tmp_path / "third").exists()
 
 
-def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path):
-    old = tmp_path / "old"
-    old.mkdir()
-    for file in GRID.glob("grid.*"):
-        shutil.copy(file, old)
+def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path, old):
     more = '<additional-files value="a.add.xml"/><gui-settings-file value="view.xml"/></input>'
     text = (old / "grid.sumocfg").read_text()
     (old / "grid.sumocfg").write_text(text.replace("</input>", more))
@@ -147,8 +148,6 @@ def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path
     )
     (old / "more" / "v.xml").write_text('<vss><step time="0" speed="9"/></vss>')
     (old / "more" / "c.xml").write_text('<calibrator><flow begin="0" end="9" vehsPerHour="9"/></calibrator>')
-    text = "name: old\nduration_s: 5\ntraffic: {config: grid.sumocfg, ego: veh5}\nfog: {visibility_m: 100}\n"
-    (old / "scenario.yaml").write_text(text)
     begin_scenario("new", str(old), tmp_path)
     for name in ("view.xml", "a.add.xml", "more/b.add.xml", "more/v.xml", "more/c.xml"):
         assert (tmp_path / "new" / name).read_text() == (old / name).read_text()
@@ -161,10 +160,7 @@ def test_a_scenario_of_openscenario_is_not_copied_as_yaml(tmp_path):
     file = ROOT / "tests" / "data" / "openscenario" / "slow_lead.xosc"
     with pytest.raises(InputError, match=r"expected a YAML scenario; begin one with the line scenario: FILE\.xosc"):
         begin_scenario("mine", str(file), tmp_path)
-    (tmp_path / "on_top").mkdir()
-    shutil.copy(file, tmp_path / "on_top")
-    shutil.copy(file.with_name("two_lanes.xodr"), tmp_path / "on_top")
-    shutil.copytree(file.with_name("catalogs"), tmp_path / "on_top" / "catalogs")
+    shutil.copytree(file.parent, tmp_path / "on_top")
     (tmp_path / "on_top" / "scenario.yaml").write_text("scenario: slow_lead.xosc\nname: a\nfog: {visibility_m: 100}\n")
     with pytest.warns(LeftOutWarning):
         begin_scenario("mine", str(tmp_path / "on_top"), tmp_path)

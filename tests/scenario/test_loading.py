@@ -1,4 +1,5 @@
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -7,7 +8,6 @@ import pytest
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.scenario import attached_scenario, catalogue, load_scenario, override, resolved
 from fogsim.scenario.document import apply_overrides, parse_override
-from fogsim.scenario.loading import check_configuration
 
 
 @pytest.fixture
@@ -43,20 +43,9 @@ def test_a_traffic_step_that_sumo_cannot_make_is_refused_with_the_nearest() -> N
         ([f"clocks.traffic_step_s={1 / 30!r}"], "0.025 or 0.05 s; got 0.0333"),
         ([f"clocks.{key}_s=0.0125" for key in ("traffic_step", "camera_period")], "0.012 or 0.013 s; got 0.0125"),
     ]:
-        with pytest.raises(
-            InputError, match=r"clocks\.traffic_step_s: SUMO counts time in whole milliseconds"
-        ) as error:
+        told = rf"^--set {settings[0]}.*clocks\.traffic_step_s: SUMO counts time in whole milliseconds.*{nearest}"
+        with pytest.raises(InputError, match=told):
             load_scenario("motorway_fog_bank", settings)
-        assert str(error.value).startswith(f"--set {settings[0]}")
-        assert nearest in str(error.value)
-
-
-def test_a_traffic_step_below_sumo_s_tick_is_refused_with_the_least() -> None:
-    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: .* greater than or equal to 0\.001; got 0\.0004"):
-        load_scenario("motorway_fog_bank", ["clocks.traffic_step_s=0.0004"])
-
-
-def test_whole_milliseconds_are_taken() -> None:
     for step in [0.001, 0.02, 0.1, 0.1 + 1e-12]:
         assert load_scenario("motorway_fog_bank", [f"clocks.traffic_step_s={step!r}"]).clocks.traffic_step_s == step
 
@@ -66,32 +55,26 @@ def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
     assert attached_scenario("ego", [*clocks, "fog.visibility_m=80"]).clocks.traffic_step_s == 1 / 15
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
+def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path) -> None:
+    whole = (folder / "scenario.yaml").read_text(encoding="utf-8")
+    for old, new, message in [
         ("width: 640", "width: many", r"camera\.width: input should be a valid integer.*got 'many'"),
         ("width: 640", "width: 0", r"camera\.width: input should be greater than or equal to 16; got 0"),
         ("duration_s: 200", "duration_s: -1", r"duration_s: input should be greater than or equal to 0\.001; got -1"),
         ("duration_s: 200", "duration_s: yes", r"duration_s: input should be a valid number; got True"),
         ("duration_s: 200", "duration_s: '200'", r"duration_s: input should be a valid number; got '200'"),
-        (
-            "duration_s: 200",
-            "duration_s: 1e308",
-            r"duration_s: .*less than or equal to 1000000; got 1e\+308",
-        ),
+        ("duration_s: 200", "duration_s: 1e308", r"duration_s: .*less than or equal to 1000000; got 1e\+308"),
         ("width: 640", "width: yes", r"camera\.width: input should be a valid integer; got True"),
         ("width: 640", "width: 640.0", r"camera\.width: input should be a valid integer; got 640\.0"),
         ("pitch_deg: 2", "pitch_deg: no", r"camera\.pitch_deg: input should be a valid number; got False"),
+        ("outside_visibility_m: 2000", "outside_visibility_m: 2e6", r"at most 1e\+06 m, or inf; got 2000000"),
         (
             "outside_visibility_m: 2000",
-            "outside_visibility_m: 2e6",
-            r"must be at most 1e\+06 m, or inf; got 2000000",
+            "outside_visibility_m: 80m",
+            r"got '80m'; write the number alone, in m, such as 80$",
         ),
-        (
-            "duration_s: 200",
-            "duration_s: 200\nstreet_lamps: 1",
-            r"street_lamps: .*valid boolean; got 1",
-        ),
+        ("duration_s: 200", "duration_s: 200\nstreet_lamps: 1", r"street_lamps: .*valid boolean; got 1"),
+        ("traffic_step_s: 0.1", "traffic_step_s: 0.0004", r"greater than or equal to 0\.001; got 0\.0004"),
         ("ego: ego", "ego: ''", r"traffic\.ego: .* at least 1 character; got ''"),
         ("duration_s: 200", "duration_s: .nan", r"duration_s: .*got nan"),
         ("response: srgb", "response: log", r"camera\.response: .*'linear', 'gamma' or 'srgb'; got 'log'"),
@@ -101,21 +84,13 @@ def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
         ("[joint_road,", "[joint_rode,", r"estimators\.0: unknown estimator 'joint_rode'; did you mean 'joint_road'\?"),
         ("fusion: field_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: field_filter"),
+        ("reaction_time: 2", "reaction: 2", r"\.yaml:\d+: advice\.parameters\.reaction: .* mean 'reaction_time'\?"),
         (
             "reaction_time: 2.0",
-            "reaction: 2.0",
-            r"\.yaml:\d+: advice\.parameters\.reaction: unknown parameter; did you mean 'reaction_time'\?",
+            "reaction_time: a",
+            r"yaml:\d+: advice\.parameters\.reaction_time: .* 0 … 60 s, got 'a'",
         ),
-        (
-            "reaction_time: 2.0",
-            "reaction_time: fast",
-            r"\.yaml:\d+: advice\.parameters\.reaction_time: must be a number 0 … 60 s, got 'fast'",
-        ),
-        (
-            "camera_period_s: 0.1",
-            "camera_period_s: 0.25",
-            r"clocks: camera_period_s must be a whole multiple .*0\.25 s",
-        ),
+        ("camera_period_s: 0.1", "camera_period_s: 0.25", r"clocks: camera_period_s must be a .* multiple .*0\.25 s"),
         ("- kind: brake", "- vehicule: x", r"traffic\.events\.0\.kind: this key is missing"),
         ("deceleration_mps2: 6", "decelerate: 6", r"events\.0\.decelerate: unknown key; did you mean 'deceleration_"),
         ("at_position_m: 1900", "at_position_m: -5", r"traffic\.events\.0\.at_position_m: .*; got -5"),
@@ -124,23 +99,13 @@ def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
         (
             "illuminance_lx: 10000",
             "illuminance_lx: -5",
-            r"light\.illuminance_lx: input should be greater than or equal to 0; got -5",
+            r"light\.illuminance_lx: .* greater than or equal to 0; got -5",
         ),
         ("net: motorway.net.xml", "other: 3", r"traffic\.net: this key is missing"),
-    ],
-)
-def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path, old: str, new: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        load_scenario(spoil(folder, old, new))
-
-
-def test_a_missing_file_names_what_is_there(folder: Path) -> None:
-    file = spoil(folder, "net: motorway.net.xml", "net: motorvay.net.xml")
-    with pytest.raises(
-        InputError, match=r"scenario\.yaml:\d+: traffic\.net: there is no file 'motorvay\.net\.xml'"
-    ) as e:
-        load_scenario(file)
-    assert "did you mean 'motorway.net.xml'?" in str(e.value)
+    ]:
+        with pytest.raises(InputError, match=message):
+            load_scenario(spoil(folder, old, new))
+        (folder / "scenario.yaml").write_text(whole, encoding="utf-8")
 
 
 def test_every_missing_file_is_told(folder: Path) -> None:
@@ -148,30 +113,17 @@ def test_every_missing_file_is_told(folder: Path) -> None:
     with pytest.raises(InputError) as error:
         load_scenario(spoil(folder, "[signs.add.xml]", "[signs.ad.xml, signs.add.xml]"))
     net, signs = str(error.value).splitlines()
-    assert "traffic.net: there is no file 'motorvay.net.xml'" in net
+    assert re.search(r"scenario\.yaml:\d+: traffic\.net: there is no file 'motorvay\.net\.xml'", net)
+    assert "did you mean 'motorway.net.xml'?" in net
     assert "traffic.additional.0: there is no file 'signs.ad.xml'" in signs
 
 
 def test_unknown_scenarios() -> None:
-    with pytest.raises(
-        UnknownNameError, match=r"unknown scenario 'motorway_fog_bnk'; did you mean 'motorway_fog_bank'"
-    ):
+    with pytest.raises(UnknownNameError, match="unknown scenario 'motorway_fog_bnk'; did you mean 'motorway_fog_bank'"):
         load_scenario("motorway_fog_bnk")
-    with pytest.raises(InputError, match="there is no such scenario file"):
-        load_scenario("nowhere/scenario.yaml")
-    with pytest.raises(InputError, match=r"\./rising_son: there is no such scenario file"):
-        load_scenario("./rising_son")
-
-
-def test_a_number_with_a_unit_under_a_key_with_its_own() -> None:
-    with pytest.raises(InputError, match=r"got '80m'; write the number alone, in m, such as 80$"):
-        load_scenario("motorway_fog_bank", ["fog.visibility_m=80m"])
-
-
-def test_a_folder_is_no_sumo_configuration(tmp_path: Path) -> None:
-    (tmp_path / "town.sumocfg").touch()
-    with pytest.raises(InputError, match=r"is a folder; expected a SUMO configuration; in it: town\.sumocfg"):
-        check_configuration(tmp_path)
+    for name in ("nowhere/scenario.yaml", "./rising_son"):
+        with pytest.raises(InputError, match=f"{name}: there is no such scenario file"):
+            load_scenario(name)
 
 
 def test_homogeneous_fog_takes_the_place_of_banks() -> None:
@@ -186,15 +138,12 @@ def test_homogeneous_fog_takes_the_place_of_banks() -> None:
             assert load_scenario(name, [setting]).fog.visibility_m == 80.0
 
 
-def test_a_field_of_view_takes_the_place_of_a_focal_length() -> None:
-    scenario = load_scenario("motorway_fog_bank", ["camera.focal_length_px=900", "camera.field_of_view_deg=20"])
-    assert scenario.camera.focal_length_px is None
-
-
 def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
+    settings = ["fog.banks.0.visibility_m=40", "sensors.lead.reach_m=120", "camera.width=320"]
     scenario = load_scenario(
-        "motorway_fog_bank", ["fog.banks.0.visibility_m=40", "sensors.lead.reach_m=120", "camera.width=320"]
+        "motorway_fog_bank", [*settings, "camera.focal_length_px=9", "camera.field_of_view_deg=20"]
     )
+    assert scenario.camera.focal_length_px is None  # a field of view takes its place
     assert scenario.fog.banks[0].visibility_m == 40.0
     assert scenario.sensors.lead.reach_m == 120.0
     assert scenario.camera.width == 320

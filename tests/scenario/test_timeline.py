@@ -20,6 +20,8 @@ def mistake(entry: str, *settings: str) -> str:
 
 
 def test_mistakes_are_told_with_their_key() -> None:
+    arrive = "{{lead: {{arrive: {{vehicle: ego, distance_m: 9, its_distance_m: 9, {}}}}}}}"
+    path = "{{lead: {{path: {{points: {}}}}}}}"
     for do, told in [
         ("{lead: {brake: {decelaration: 6 m/s²}}}", "do.lead.brake.decelaration: unknown key; did you mean 'dec"),
         ("{lead: {brakes: {}}}", "do.lead.brakes: unknown key; did you mean 'brake'"),
@@ -28,10 +30,7 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("{lead: {}}", "do.lead: no action given; allowed: speed, brake, follow"),
         ("{lead: {brake: {}, speed: {to: 3 m/s}}}", "do.lead: speed and brake cannot begin together"),
         ("{lead: {change_lane: {}}}", "do.lead.change_lane: say where: lanes"),
-        (
-            "{lead: {speed: {to_kmh: 3, over_s: 1, rate_mps2: 2}}}",
-            "do.lead.speed: give over_s, rate_mps2, profile or shape",
-        ),
+        ("{lead: {speed: {to_kmh: 3, over_s: 1, rate_mps2: 2}}}", "do.lead.speed: give over_s, rate_mps2, profile or"),
         ("{lead: {stop: {}}}", "do.lead.stop: say where: position_m or after_m"),
         ("{lead: {lamps: {stopp: off}}}", "do.lead.lamps.stopp: unknown key; did you mean 'stop'"),
         ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: this key is missing"),
@@ -39,26 +38,14 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("{lead: {speed: {over: 3 s}}}", "do.lead.speed: say which speed: to_kmh, like"),
         ("{lead: {speed: {to_kmh: 3, factor: 0.5}}}", "do.lead.speed: factor and plus_kmh go with like"),
         ("{lead: {speed: {profile: [[1, 30]], shape: sinusoidal}}}", "do.lead.speed: shape goes with to_kmh or like"),
-        (
-            "{lead: {arrive: {vehicle: ego, distance_m: 9, its_distance_m: 9, factor: 1}}}",
-            "do.lead.arrive: factor goes with to_kmh",
-        ),
-        (
-            "{lead: {arrive: {vehicle: ego, distance_m: 9, its_distance_m: 9, to_kmh: 1, steady_m: 1, steady_s: 1}}}",
-            "do.lead.arrive: give steady_m or steady_s, not both",
-        ),
+        (arrive.format("factor: 1"), "do.lead.arrive: factor goes with to_kmh"),
+        (arrive.format("to_kmh: 1, steady_m: 1, steady_s: 1"), "do.lead.arrive: give steady_m or steady_s, not both"),
         ("{lead: {speed: {profile: [[2, 30], [1, 40]]}}}", "do.lead.speed: profile: each time must be later"),
         ("{lead: {follow: {vehicle: ego}}}", "do.lead.follow: say how far behind: headway_s, gap_m or both"),
-        ("{lead: {path: {points: [[1, 2]]}}}", "do.lead.path: give a heading with each of points or with none"),
-        (
-            "{lead: {path: {points: [[1, 2], [3, 4, 5]]}}}",
-            "do.lead.path: give a heading with each of points or with none",
-        ),
-        ("{lead: {path: {points: [[1, 2], [3, 4]], at_s: [1]}}}", "do.lead.path: at_s has a time for each of points"),
-        (
-            "{lead: {path: {points: [[1, 2], [3, 4]], at_s: [1, 1]}}}",
-            "do.lead.path: at_s has a time for each of points",
-        ),
+        (path.format("[[1, 2]]"), "do.lead.path: give a heading with each of points or with none"),
+        (path.format("[[1, 2], [3, 4, 5]]"), "do.lead.path: give a heading with each of points or with none"),
+        (path.format("[[1, 2], [3, 4]], at_s: [1]"), "do.lead.path: at_s has a time for each of points"),
+        (path.format("[[1, 2], [3, 4]], at_s: [1, 1]"), "do.lead.path: at_s has a time for each of points"),
         ("{ego: {take_route: [bank]}}", "do.ego: take_route: positions count along the ego's route"),
         ("{lead: {leave: true, brake: {}}}", "do.lead: leave must be the only key"),
         ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),
@@ -92,17 +79,10 @@ def test_mistakes_of_conditions_and_names() -> None:
 
 
 def test_what_does_not_fit_the_scenario_is_told() -> None:
+    banks = "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}"
     for do, setting, told in [
-        (
-            "fog: {density: 2}",
-            "fog={visibility_m: inf}",
-            "this multiplies the scenario's fog",
-        ),
-        (
-            "fog: {visibility: 30 m}",
-            "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",
-            "outside the banks the air is clear; write density",
-        ),
+        ("fog: {density: 2}", "fog={visibility_m: inf}", "this multiplies the scenario's fog"),
+        ("fog: {visibility: 30 m}", banks, "outside the banks the air is clear; write density"),
         (
             "light: {illuminance: 20 lx, course: factors}",
             "light.illuminance_lx=0",

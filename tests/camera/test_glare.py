@@ -81,9 +81,6 @@ def test_glow_grows_with_the_lamp_and_the_share_without_a_step_and_has_its_colou
     picture[MIDDLE] = (LAMP, 0.2 * LAMP, 0.1 * LAMP)
     red, green, blue = glow(picture)[MIDDLE[0], MIDDLE[1] + 6]
     assert (green / red, blue / red) == pytest.approx((0.2, 0.1), rel=1e-3)
-
-
-def test_no_lamp_no_glare() -> None:
     picture = dark()
     picture[200:300, 100:500] = 0.99 * BRIGHT * SATURATION
     assert LensGlare(camera(), 0.05).scatter(picture, SATURATION) is picture

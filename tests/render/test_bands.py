@@ -28,7 +28,9 @@ def test_pictures_do_not_depend_on_the_bands(place: Any, monkeypatch: pytest.Mon
             assert np.array_equal(getattr(whole, name), getattr(banded, name)), (name, middle)
 
 
-def test_every_row_is_worked_on_once_and_no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_row_is_worked_on_once_and_the_slower_band_gets_fewer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(jit, "processors", lambda: 2)
     bands, before = Bands(), threading.active_count()
     for _ in range(20):
@@ -41,19 +43,6 @@ def test_every_row_is_worked_on_once_and_no_thread_is_left(monkeypatch: pytest.M
         assert set(rows.tolist()) == {1, 2}
     assert threading.active_count() == before
 
-
-def test_small_pictures_and_single_processors_have_one_band(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[tuple[int, int, int]] = []
-    for processors, side in ((2, 100), (1, 1000)):
-        monkeypatch.setattr(jit, "processors", lambda count=processors: count)
-        Bands().work(lambda *band: seen.append(band), side, side)
-    assert seen == [(0, 0, 100), (0, 0, 1000)]
-
-
-def test_the_slower_band_gets_fewer_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "processors", lambda: 2)
-    bands = Bands()
-
     def slow_below(band: int, top: int, bottom: int) -> None:
         if band == 1:
             sum(i * i for i in range(20_000))
@@ -61,6 +50,14 @@ def test_the_slower_band_gets_fewer_rows(monkeypatch: pytest.MonkeyPatch) -> Non
     for _ in range(5):
         bands.work(slow_below, 1000, 1000)
     assert bands.middle > 0.6
+
+
+def test_small_pictures_and_single_processors_have_one_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[int, int, int]] = []
+    for processors, side in ((2, 100), (1, 1000)):
+        monkeypatch.setattr(jit, "processors", lambda count=processors: count)
+        Bands().work(lambda *band: seen.append(band), side, side)
+    assert seen == [(0, 0, 100), (0, 0, 1000)]
 
 
 @pytest.mark.parametrize("failing", [0, 1])

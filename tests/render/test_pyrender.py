@@ -68,14 +68,9 @@ def test_so_they_are_at_other_sizes_and_angles(place: Place, three: dict[str, Re
     agree(*(three[name].render(vehicles, TILTED, place.pose) for name in ("pyrender", "cpu")))
 
 
-def test_each_vehicle_covers_the_same_pixels(views: dict[str, View]) -> None:
-    for number in range(16, 20):
-        one, other = (views[name].instance == number for name in ("pyrender", "cpu"))
-        assert other.sum() > 200
-        assert (one & other).sum() / (one | other).sum() > 0.95
-
-
-def test_radiance_is_that_of_the_others_but_for_grain_and_eight_bits(views: dict[str, View]) -> None:
+def test_radiance_is_that_of_the_others_but_for_grain_and_eight_bits_and_so_are_paint_and_lamps(
+    views: dict[str, View],
+) -> None:
     one, other = views["pyrender"], views["cpu"]
     same = one.instance == other.instance
     ratio = one.radiance[same] / other.radiance[same]
@@ -83,21 +78,19 @@ def test_radiance_is_that_of_the_others_but_for_grain_and_eight_bits(views: dict
     assert np.mean(np.abs(ratio - 1.0) < 0.25) > 0.95
     sky = np.isinf(one.distance) & np.isinf(other.distance)
     np.testing.assert_allclose(one.radiance[sky], other.radiance[sky], rtol=1e-4)
-
-
-def test_dashed_lines_are_where_shading_paints_them(views: dict[str, View]) -> None:
     # Paint is five times as bright as asphalt; edges of a line may differ by a pixel.
     road = (views["pyrender"].instance == 2) & (views["cpu"].instance == 2)
     paint = [road & (views[name].radiance[..., 1] > 0.3 * ILLUMINANCE / math.pi) for name in ("pyrender", "cpu")]
     assert paint[1].sum() > 1000
     assert (paint[0] & paint[1]).sum() / (paint[0] | paint[1]).sum() > 0.9
-
-
-def test_lit_lamps_have_their_radiance(views: dict[str, View]) -> None:
     stop = lamp_radiance(Surface.LAMP_STOP)
     lit = np.all(np.isclose(views["pyrender"].radiance, stop, rtol=1e-4), axis=-1)
     assert lit.any()
     assert (views["pyrender"].instance[lit] >= 16).all()
+    for number in range(16, 20):
+        one, other = (views[name].instance == number for name in ("pyrender", "cpu"))
+        assert other.sum() > 200
+        assert (one & other).sum() / (one | other).sum() > 0.95
 
 
 @pytest.mark.parametrize("distance", [1.0, 10.0, 100.0, 1000.0])
@@ -136,6 +129,12 @@ def test_lamplight_is_refused_and_told_where_it_is_drawn() -> None:
     with pytest.raises(InputError, match="use opengl or cpu"):
         one.render((), SMALL, POSE, lamplight=True)
     one.close()
+    # Without lamps the scene is that of the day.
+    made = to_pyrender(walls(10.0), POSE)
+    assert not made.light_nodes
+    np.testing.assert_allclose(made.ambient_light, 1.0)
+    dark = to_pyrender(walls(10.0), POSE, illuminance=0.0)
+    np.testing.assert_allclose(dark.ambient_light, 0.0)
 
 
 def test_a_scene_of_pyrenders_has_meshes_materials_camera_and_lamps_as_nodes(place: Place) -> None:
@@ -177,14 +176,6 @@ def test_what_old_scenarios_call_pyrender_is_drawn_by_opengl_and_told() -> None:
         old = load_scenario("motorway_fog_bank", ["renderer=pyrender"])
     assert old.renderer == "opengl"
     assert load_scenario("motorway_fog_bank", ["renderer=reference"]).renderer == "reference"
-
-
-def test_without_lamps_and_vehicles_the_scene_is_that_of_the_day() -> None:
-    made = to_pyrender(walls(10.0), POSE)
-    assert not made.light_nodes
-    np.testing.assert_allclose(made.ambient_light, 1.0)
-    dark = to_pyrender(walls(10.0), POSE, illuminance=0.0)
-    np.testing.assert_allclose(dark.ambient_light, 0.0)
 
 
 @pytest.mark.nightly

@@ -41,11 +41,17 @@ def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
         assert max(road_under(ground, 10.0, y, (Surface.MATT,))) == pytest.approx(KERB)
 
 
-def test_what_lies_beside_a_road_reaches_up_to_the_road_that_it_ends_at() -> None:
+def test_what_lies_beside_a_road_and_a_footway_reach_up_to_the_road_that_they_end_at() -> None:
     into = street([[-100.0, 0, 0], [0, 0, 0]])
     other = street([[1.6, 80.0, 0], [1.6, -80, 0]], "b")
     ground = build(RoadNetwork((into, other), into.centreline)).ground
     assert max(road_under(ground, -0.5, -2.5, (Surface.MATT,))) == pytest.approx(KERB)
+    road = street([[-40.0, 0, 0], [40, 0, 0]])
+    none = LaneMarking.NONE
+    way = Lane("w", "w", road.centreline[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
+    ground = build(RoadNetwork((road, way), road.centreline)).ground
+    assert max(road_under(ground, 0.0, 10.0, (Surface.MATT,))) == pytest.approx(KERB)
+    assert max(road_under(ground, 0.0, 0.0, (Surface.MATT,)), default=-1.0) < 0.0
 
 
 def test_a_walking_area_that_vehicles_drive_over_is_no_kerb_in_their_way() -> None:
@@ -101,15 +107,6 @@ def test_nothing_is_put_by_chance_where_a_building_stands() -> None:
 
     assert beside_the_wall(bare) > 3
     assert beside_the_wall(built) == 0
-
-
-def test_a_footway_ends_where_a_road_lies_across_it() -> None:
-    road = street([[-40.0, 0, 0], [40, 0, 0]])
-    none = LaneMarking.NONE
-    way = Lane("w", "w", road.centreline[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
-    ground = build(RoadNetwork((road, way), road.centreline)).ground
-    assert max(road_under(ground, 0.0, 10.0, (Surface.MATT,))) == pytest.approx(KERB)
-    assert max(road_under(ground, 0.0, 0.0, (Surface.MATT,)), default=-1.0) < 0.0
 
 
 def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:

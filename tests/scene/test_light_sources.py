@@ -91,16 +91,13 @@ def test_head_lamps_shine_what_their_beam_has_in_the_direction_of_the_eye() -> N
     assert len(light_sources(one(Lamp.HIGH_BEAM, heading=np.pi), None, EYE, BEAMS).intensity) == 0
 
 
-def test_front_fog_lamps_lie_below_the_head_lamps() -> None:
+def test_front_fog_lamps_lie_below_the_head_lamps_and_daytime_lamps_are_dimmer_off_their_axis() -> None:
     state = one(Lamp.LOW_BEAM | Lamp.FRONT_FOG, heading=np.pi)
     found = light_sources(state, None, EYE, {Lamp.LOW_BEAM: FLAT, Lamp.FRONT_FOG: FLAT})
     assert len(found.intensity) == 4
     heights = np.sort(found.position[:, 2])
     assert heights[1] < heights[2] - 0.15
     assert heights[0] > 0.5 + 0.2
-
-
-def test_daytime_lamps_are_dimmer_off_their_axis() -> None:
     ahead = light_sources(one(Lamp.DAYTIME, heading=np.pi, gap=100.0), None, EYE, BEAMS)
     aside = light_sources(one(Lamp.DAYTIME, heading=np.pi - 0.5, gap=100.0), None, EYE, BEAMS)
     assert ahead.intensity == pytest.approx(np.full(2, 600.0), rel=0.03)
@@ -122,9 +119,6 @@ def test_street_lamps_within_400_m_shine_by_their_angle(motorway: RoadNetwork) -
     assert len(above.intensity) == 0
     scene = build_scene(motorway, SignMap(), np.random.default_rng(1), street_lamps=True)
     assert len(light_sources(empty, None, EYE, BEAMS, street_lamp_heads(scene)).intensity) > 5
-
-
-def test_street_lighting_is_what_the_lamps_are_seen_with():
     heads = np.array([[0.0, 0.0, 8.0]])
     lighting = street_lighting(heads, 0.1)
     below = light_sources(one(Lamp.NONE), None, (0.0, 0.0, 0.0), {}, heads)

@@ -123,7 +123,7 @@ def test_a_line_to_give_way_at_is_broken_and_a_crossing_is_striped() -> None:
     assert transverse_markings([dataclasses.replace(way, end=LaneEnd.OPEN)]) == []
 
 
-def test_lanes_reach_over_the_gaps_that_outlines_of_junctions_leave() -> None:
+def test_lanes_and_shoulders_reach_over_the_gaps_that_outlines_of_junctions_leave() -> None:
     line = np.array([[10.0, 0.0, 1.0], [10.0, 30.0, 1.0], [40.0, 30.0, 1.0]])
     lane = Lane("a_0", "a", line, 3.5, 20.0, LaneMarking.DASHED, LaneMarking.SOLID, outermost=True)
     drawn = lane_mesh(lane, Chainage([lane]))
@@ -131,9 +131,6 @@ def test_lanes_reach_over_the_gaps_that_outlines_of_junctions_leave() -> None:
     assert drawn.positions[:, 0].max() == pytest.approx(40.1, abs=1e-5)
     # Its dashes are not stretched.
     assert np.ptp(drawn.road[:, 0]) == pytest.approx(60.2, abs=1e-4)
-
-
-def test_shoulders_reach_over_gaps_as_lanes_do() -> None:
     line, lane = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0]]), (3.5, 30.0, LaneMarking.DASHED, LaneMarking.SOLID)
     lanes = [Lane("a_0", "a", line, *lane, outermost=True)]
     edge = Edge(line, -1, 1.75, 30.0, 2.5, np.full(2, 3.2), LaneMarking.SOLID)

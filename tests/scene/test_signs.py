@@ -83,7 +83,7 @@ def test_from_afar_a_face_keeps_its_mean_colour() -> None:
     assert mean(face.tiny()) == pytest.approx(mean(face.far()), rel=0.03)
 
 
-def test_an_unknown_code_is_a_plate_with_the_code_on_it() -> None:
+def test_codes_of_the_catalogue_have_the_faces_of_their_kinds_and_others_their_code() -> None:
     one, other = (dataclasses.replace(LIMIT, kind=kind) for kind in ("xodr.450-52", "tempo"))
     written = [face_of(sign).symbol for sign in (one, other)]
     expected = [lettering(code, BLACK) for code in ("450-52", "TEMPO")]
@@ -92,9 +92,6 @@ def test_an_unknown_code_is_a_plate_with_the_code_on_it() -> None:
         assert np.ptp(mesh.positions[:, 0]) < 0.92
     outline = np.array(face_of(one).outline)
     assert np.ptp(outline, axis=0) == pytest.approx((1.0, 1.0))
-
-
-def test_codes_of_the_catalogue_have_the_faces_of_their_kinds() -> None:
     for code, kind in (("xodr.206", "stop"), ("205", "yield"), ("267", "no_entry")):
         one, other = (face_of(dataclasses.replace(LIMIT, kind=k)) for k in (code, kind))
         assert one.outline == other.outline

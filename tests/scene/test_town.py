@@ -112,7 +112,7 @@ def test_heads_for_persons_have_two_figures_that_shine_less() -> None:
     assert area / (0.25 * math.pi) == pytest.approx(0.3, abs=0.03)
 
 
-def test_heads_above_the_road_hang_on_an_arm_of_a_post() -> None:
+def test_heads_above_the_road_hang_on_an_arm_of_a_post_and_face_those_who_approach() -> None:
     beside = dataclasses.replace(HEAD, lane_id="a_0", position=(0.0, -6.0, 2.75), diameter=0.2)
     posts, arms = signal_posts([beside, HEAD])
     assert posts.transforms.shape[0] == arms.transforms.shape[0] == 1
@@ -122,9 +122,6 @@ def test_heads_above_the_road_hang_on_an_arm_of_a_post() -> None:
     tip = arms.transforms[0] @ (1.0, 0.0, 0.0, 1.0)
     assert tip[1] > -3.0
     assert tip[0] > 0.2
-
-
-def test_shapes_of_heads_look_back_at_those_who_approach() -> None:
     for name, shape in signal_shapes().items():
         lenses = shape.surface == Surface.LENS_GREEN
         assert lenses.any() == name.startswith(("signal_head", "signal_walk"))
@@ -143,7 +140,7 @@ def test_persons_are_as_high_as_people_and_stand_on_what_they_walk_on() -> None:
         assert ground + 1.5 < high < ground + 1.9
 
 
-def test_persons_stride_by_the_way_they_go_and_stand_when_they_stand() -> None:
+def test_persons_stride_by_the_way_they_go_and_clothes_stay_and_differ() -> None:
     def poses(speed: float) -> list[str]:
         return [
             next(batch.shape for batch in person_batches(walking("anna", speed=speed, x=x)) if "legs" in batch.shape)
@@ -152,9 +149,6 @@ def test_persons_stride_by_the_way_they_go_and_stand_when_they_stand() -> None:
 
     assert len(set(poses(1.4))) == 8
     assert set(poses(0.0)) == {f"person_legs_{STANDING}"}
-
-
-def test_clothes_are_the_same_whenever_asked_and_differ_from_one_to_another() -> None:
     crowd = tuple(f"p.{n}" for n in range(40))
     once, again = person_batches(walking(*crowd, speed=0.0)), person_batches(walking(*crowd, speed=0.0))
     for one, other in zip(once, again, strict=True):

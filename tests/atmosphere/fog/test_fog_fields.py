@@ -170,9 +170,6 @@ def test_access_answers_for_its_time_and_bounds_all_times() -> None:
         k = access.extinction(places, time)
         assert access.minimum_extinction <= k.min()
         assert k.max() <= access.maximum_extinction
-
-
-def test_fog_now_is_the_fog_of_the_time_that_was_set() -> None:
     field = FogField(0.004, AIRLIGHT, (BANK,), patches=PATCHES, wind=(3.0, -2.0))
     now, a, b = FogNow(field), np.array([0.0, 0.0, 1.0]), np.array([90.0, 40.0, 1.0])
     for time in (0.0, 12.5):

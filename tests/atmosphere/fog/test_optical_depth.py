@@ -37,6 +37,15 @@ def test_visibility_inside_and_outside_a_bank() -> None:
     assert extinction(FIELD, inside + np.array([0, 0, 60])) == 0.0
     half = np.array([100.0, 50.0, 1.0])
     assert extinction(FIELD, half) == pytest.approx(0.0015 + 0.045 / 2)
+    # Where clearings cross there is no less than no fog.
+    clearings = (
+        FogBank((0.0, 0.0), (1.0, 0.0), 100.0, 300.0, 50.0, -0.03),
+        FogBank((0.0, 0.0), (0.0, 1.0), 100.0, 300.0, 50.0, -0.03),
+    )
+    field = FogField(0.03, AIRLIGHT, clearings, top=60.0)
+    assert extinction(field, (200.0, 200.0, 1.0)) == 0.0
+    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 1.0)) == 0.0
+    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 2.0)) == 0.0
 
 
 def test_many_lines_at_once_of_which_one_end_may_be_given_once():
@@ -48,14 +57,3 @@ def test_many_lines_at_once_of_which_one_end_may_be_given_once():
     assert optical_depth(field, np.zeros((1, 3)), ends[:1]) == pytest.approx([0.3])
     assert optical_depth(field, ends, np.zeros(3)) == pytest.approx([0.3, 0.6])
     assert optical_depth(field, (0.0, 0.0, 0.0), ends[:1]) == pytest.approx([0.3])
-
-
-def test_where_clearings_cross_there_is_no_less_than_no_fog() -> None:
-    clearings = (
-        FogBank((0.0, 0.0), (1.0, 0.0), 100.0, 300.0, 50.0, -0.03),
-        FogBank((0.0, 0.0), (0.0, 1.0), 100.0, 300.0, 50.0, -0.03),
-    )
-    field = FogField(0.03, AIRLIGHT, clearings, top=60.0)
-    assert extinction(field, (200.0, 200.0, 1.0)) == 0.0
-    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 1.0)) == 0.0
-    assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 2.0)) == 0.0

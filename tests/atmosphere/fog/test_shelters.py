@@ -23,6 +23,11 @@ def test_fog_ends_within_its_reach_behind_the_portals() -> None:
     assert extinction(FIELD, at) / K == pytest.approx(shares, abs=1e-12)
     assert extinction(FIELD, (300.0, 60.0, EYES)) == pytest.approx(K)
     assert extinction(FIELD, (300.0, 34.0, EYES)) == 0.0
+    windy = dataclasses.replace(FIELD, wind=(10.0, 0.0))
+    assert extinction(windy, (300.0, 0.0, EYES), 30.0) == 0.0
+    access = FieldAccess(FIELD)
+    assert (access.minimum_extinction, access.maximum_extinction) == (0.0, K)
+    assert FieldAccess(OPEN).minimum_extinction == K
 
 
 def test_optical_depth_is_that_of_the_way_outside() -> None:
@@ -35,14 +40,6 @@ def test_optical_depth_is_that_of_the_way_outside() -> None:
     assert along == pytest.approx(K * np.array([10.0, 50.0, 55.0, 55.0, 110.0]), rel=1e-9)
     aside = optical_depth(FIELD, (300.0, 0.0, EYES), (300.0, 100.0, EYES))
     assert aside == pytest.approx(K * (100.0 - 45.0), rel=1e-9)
-
-
-def test_wind_moves_no_tunnel_and_bounds_hold() -> None:
-    windy = dataclasses.replace(FIELD, wind=(10.0, 0.0))
-    assert extinction(windy, (300.0, 0.0, EYES), 30.0) == 0.0
-    access = FieldAccess(FIELD)
-    assert (access.minimum_extinction, access.maximum_extinction) == (0.0, K)
-    assert FieldAccess(OPEN).minimum_extinction == K
 
 
 def tunnel_field(*settings: str) -> FogField:

@@ -137,7 +137,12 @@ def test_lamps_of_a_far_vehicle_glow_as_one():
     np.testing.assert_allclose(both, apart, rtol=0.04)
 
 
-def test_lamps_lost_in_the_light_of_others_are_left_out():
+def test_lamps_behind_something_or_the_camera_large_or_dark_are_not_drawn():
+    assert drawn(fog(math.inf), lamps((200.0, 0.0, 1.5)), empty_view(CAMERA, 50.0)).max() == 0.0
+    assert drawn(fog(math.inf), lamps((20.0, 0.0, 1.5), area=0.02)).max() == 0.0
+    assert drawn(fog(100), lamps((-20.0, 0.0, 1.5))).max() == 0.0
+    assert drawn(fog(100), lamps((20.0, 0.0, 1.5), intensity=0.0)).max() == 0.0
+    assert drawn(fog(100), lamps()).max() == 0.0
     bright, faint = (20.0, 2.0, 1.5), (300.0, -40.0, 1.5)
     view = dataclasses.replace(empty_view(CAMERA), radiance=np.full((480, 640, 3), 50.0, np.float32))
     out = view.radiance.copy()
@@ -145,14 +150,6 @@ def test_lamps_lost_in_the_light_of_others_are_left_out():
     assert np.array_equal(out, view.radiance)
     assert drawn(fog(100), lamps(faint, intensity=0.05)).max() > 0.0
     assert drawn(fog(100), lamps(bright)).max() > 0.0
-
-
-def test_lamps_behind_something_or_the_camera_large_or_dark_are_not_drawn():
-    assert drawn(fog(math.inf), lamps((200.0, 0.0, 1.5)), empty_view(CAMERA, 50.0)).max() == 0.0
-    assert drawn(fog(math.inf), lamps((20.0, 0.0, 1.5), area=0.02)).max() == 0.0
-    assert drawn(fog(100), lamps((-20.0, 0.0, 1.5))).max() == 0.0
-    assert drawn(fog(100), lamps((20.0, 0.0, 1.5), intensity=0.0)).max() == 0.0
-    assert drawn(fog(100), lamps()).max() == 0.0
 
 
 def test_lamps_fade_smoothly_as_they_pass_the_camera():

@@ -7,17 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
+from fogsim.atmosphere.lamps import road_glow
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.road_glow import (
-    ROAD_ALBEDO,
-    RoadGlow,
-    choose_pixels,
-    glow_of_beams,
-    piece_length,
-    row_points,
-    spread_over_row,
-)
 from fogsim.lighting.beams import low_beam
 from fogsim.values import Camera, CameraPose, FogBank, FogField, HeadLamp, Lights, LightSources
 from fogsim.values.light import RoadBeams
@@ -34,7 +26,7 @@ def test_the_sky_over_a_lit_road_is_that_of_photons(droplets):
     rows = read_table("monte_carlo_road.csv")
     for row in rows[(rows["fog"] == droplets) & (rows["error"] < 0.1 * rows["road"])]:
         field, out = fog(float(row["visibility"])), np.zeros((120, 160, 3), np.float32)
-        sources = RoadGlow().sources(LOW, CAMERA, POSE, field)
+        sources = road_glow.RoadGlow().sources(LOW, CAMERA, POSE, field)
         Halos(droplets).add(out, empty_view(CAMERA), CAMERA, POSE, field, sources)
         drawn = np.interp(
             79.5 - 100.0 * math.tan(math.radians(row["up"])), np.arange(120), out[:, 79:81, 1].mean(axis=1)
@@ -44,15 +36,15 @@ def test_the_sky_over_a_lit_road_is_that_of_photons(droplets):
 
 def test_lit_pieces_of_road_lie_ahead_on_it_and_return_its_share():
     turned = CameraPose((100.0, 50.0, 6.5), math.pi / 2)
-    sources = RoadGlow().sources(LOW, CAMERA, turned, fog(math.inf))
+    sources = road_glow.RoadGlow().sources(LOW, CAMERA, turned, fog(math.inf))
     assert sources.position[:, 2] == pytest.approx(np.full(5, 5.0))
     assert (np.diff(sources.position[:, 1]) > 0).all()
     assert np.abs(sources.position[:, 0] - 100.0).max() < 1.0
     assert sources.lobes is not None
     # A Lambertian surface shines π times its intensity straight up.
     flux = math.pi * 1000.0 * sources.lobes.scale.sum()
-    assert 60.0 < flux < 0.95 * ROAD_ALBEDO * 2 * 517.0
-    dense = RoadGlow().sources(LOW, CAMERA, turned, fog(50))
+    assert 60.0 < flux < 0.95 * road_glow.ROAD_ALBEDO * 2 * 517.0
+    dense = road_glow.RoadGlow().sources(LOW, CAMERA, turned, fog(50))
     assert (dense.intensity < sources.intensity).all()
 
 
@@ -73,16 +65,16 @@ def beams(*places: tuple[float, float]) -> RoadBeams:
 
 def test_the_road_before_others_glows_where_their_lamps_light_it() -> None:
     coming = beams((60.0, 3.5), (200.0, 3.5))
-    sources = glow_of_beams(coming, POSE, fog(100))
+    sources = road_glow.glow_of_beams(coming, POSE, fog(100))
     assert sources.position[:, 0] == pytest.approx([60.0 - 12.0, 200.0 - 12.0], abs=5.0)
     assert sources.position[:, 2] == pytest.approx([0.0, 0.0], abs=1e-9)
-    own = RoadGlow().sources(LOW, CAMERA, POSE, fog(100)).lobes
+    own = road_glow.RoadGlow().sources(LOW, CAMERA, POSE, fog(100)).lobes
     assert sources.lobes is not None
     assert own is not None
     # As much light as before the own lamps.
     assert sources.lobes.scale == pytest.approx(np.full(2, own.scale.sum()), rel=0.02)
-    assert (glow_of_beams(coming, POSE, fog(20)).intensity < sources.intensity).all()
-    many = glow_of_beams(beams(*((20.0 * n, 0.0) for n in range(1, 8))), POSE, fog(100))
+    assert (road_glow.glow_of_beams(coming, POSE, fog(20)).intensity < sources.intensity).all()
+    many = road_glow.glow_of_beams(beams(*((20.0 * n, 0.0) for n in range(1, 8))), POSE, fog(100))
     assert len(many.intensity) == 2
     assert many.position[:, 0].max() < 40.0
 
@@ -105,17 +97,17 @@ def read(length: NDArray[np.float32], step: int, values: NDArray[np.float32]) ->
     inverse, bent = np.empty(size, np.float32), np.empty(size, np.uint8)
     pixel, chosen = np.empty(size, np.float32), np.empty(size, np.float32)
     first, even, out = np.empty(size, np.uint64), np.empty(size, np.bool_), np.empty(size, np.float32)
-    count = int(choose_pixels(length, step, inverse, bent, pixel, chosen, first, even))
+    count = int(road_glow.choose_pixels(length, step, inverse, bent, pixel, chosen, first, even))
     known = np.zeros(size, np.float32)
     known[:count] = values[pixel[:count].astype(int)]
     assert np.array_equal(chosen[:count], length[pixel[:count].astype(int)])
-    spread_over_row(known, step, first, even, out)
+    road_glow.spread_over_row(known, step, first, even, out)
     return count, out
 
 
 def test_pieces_are_as_wide_as_light_allows() -> None:
     for focal_length, pixels in [(50.0, 1), (144.0, 1), (576.9, 6), (5000.0, 8)]:
-        assert piece_length(focal_length) == pixels
+        assert road_glow.piece_length(focal_length) == pixels
 
 
 def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_pixel() -> None:
@@ -137,6 +129,6 @@ def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_p
 def test_points_lie_at_their_distance_along_the_ray() -> None:
     ray_map = np.array([[0.01, 0.0, -0.5], [0.0, 0.01, -0.3], [0.0, 0.0, 1.0]], np.float32)
     pixel, length, points = np.array([0, 100], np.float32), np.array([20, 30], np.float32), np.empty((3, 2), np.float32)
-    row_points(np.uint64(2), ray_map, 30, pixel, length, points)
+    road_glow.row_points(np.uint64(2), ray_map, 30, pixel, length, points)
     assert np.linalg.norm(points, axis=0) == pytest.approx(length, rel=1e-6)
     assert points[:2] / points[2] == pytest.approx(np.array([[-0.5, 0.5], [0.0, 0.0]]), abs=1e-6)

@@ -63,9 +63,6 @@ def test_the_same_light_from_wherever_the_camera_looks_and_as_it_drives_on():
         pose = dataclasses.replace(POSE, position=(x, 0.0, 1.5))
         out = painter.on(road(), CAMERA, pose, fog(math.inf), lamps).radiance - road().radiance
         assert (np.abs(out - still) <= np.maximum(0.05 * still, 1e-3)).all()
-
-
-def test_map_stays_as_the_camera_drives_and_moves_on_with_it():
     painter = StreetLight()
     lamps = dataclasses.replace(EVEN, position=np.array([[10.0 * n, 3.0, 8.0] for n in range(-20, 200)]))
     light = []

@@ -59,11 +59,15 @@ def test_inside_lamps_alone_light_what_is_far_from_the_portals() -> None:
     assert lit(250.0, 10.0, own=300.0)[24, 32] == pytest.approx(300.0 + deep, rel=0.01)
 
 
-def test_outside_and_beside_nothing_changes() -> None:
+def test_outside_beside_and_far_away_nothing_changes() -> None:
     assert np.all(lit(0.0, 50.0) == np.float32(SKY / np.pi))
     endless = lit(250.0, np.inf)
     assert np.all(endless == np.float32(SKY / np.pi))
     assert lit(250.0, 40.0)[24, 0] == np.float32(SKY / np.pi)  # 21 m to the left, outside its walls
+    light = TunnelLight((TUNNEL,), SKY)
+    assert light.is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))
+    assert not light.is_seen_by(CameraPose((5000.0, 0.0, 1.4), 0.0))
+    assert not TunnelLight((), SKY).is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))
 
 
 def test_lamps_shine_in_a_row_under_the_ceiling_which_is_darker_than_the_road() -> None:
@@ -73,10 +77,3 @@ def test_lamps_shine_in_a_row_under_the_ceiling_which_is_darker_than_the_road() 
     shining = [lit(float(x), 13.6)[7, 32] for x in range(200, 216)]
     assert max(shining) > 1e4
     assert min(shining) < 100.0
-
-
-def test_a_camera_far_away_sees_no_tunnel() -> None:
-    light = TunnelLight((TUNNEL,), SKY)
-    assert light.is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))
-    assert not light.is_seen_by(CameraPose((5000.0, 0.0, 1.4), 0.0))
-    assert not TunnelLight((), SKY).is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))

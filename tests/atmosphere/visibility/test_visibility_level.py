@@ -34,16 +34,15 @@ def test_threshold_of_the_published_formula():
     assert threshold(0.002, minutes(10)) == pytest.approx(0.009189, rel=1e-3)
 
 
-def test_polarity_factor():
+def test_factors_of_polarity_and_age_and_angular_size():
     assert polarity_factor(1.0, 10) == pytest.approx(0.58993, rel=1e-4)
     assert polarity_factor(0.01, 7.45) == pytest.approx(0.46361, rel=1e-4)
     assert polarity_factor(1e-5, 10) == polarity_factor(0.004, 10)
-
-
-def test_age_factor():
     for age, factor in [(20, 0.99741), (25, 1.00667), (30, 1.04602), (60, 1.76824), (64, 1.92750), (70, 2.97394)]:
         assert age_factor(age) == pytest.approx(factor, rel=1e-5)
     assert age_factor(64.0001) == pytest.approx(1.90098, rel=1e-4)  # it jumps, as published
+    for distance, size in [(60, 10.3132), (83, 7.4554), (100, 6.1879), (150, 4.1253)]:
+        assert np.degrees(angular_size(0.18, distance)) * 60 == pytest.approx(size, rel=1e-4)
 
 
 def test_branches_meet_within_their_own_mismatch():
@@ -54,11 +53,6 @@ def test_branches_meet_within_their_own_mismatch():
         (luminance_root, 0.007, 0.00418),
     ]:
         assert function(join * 1.0001) == pytest.approx(float(function(join * 0.9999)), rel=mismatch)
-
-
-def test_angular_size():
-    for distance, size in [(60, 10.3132), (83, 7.4554), (100, 6.1879), (150, 4.1253)]:
-        assert np.degrees(angular_size(0.18, distance)) * 60 == pytest.approx(size, rel=1e-4)
 
 
 def test_visibility_level_of_the_small_target_is_lowered_by_a_veil_and_negative_for_dark_ones():

@@ -8,15 +8,6 @@ import pytest
 
 from fogsim.values import Camera, Estimate, LeadMeasurement
 from fogsim.vision.day import confirmation
-from fogsim.vision.day.confirmation import (
-    MODEL_DEVIATION,
-    NOT_CLEAR,
-    PERIOD,
-    SOON,
-    UNCONFIRMED,
-    Confirmation,
-    without_far_objects,
-)
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.second_opinion import DISAGREE, STANDS_OUT, DayVerdict
 from fogsim.vision.lines.horizon import Horizon
@@ -40,7 +31,7 @@ def looked(monkeypatch):
         monkeypatch.setattr(confirmation, "fit_free_road", lambda *arguments: looks.append(arguments))
         monkeypatch.setattr(confirmation, "verdict_of", lambda *_: day)
         monkeypatch.setattr(confirmation, "stands_out", lambda *_: far)
-        return Confirmation(CAMERA, Horizon(23.5, 1.0), SCALE), looks
+        return confirmation.Confirmation(CAMERA, Horizon(23.5, 1.0), SCALE), looks
 
     return confirming
 
@@ -53,7 +44,7 @@ def test_fog_that_shows_in_both_counts_with_what_camera_and_models_leave_open(lo
     found = once(looked, OWN, FOG)
     assert found.extinction == OWN.extinction
     least = math.hypot(OWN.standard_deviation, SCALE * OWN.extinction)
-    assert least < found.standard_deviation < math.hypot(least, 1.1 * MODEL_DEVIATION * OWN.extinction)
+    assert least < found.standard_deviation < math.hypot(least, 1.1 * confirmation.MODEL_DEVIATION * OWN.extinction)
     assert SCALE <= found.common_deviation < 0.2
 
 
@@ -69,7 +60,7 @@ def test_a_day_model_with_other_fog_or_without_any_refuses(looked, own):
     other = replace(FOG, extinction=0.2, deviation=0.01, median=0.2, interval=(14.0, 16.0))
     assert once(looked, own, other).diagnostics["reason"] == DISAGREE
     reasons = {once(looked, own, SILENT).diagnostics["reason"], once(looked, OWN, CLEAR).diagnostics["reason"]}
-    assert reasons == {UNCONFIRMED if own is OWN else NOT_CLEAR, UNCONFIRMED}
+    assert reasons == {confirmation.UNCONFIRMED if own is OWN else confirmation.NOT_CLEAR, confirmation.UNCONFIRMED}
 
 
 def test_clear_air_needs_contrast_far_away(looked):
@@ -82,19 +73,19 @@ def test_clear_air_needs_contrast_far_away(looked):
 def test_what_stands_out_refuses_fog(looked):
     found = once(looked, OWN, FOG, far=True)
     assert found.diagnostics == {"reason": STANDS_OUT, "frames": 1}
-    assert without_far_objects(OWN, IMAGE, CAMERA, Horizon(23.5, 1.0)).diagnostics["reason"] == STANDS_OUT
-    assert without_far_objects(NO_FOG, IMAGE, CAMERA, Horizon(23.5, 1.0)) is NO_FOG
+    assert confirmation.without_far_objects(OWN, IMAGE, CAMERA, Horizon(23.5, 1.0)).diagnostics["reason"] == STANDS_OUT
+    assert confirmation.without_far_objects(NO_FOG, IMAGE, CAMERA, Horizon(23.5, 1.0)) is NO_FOG
 
 
 def test_in_a_drive_it_looks_from_time_to_time_and_where_the_estimate_changes(looked):
     confirms, looks = looked(FOG)
-    for time in (0.0, 0.1, PERIOD - 0.1, PERIOD + 0.1):
+    for time in (0.0, 0.1, confirmation.PERIOD - 0.1, confirmation.PERIOD + 0.1):
         confirms.of(OWN, IMAGE, math.inf, time)
     assert len(looks) == 2
-    assert not confirms.of(replace(OWN, extinction=0.3), IMAGE, math.inf, PERIOD + 0.2).valid
+    assert not confirms.of(replace(OWN, extinction=0.3), IMAGE, math.inf, confirmation.PERIOD + 0.2).valid
     assert len(looks) == 3
     refuses, looks = looked(SILENT)
-    for time in (0.0, 0.5 * SOON, 1.5 * SOON):
+    for time in (0.0, 0.5 * confirmation.SOON, 1.5 * confirmation.SOON):
         assert not refuses.of(OWN, IMAGE, math.inf, time).valid
     assert len(looks) == 2
 

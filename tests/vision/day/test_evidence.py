@@ -5,19 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.vision.day.evidence_kernels import (
-    GRAIN,
-    PATCHES,
-    SHARED_ROWS,
-    SKY_VARIANCE,
-    Law,
-    evidence,
-    footprint,
-    no_factor,
-    road_pass,
-    road_steps,
-    sky_pass,
-)
+from fogsim.vision.day import evidence_kernels
 from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, ROAD, SHEEN, VIGNETTING, fill_columns
 
 FIRST = np.concatenate([np.arange(60.0, 100.0, 8.0), np.arange(100.0, 120.0), np.arange(120.0, 240.0, 10.0)])
@@ -43,8 +31,8 @@ for column, mean, deviation in ((AIRLIGHT, 0.5, 0.05), (ROAD, 0.2, 0.02), (SHEEN
 
 
 def found_evidence(gram, half, least_airlight=0.0):
-    law = Law(PRIOR_MEAN, PRIOR_DEVIATION, np.flatnonzero(PRIOR_DEVIATION > 0.0))
-    return evidence(gram, half, law, least_airlight, 0, no_factor())
+    law = evidence_kernels.Law(PRIOR_MEAN, PRIOR_DEVIATION, np.flatnonzero(PRIOR_DEVIATION > 0.0))
+    return evidence_kernels.evidence(gram, half, law, least_airlight, 0, evidence_kernels.no_factor())
 
 
 def dense(light, columns, covariance):
@@ -62,18 +50,20 @@ def test_the_road_filter_is_the_dense_law_of_patches_grain_and_shared_noise(rows
     shared, albedo = np.full(light.size, 0.004), np.array([0.03, 0.02, 0.0])
     cuts = np.array([light.size - 4, light.size])
     grams, halves = np.empty((2, COLUMNS + 1, COLUMNS + 1)), np.empty(2)
-    steps = road_steps(place, noise, int(np.argmax(road)))
-    road_pass(noise, shared, columns, place, steps, albedo, math.inf, cuts, grams, halves)
+    steps = evidence_kernels.road_steps(place, noise, int(np.argmax(road)))
+    evidence_kernels.road_pass(noise, shared, columns, place, steps, albedo, math.inf, cuts, grams, halves)
     for cut, gram, half in zip(cuts, grams, halves, strict=True):
         seen = np.flatnonzero(road[:cut])
         left, depth, extent, row = place[seen, :4].T
         apart = np.abs(depth[:, None] - depth)
-        patches = left * albedo[0] * [footprint(e, PATCHES) for e in extent]
-        grain = left * albedo[1] * [footprint(e, GRAIN) for e in extent]
-        scaled = math.sqrt(3.0) / PATCHES * apart
+        patches = left * albedo[0] * [evidence_kernels.footprint(e, evidence_kernels.PATCHES) for e in extent]
+        grain = left * albedo[1] * [evidence_kernels.footprint(e, evidence_kernels.GRAIN) for e in extent]
+        scaled = math.sqrt(3.0) / evidence_kernels.PATCHES * apart
         covariance = np.outer(patches, patches) * (1.0 + scaled) * np.exp(-scaled)
-        covariance += np.outer(grain, grain) * np.exp(-apart / GRAIN)
-        covariance += 0.004**2 * np.exp(-np.abs(row[:, None] - row) / SHARED_ROWS) + np.diag(noise[seen] ** 2)
+        covariance += np.outer(grain, grain) * np.exp(-apart / evidence_kernels.GRAIN)
+        covariance += 0.004**2 * np.exp(-np.abs(row[:, None] - row) / evidence_kernels.SHARED_ROWS) + np.diag(
+            noise[seen] ** 2
+        )
         assert found_evidence(gram, half) == pytest.approx(dense(light[seen], columns[seen], covariance), abs=0.01)
 
 
@@ -81,16 +71,16 @@ def test_the_sky_filter_is_the_dense_law_of_a_walk_upward_from_the_horizon(rows)
     columns, place, light, noise = rows
     size = int((LAST + 0.5 <= HORIZON).sum())
     slope, gram = np.full(light.size, 1.7), np.zeros((COLUMNS + 1, COLUMNS + 1))
-    half = sky_pass(slope, noise, columns, place, size, np.array([0.0, 0.12]), gram)
+    half = evidence_kernels.sky_pass(slope, noise, columns, place, size, np.array([0.0, 0.12]), gram)
     above = place[:size, 4]
-    covariance = SKY_VARIANCE * 1.7**2 * np.minimum(above[:, None], above) + np.diag(noise[:size] ** 2)
+    covariance = evidence_kernels.SKY_VARIANCE * 1.7**2 * np.minimum(above[:, None], above) + np.diag(noise[:size] ** 2)
     assert found_evidence(gram, half) == pytest.approx(dense(light[:size], columns[:size], covariance), abs=0.01)
 
 
 def test_clipped_light_speaks_against_airlight_below_it(rows):
     columns, place, light, noise = rows
     gram = np.zeros((COLUMNS + 1, COLUMNS + 1))
-    half = sky_pass(np.ones(light.size), noise, columns, place, 5, np.array([0.0, 0.12]), gram)
+    half = evidence_kernels.sky_pass(np.ones(light.size), noise, columns, place, 5, np.array([0.0, 0.12]), gram)
     free = found_evidence(gram, half)
     assert found_evidence(gram, half, 0.3) == pytest.approx(free, abs=0.01)
     assert found_evidence(gram, half, 0.7) < free - 5.0

@@ -19,6 +19,8 @@ AGREES = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.
 DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
 FAR = replace(AGREES, extinction=0.003, deviation=0.0002, interval=(900.0, 1100.0))
 SILENT = replace(AGREES, reason="dark")
+THIN = replace(OWN, extinction=0.001, standard_deviation=1e-4)
+CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
 
 
 @pytest.fixture
@@ -80,9 +82,6 @@ def test_what_the_joint_fit_does_not_know_ends_its_estimate_and_proves_no_other(
     assert not said(OWN, replace(FAR, outside=0.9))[0].valid
     assert not said(OWN, replace(SILENT, outside=0.9))[0].valid
     assert said(OWN, replace(SILENT, outside=0.4))[0].valid
-
-
-def test_contrast_beyond_its_fog_ends_an_estimate(said):
     assert said(OWN, replace(AGREES, doubt=MOST_DOUBT - 1.0))[0].valid
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
@@ -118,25 +117,20 @@ def test_a_road_in_shade_is_one_where_its_lines_meet_under_the_stated_response()
     assert not seen.is_even
 
 
-CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
-
-
 def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):
-    found, _ = said(replace(OWN, extinction=0.001, standard_deviation=1e-4), CLEAR)
+    found, _ = said(THIN, CLEAR)
     assert found.valid
     assert found.extinction == 0.001
     assert found.visibility_interval[1] == math.inf
 
 
 def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch):
-    thin, looks = replace(OWN, extinction=0.001, standard_deviation=1e-4), []
+    looks = []
     monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
     monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: CLEAR if len(looks) < 2 else AGREES)
     second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
-    found = [
-        second.on(own, image, Horizon(23.5, 1.0), math.inf, time, 0)
-        for time, own in ((0.0, thin), (0.1, thin), (0.2, OWN))
-    ]
+    times = ((0.0, THIN), (0.1, THIN), (0.2, OWN))
+    found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time, 0) for time, own in times]
     assert len(looks) == 2
     assert found[1].visibility_interval[1] == math.inf
     assert found[2].visibility_interval[1] < 150.0

@@ -14,14 +14,11 @@ def step(rows=60, cols=80, at=30, low=60.0, high=100.0):
     return image
 
 
-def test_derivatives_of_a_ramp_are_its_slopes():
+def test_derivatives_of_a_ramp_are_its_slopes_a_step_is_an_edge_and_grain_raises_the_threshold():
     v, u = np.mgrid[:40, :50].astype(np.float32)
     gradient = edge_map(2.0 * u - 3.0 * v, np.zeros(40, np.float32)).gradient
     assert gradient.across[1:-1, 1:-1] == pytest.approx(2.0)
     assert gradient.down[1:-1, 1:-1] == pytest.approx(-3.0)
-
-
-def test_a_step_is_an_edge_where_it_is_and_grain_raises_the_threshold():
     edges = edge_map(step(), np.zeros(60, np.float32))
     assert set(np.nonzero(edges.pixels)[1]) <= {29, 30}
     assert edges.pixels.any(axis=1).all()

@@ -72,7 +72,7 @@ def test_a_vehicle_ahead_is_no_bend():
         assert course is None or course.is_straight
 
 
-def test_rows_on_a_plane_are_those_of_rays_on_the_curve():
+def test_rows_on_a_plane_are_those_of_rays_on_the_curve_and_none_shows_road_behind_a_crest():
     unit, height, sag = 800.0, 1.4, np.array([1e-4, 2e-4, 0.0, -1e-4, 0.0, 1e-5])
     for distance in (20.0, 60.0, 110.0, 150.0):
         rise = sum(c * turned(distance, piece)[0] for piece, c in enumerate(sag))
@@ -81,9 +81,6 @@ def test_rows_on_a_plane_are_those_of_rays_on_the_curve():
         assert row == pytest.approx(unit / distance, rel=1e-5)
         nearby, _ = row_on_plane(below + 1e-3, sag, unit, height, below)
         assert (nearby - row) / 1e-3 == pytest.approx(change, rel=1e-3)
-
-
-def test_behind_a_crest_no_row_shows_road():
     crest = np.full(len(KNOTS) - 1, -1.0 / 2000.0)
     # It hides what lies beyond √(2 h R) = 75 m, which is seen 2 h / 75 m below the tangent's horizon.
     limit = 2.0 * 1.4 / math.sqrt(2.0 * 1.4 * 2000.0)

@@ -8,54 +8,38 @@ from stripes import CENTRE, ROW, road_lines
 
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.lines import vanishing_point
 from fogsim.vision.lines.edges import CannyDeriche, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_lines import road_vanishing_point
-from fogsim.vision.lines.vanishing_point import (
-    LaneLine,
-    Lines,
-    all_pairs,
-    consensus_vanishing_point,
-    crossings,
-    edge_points,
-    hough_lines,
-    hough_peaks,
-    nearest_point,
-    published_vanishing_point,
-    residual_scale,
-    sloped_lines,
-    supports,
-)
 
 POINT = np.array([311.7, 58.2])
 
 
 def lines_through(*angles, point=POINT):
-    """Lines of unit normals through a point."""
+    """vanishing_point.Lines of unit normals through a point."""
     normal = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
-    return Lines(normal, (normal * point).sum(axis=1))
-
-
-def test_pairs_are_all_pairs_once():
-    assert sorted(zip(*(part.tolist() for part in all_pairs(3)), strict=True)) == [(1, 0), (2, 0), (2, 1)]
-    assert all_pairs(1)[0].size == all_pairs(0)[0].size == 0
+    return vanishing_point.Lines(normal, (normal * point).sum(axis=1))
 
 
 def test_every_pair_crosses_in_the_common_point():
-    found = crossings(lines_through(0.2, 0.9, -0.7, 1.4), *all_pairs(4), 0.1)
+    found = vanishing_point.crossings(lines_through(0.2, 0.9, -0.7, 1.4), *vanishing_point.all_pairs(4), 0.1)
     assert found == pytest.approx(np.tile(POINT, (6, 1)), abs=1e-9)
+    assert sorted(zip(*(part.tolist() for part in vanishing_point.all_pairs(3)), strict=True)) == [
+        (1, 0),
+        (2, 0),
+        (2, 1),
+    ]
+    assert vanishing_point.all_pairs(1)[0].size == vanishing_point.all_pairs(0)[0].size == 0
 
 
 def test_parallel_lines_do_not_cross():
-    lines = sloped_lines([10.0, 30.0, 50.0], [0.5, 0.5, 0.9])
-    found = crossings(lines, *all_pairs(3), 0.4)
+    lines = vanishing_point.sloped_lines([10.0, 30.0, 50.0], [0.5, 0.5, 0.9])
+    found = vanishing_point.crossings(lines, *vanishing_point.all_pairs(3), 0.4)
     assert np.isnan(found[0]).all()
     assert found[1:] == pytest.approx(np.array([[-40.0, -100.0], [5.0, -50.0]]))
-    assert supports(lines, np.ones(3), found, 1.0).tolist() == [0.0, 2.0, 2.0]
-
-
-def test_sloped_lines_miss_a_point_by_columns():
-    lines = sloped_lines([10.0, -20.0], [0.5, 2.0])
+    assert vanishing_point.supports(lines, np.ones(3), found, 1.0).tolist() == [0.0, 2.0, 2.0]
+    lines = vanishing_point.sloped_lines([10.0, -20.0], [0.5, 2.0])
     assert lines.misses(np.array([100.0, 40.0])) == pytest.approx([70.0, 40.0])
     assert lines.misses(np.array([[100.0, 40.0], [30.0, 40.0]]))[1] == pytest.approx([0.0, -30.0])
 
@@ -65,18 +49,18 @@ def test_support_is_the_weight_of_the_lines_that_pass():
     beside = POINT + 3.0 * lines.normal[0] / np.linalg.norm(lines.normal[0])
     weight = np.array([1.0, 10.0, 100.0])
     points = np.array([POINT, beside, (np.nan, np.nan)])
-    assert supports(lines, weight, points, 3.1).tolist() == [111.0, 111.0, 0.0]
-    assert supports(lines, weight, points, 1e-9).tolist() == [111.0, 0.0, 0.0]
+    assert vanishing_point.supports(lines, weight, points, 3.1).tolist() == [111.0, 111.0, 0.0]
+    assert vanishing_point.supports(lines, weight, points, 1e-9).tolist() == [111.0, 0.0, 0.0]
 
 
 def test_least_squares_of_lines_that_meet_is_where_they_meet():
     weight = np.array([1.0, 3.0, 0.2])
-    point, covariance = nearest_point(lines_through(0.2, 0.9, -0.7), weight)
+    point, covariance = vanishing_point.nearest_point(lines_through(0.2, 0.9, -0.7), weight)
     assert point == pytest.approx(POINT, abs=1e-9)
     assert covariance == pytest.approx(covariance.T)
     # An upright line places the column, a level one the row.
     lines = lines_through(0.0, 0.5 * math.pi)
-    point, covariance = nearest_point(lines, np.array([1 / 4.0, 1 / 9.0]))
+    point, covariance = vanishing_point.nearest_point(lines, np.array([1 / 4.0, 1 / 9.0]))
     assert point == pytest.approx(POINT)
     assert covariance == pytest.approx(np.diag([4.0, 9.0]), abs=1e-9)
 
@@ -86,16 +70,21 @@ def test_deviation_of_the_point_is_that_of_many_trials():
     exact = lines_through(*angles)
     weight = np.full(4, 1 / 0.5**2)
     found = np.array(
-        [nearest_point(Lines(exact.normal, exact.offset + rng.normal(0, 0.5, 4)), weight)[0] for _ in range(4000)]
+        [
+            vanishing_point.nearest_point(
+                vanishing_point.Lines(exact.normal, exact.offset + rng.normal(0, 0.5, 4)), weight
+            )[0]
+            for _ in range(4000)
+        ]
     )
-    expected = nearest_point(exact, weight)[1]
+    expected = vanishing_point.nearest_point(exact, weight)[1]
     assert np.cov(found.T) == pytest.approx(expected, abs=0.1 * expected[1, 1])
 
 
 def test_residuals_widen_a_deviation_and_never_narrow_it():
-    assert residual_scale(np.array([0.1, -0.1, 0.0])) == 1.0
-    assert residual_scale(np.array([3.0, 0.0, 0.0, 4.0])) == pytest.approx(math.sqrt(25.0 / 2.0))
-    assert residual_scale(np.array([2.0, 2.0])) == pytest.approx(math.sqrt(8.0))
+    assert vanishing_point.residual_scale(np.array([0.1, -0.1, 0.0])) == 1.0
+    assert vanishing_point.residual_scale(np.array([3.0, 0.0, 0.0, 4.0])) == pytest.approx(math.sqrt(25.0 / 2.0))
+    assert vanishing_point.residual_scale(np.array([2.0, 2.0])) == pytest.approx(math.sqrt(8.0))
 
 
 FIRST = math.ceil(ROW) + 20
@@ -103,37 +92,37 @@ FIRST = math.ceil(ROW) + 20
 
 def lines_of(image):
     edges = edge_map(smoothed(image), np.zeros(len(image), np.float32)).pixels
-    return hough_lines(edges, FIRST, math.radians(10.0))
+    return vanishing_point.hough_lines(edges, FIRST, math.radians(10.0))
 
 
 def line_through(column, row, slope, votes=100):
-    return LaneLine(slope, column - slope * row, votes)
+    return vanishing_point.LaneLine(slope, column - slope * row, votes)
 
 
 def test_published_lines_are_right_within_their_cells():
     assert lines_of(np.full((300, 640), 90.0, np.float32)) == []
     lines = lines_of(road_lines())
     assert sorted(math.copysign(1.0, line.slope) for line in lines) == [-1.0, 1.0]
-    point = published_vanishing_point(lines, 0)
+    point = vanishing_point.published_vanishing_point(lines, 0)
     assert (point.column, point.row) == pytest.approx((CENTRE, ROW), abs=8.0)
     assert (point.lines, point.support) == (2, sum(line.votes for line in lines))
 
 
 def test_exact_lines_meet_exactly_in_rows_of_the_whole_image():
     lines = [line_through(300.0, 50.0, slope) for slope in (-2.0, 2.5)]
-    point = published_vanishing_point(lines, 7)
+    point = vanishing_point.published_vanishing_point(lines, 7)
     assert (point.column, point.row) == pytest.approx((300.0, 57.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("slopes", [(), (1.2,), (0.8, 1.1), (1.0, 1.0, 1.0)])
 def test_too_few_lines_and_parallel_ones_have_no_point(slopes):
     lines = [line_through(300.0 + i, 50.0, slope) for i, slope in enumerate(slopes)]
-    assert published_vanishing_point(lines, 0) is None
+    assert vanishing_point.published_vanishing_point(lines, 0) is None
 
 
 def found(image, guess=(325.0, 64.0)):
     edges = CannyDeriche()(image, None)
-    return consensus_vanishing_point(edges.gradient, edges.pixels, guess, 40.0)
+    return vanishing_point.consensus_vanishing_point(edges.gradient, edges.pixels, guess, 40.0)
 
 
 def test_the_published_recipe_is_right_within_its_cells_and_coarser_than_the_roads_own_lines():
@@ -161,9 +150,9 @@ def test_fewer_than_two_lines_and_parallel_ones_have_none():
         image[:, left : left + 20] = 120.0
     guess = (310.0, 20.0)
     edges = CannyDeriche()(image, None)
-    points = edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, *guess)
-    assert hough_peaks(points, 150.0, 6, 30)[0][:, 0] % math.pi == pytest.approx([0.0] * 6, abs=1e-9)
-    assert consensus_vanishing_point(edges.gradient, edges.pixels, guess, 150.0) is None
+    points = vanishing_point.edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, *guess)
+    assert vanishing_point.hough_peaks(points, 150.0, 6, 30)[0][:, 0] % math.pi == pytest.approx([0.0] * 6, abs=1e-9)
+    assert vanishing_point.consensus_vanishing_point(edges.gradient, edges.pixels, guess, 150.0) is None
 
 
 @pytest.mark.parametrize("slope", [-0.8, 0.0, 0.5])
@@ -172,10 +161,10 @@ def test_an_edge_is_a_line_with_the_direction_of_its_gradient(slope):
     v, u = np.mgrid[:200, :200]
     image = np.clip(60.0 + 60.0 * (u - 100.3 - slope * (v - 100)), 60.0, 120.0).astype(np.float32)
     edges = CannyDeriche()(image, None)
-    points = edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, 100.0, 0.0)
+    points = vanishing_point.edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, 100.0, 0.0)
     assert np.median(points[:, 0] - slope * (points[:, 1] - 100.0)) == pytest.approx(0.8, abs=0.1)
     assert np.median(points[:, 2]) == pytest.approx(math.atan(-slope), abs=0.02)
-    lines, votes = hough_peaks(points, 120.0, 1, 30)
+    lines, votes = vanishing_point.hough_peaks(points, 120.0, 1, 30)
     angle, offset = lines[0]
     assert math.remainder(angle - math.atan(-slope), 2.0 * math.pi) == pytest.approx(0.0, abs=math.radians(1.5))
     assert offset == pytest.approx(math.cos(angle) * (0.8 - 100.0 * slope), abs=3.0)

@@ -21,12 +21,17 @@ def even(image):
     return cumulative_limits(np.full(image.shape[0], 5.0, np.float32), 5.0)
 
 
-def test_region_fills_a_smooth_ramp_and_stops_at_a_step():
+def test_region_fills_a_smooth_ramp_stops_at_a_step_and_begins_near_the_median_only():
     image = np.repeat(np.linspace(120, 60, 60, dtype=np.float32)[:, None], 40, axis=1)
     image[:10] += 50
     region = grow_region(image, np.zeros(image.shape, np.uint8), even(image))
     assert region[10:].all()
     assert not region[:10].any()
+    image = np.full((20, 40), 80.0, np.float32)
+    image[:, 30:] = 200.0
+    region = grow_region(image, np.zeros(image.shape, np.uint8), even(image))
+    assert region[:, :30].all()
+    assert not region[:, 30:].any()
 
 
 def test_region_does_not_enter_edges_and_goes_round_them():
@@ -37,14 +42,6 @@ def test_region_does_not_enter_edges_and_goes_round_them():
     # Growth is one column a row at most: behind the edge a triangle stays dark.
     assert not region[19, 12:18].any()
     assert region[14, 14] == 1
-
-
-def test_seeds_are_near_the_median_only():
-    image = np.full((20, 40), 80.0, np.float32)
-    image[:, 30:] = 200.0
-    region = grow_region(image, np.zeros(image.shape, np.uint8), even(image))
-    assert region[:, :30].all()
-    assert not region[:, 30:].any()
 
 
 def test_equal_steps_are_the_constant_limits_of_the_papers():
@@ -78,9 +75,6 @@ def test_band_is_the_widest_that_reaches_the_top():
     region[3:, 8:14] = 1
     region[3:, 30:42] = 1
     assert crossing_band(region, EVEN, 29.5, min_width=3, max_width=60) == Band(30, 41, 3, 49)
-
-
-def test_of_wide_bands_the_one_near_the_centre_is_cut_out():
     region = np.ones((50, 60), np.uint8)
     region[:, 20:24] = 0
     assert crossing_band(region, EVEN, 29.5, min_width=3, max_width=10) == Band(25, 34, 0, 49)

@@ -62,9 +62,6 @@ def test_branches_grow_until_they_merge() -> None:
     left, right, top, bottom = near.box(0, last)
     assert left < near.centres(0)[0][0] < right
     assert top < near.centres(0)[0][1] < bottom
-
-
-def test_a_branch_that_leaks_into_a_bright_surface_ends_there() -> None:
     level = picture(((100.0, 100.0, 4.0, 300.0),))
     level[96:200, 105:200] = 230  # a lit wall that touches the lamp
     tree = source_tree(level)

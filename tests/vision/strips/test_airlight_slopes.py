@@ -245,13 +245,10 @@ def test_a_picture_counts_by_the_road_in_it_that_is_new():
     assert often == pytest.approx(seldom, abs=0.02)
 
 
-def test_over_a_way_pictures_overrule_what_is_usual_and_one_alone_cannot():
+def test_over_a_way_pictures_overrule_what_is_usual_one_alone_cannot_and_all_is_forgotten():
     assert learnt(*[LARGE] * 12)[2] > 0.9
     alone = learnt(LARGE, (0.0, -50.0, -90.0), speed=2.0 * OTHER_ROAD)
     assert alone[1] / alone[0] >= DROPLET_CHANCES[1] / DROPLET_CHANCES[0] * np.exp(-MOST) * 0.9
-
-
-def test_what_was_learnt_is_forgotten_over_the_way():
     memory = DropletMemory()
     for number in range(20):
         memory.learn(LARGE, float(number), 20.0)

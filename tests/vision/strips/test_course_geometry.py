@@ -52,14 +52,11 @@ def test_rows_of_a_sag_are_nearer_and_of_a_crest_farther(sag):
     assert (distance < STRAIGHT.distance[row]) == (sag > 0)
 
 
-def test_strips_shift_with_a_bend_to_the_right():
+def test_strips_shift_with_a_bend_to_the_right_and_where_it_is_unsure_nothing_is_read():
     laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, bend=np.full(PIECES, 1.0 / 400.0)))
     row = int(np.argmin(np.abs(STRAIGHT.distance - 60.0)))
     shift = CAMERA.focal_length * 0.5 * STRAIGHT.distance[row] / 400.0
     assert laid.left[0, row] - STRAIGHT.left[0, row] == pytest.approx(shift, rel=1e-2)
-
-
-def test_where_the_bend_is_unsure_nothing_is_read():
     unsure = replace(LEVEL, bend=np.full(PIECES, 1e-3), bend_covariance=np.full((PIECES, PIECES), (5e-4) ** 2))
     laid = course_geometry(STRAIGHT, CAMERA, unsure)
     width = (laid.right - laid.left)[0]
@@ -68,13 +65,10 @@ def test_where_the_bend_is_unsure_nothing_is_read():
     assert (width[laid.distance > 50.0] == 0).all()
 
 
-def test_what_is_not_known_of_the_course_matters_the_more_the_thinner_the_fog():
+def test_what_is_not_known_of_the_course_matters_the_more_the_thinner_the_fog_and_what_is_known_not():
     unseen = unseen_course(CAMERA, Horizon(CAMERA.horizon_row, 0.3))
     dense, medium, thin = (deviation(3.0 / visibility, unseen) for visibility in (30.0, 100.0, 300.0))
     assert dense < 0.02
     assert dense < medium < thin
-
-
-def test_a_course_that_is_known_adds_nothing_beyond_its_horizon():
     known = replace(LEVEL, covariance=np.diag([0.09, *np.full(PIECES, 1e-24)]))
     assert deviation(0.02, known) < 1e-6

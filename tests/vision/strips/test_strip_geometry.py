@@ -41,10 +41,6 @@ def test_bins_follow_one_another_without_gaps_and_grow_with_the_rows_below_the_h
     assert (geometry.rows[geometry.below < WHOLE_ROWS] == 1.0).all()
     assert (np.diff(geometry.rows) <= 0).all()
     assert (np.diff(geometry.distance) > 0).all()
-
-
-def test_the_road_that_bins_cover_adds_up():
-    geometry = strip_geometry(CAMERA, 2.0)
     near, far = (CAMERA.row_distance / (geometry.below[i] + s * geometry.half[i]) for i, s in ((0, 1.0), (-1, -1.0)))
     assert geometry.extent.sum() == pytest.approx(far - near, rel=1e-6)
 

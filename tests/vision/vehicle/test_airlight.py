@@ -91,8 +91,5 @@ def test_a_road_brighter_than_the_sky_is_refused_and_none_is_not():
     check_road(np.zeros((0, 5), np.float32), 200.0)
     with pytest.raises(CannotTellError, match="brighter than the sky"):
         check_road(np.full((4, 5), 225.0, np.float32), 200.0)
-
-
-def test_what_a_vehicle_may_hide_is_as_wide_as_it_is_near():
     assert hidden_at_side(700.0, 20.0) == pytest.approx(2.0 * hidden_at_side(700.0, 40.0))
     assert hidden_at_side(700.0, np.inf) == 0.0

@@ -53,29 +53,23 @@ def test_contrast_to_the_sky_falls_by_one_factor_at_any_exposure(left):
     assert fallen(rear(), fogged(rear(), left), exposure=0.5) == pytest.approx(left, rel=1e-6)
 
 
-def test_lit_lamps_and_repainted_parts_do_not_count():
+def test_lit_lamps_and_repainted_parts_do_not_count_and_paint_that_shines_differently_little():
     far = fogged(rear(), 0.5)
     far[22:26, 6:12] = far[22:26, -12:-6] = 250.0
     assert fallen(rear(), far) == pytest.approx(0.5, rel=0.005)
-
-
-def test_bright_paint_that_shines_differently_counts_little():
     near, far = rear(), rear()
     far[far > 100.0] *= 1.08
     # A plain mean would take the sheen for a fifth less contrast.
     assert (SKY - far).mean() / (SKY - near).mean() < 0.92
     assert fallen(near, fogged(far, 0.5)) == pytest.approx(0.5, rel=0.03)
+    same = patch(np.full((40, 48), SKY))
+    assert mean_luminances(same, same, Placement(same.column, same.row, 1.0), (SKY, SKY), 0.5) is None
 
 
 def test_noise_does_not_bias_what_hardly_shows():
     rng = np.random.default_rng(0)
     found = [fallen(rear(), fogged(rear(), 0.02) + rng.normal(0.0, 4.0, (40, 48)), 4.0) for _ in range(200)]
     assert np.mean(found) == pytest.approx(0.02, abs=3.0 * np.std(found) / np.sqrt(200))
-
-
-def test_nothing_is_said_of_what_is_as_bright_as_the_sky():
-    same = patch(np.full((40, 48), SKY))
-    assert mean_luminances(same, same, Placement(same.column, same.row, 1.0), (SKY, SKY), 0.5) is None
 
 
 @pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
@@ -99,11 +93,16 @@ def test_a_mirrored_picture_is_shrunk_to_the_mirror_image(scale):
     assert other.column == pytest.approx(small.luminance.shape[1] - 1 - there)
 
 
-def test_shrinking_averages_noise_away():
+def test_shrinking_averages_noise_away_and_shares_nothing_beyond_the_border():
     noisy = patch(np.random.default_rng(0).normal(100.0, 8.0, (200, 240)))
     inner = shrink(noisy, 0.25).luminance[2:-2, 2:-2]
     assert inner.std() == pytest.approx(8.0 * 0.25, rel=0.1)
     assert shrink(noisy, 1.0) is noisy
+    even = patch(np.full((40, 48), 70.0))
+    grid = pixel_grid(even, even, Placement(23.5, 19.5, 0.6))
+    assert downsample_to(even, grid, Placement(23.5, 19.5, 0.6)) == pytest.approx(70.0)
+    weights = box_weights(10, 5.0, np.array([-20.0, 5.0, 40.0]), 5.0, 0.5)
+    assert weights.sum(axis=1) == pytest.approx([0.0, 1.0, 0.0])
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.7, 0.3])
@@ -113,17 +112,6 @@ def test_boxes_share_the_near_pixels_out(scale):
     half, middle, near = 0.5 * math.sqrt(max(scale**-2 - 1.0, 0.25)), 29.4 + (far[:, None] - 5.5) / scale, np.arange(60)
     overlap = np.minimum(middle + half, near + 0.5) - np.maximum(middle - half, near - 0.5)
     assert weights == pytest.approx(np.maximum(overlap, 0.0) / (2.0 * half), abs=1e-15)
-
-
-def test_pixels_beyond_the_border_have_no_share():
-    weights = box_weights(10, 5.0, np.array([-20.0, 5.0, 40.0]), 5.0, 0.5)
-    assert weights.sum(axis=1) == pytest.approx([0.0, 1.0, 0.0])
-
-
-def test_an_even_patch_is_even_however_it_is_seen():
-    even = patch(np.full((40, 48), 70.0))
-    grid = pixel_grid(even, even, Placement(23.5, 19.5, 0.6))
-    assert downsample_to(even, grid, Placement(23.5, 19.5, 0.6)) == pytest.approx(70.0)
 
 
 RNG = np.random.default_rng(5)

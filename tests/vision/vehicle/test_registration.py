@@ -46,9 +46,6 @@ def test_coarse_placement_moves_by_whole_pixels():
     at = Placement(22.4, 21.3, 0.55)
     found = coarse_placement(NEAR, far_patch(at, 0.5), prior(at, 2.0, -3.0))
     assert (found.column, found.row, found.scale) == pytest.approx((at.column, at.row, at.scale))
-
-
-def test_what_shows_no_detail_stays_where_it_was_expected_or_says_nothing():
     at = Placement(22.0, 21.0, 0.55)
     even = replace(NEAR, luminance=np.full_like(BLOCKS, 90.0))
     assert coarse_placement(even, far_patch(at, 0.5), prior(at)) is None

@@ -147,15 +147,12 @@ def test_what_stands_on_the_road_is_restored_by_its_foot() -> None:
     assert shown.mean() == pytest.approx(255 * respond(np.array(0.08), Response.SRGB), abs=25)
 
 
-def test_the_airlight_is_that_above_the_horizon() -> None:
+def test_the_airlight_is_that_above_the_horizon_and_leaves_no_edge_below_it() -> None:
     distance = road_distance(CAMERA)[0].astype(np.float64)
     image = image_of(fogged(road(np.random.default_rng(7)), distance))
     for method in METHODS:
         assert restore_contrast(image, CAMERA, K, method=method).airlight == pytest.approx(airlight(), abs=2.0)
-
-
-def test_a_sky_that_brightens_upward_leaves_no_edge_below_the_horizon() -> None:
-    """Foggy skies do: with the light of the upper sky, the road near the horizon would pass for what stands on it."""
+    # Foggy skies do: with the light of the upper sky, the road near the horizon would pass for what stands on it.
     distance = road_distance(CAMERA)[0].astype(np.float64)
     light = fogged(road(np.random.default_rng(3)), distance)
     above = CAMERA.horizon_row - np.arange(CAMERA.height)[:, None, None]

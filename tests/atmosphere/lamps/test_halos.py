@@ -43,12 +43,15 @@ def test_glow_is_the_model_all_over_the_image():
         assert ratio.max() < 1.1
 
 
-def test_glow_has_no_edges():
+def test_glow_has_no_edges_and_the_colour_of_its_lamp():
     ours = drawn(fog(100), lamps((30.0, 0.0, 1.5), area=0.02))[240, 330:, 1]
     steps = ours[1:] / ours[:-1]
     assert steps.max() <= 1.0
     assert steps.min() > 0.8
     assert np.abs(np.diff(steps)).max() < 0.04
+    ours = drawn(fog(100), lamps((40.0, 0.0, 1.5), colour=(2.0, 0.5, 0.25)))[240, ::40]
+    assert ours[:, 0] == pytest.approx(4 * ours[:, 1], rel=1e-4)
+    assert ours[:, 2] == pytest.approx(0.5 * ours[:, 1], rel=1e-4)
 
 
 @pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (1.0 / 0.2126, 0.0, 0.0)])
@@ -98,7 +101,7 @@ def test_what_the_renderer_drew_is_not_added_again():
     assert flux(drawn(fog(math.inf), lamps(place), dusk), place) == pytest.approx(100.0 / 200.0**2, rel=0.01)
 
 
-def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity():
+def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity_and_darkens_no_paint_around_it():
     place, view = (200.0, 0.0, 1.5), empty_view(CAMERA)
     view.radiance[239, 319] = 3.0 * 100.0 / 200.0**2 * 576.9**2
     # What shines at another distance is another lamp.
@@ -107,9 +110,6 @@ def test_a_lamp_smaller_than_its_pixel_is_dimmed_to_its_intensity():
         out = view.radiance.copy()
         Halos().add(out, view, CAMERA, POSE, fog(math.inf), lamps(place))
         assert flux(out, place) == pytest.approx(shown * 100.0 / 200.0**2, rel=0.01)
-
-
-def test_a_lamp_in_daylight_does_not_darken_the_white_paint_around_it():
     view = empty_view(CAMERA, 200.0)
     view.radiance[:] = 1000.0
     view.radiance[230:250, 310:330] = 2000.0
@@ -156,9 +156,3 @@ def test_lamps_fade_smoothly_as_they_pass_the_camera():
     light = [drawn(fog(100), lamps((x, 3.0, 1.5)))[240, 0, 1] for x in np.linspace(1.0, 0.0, 21)]
     assert light[-1] < 1e-3 * light[0]
     assert np.abs(np.diff(light)).max() < 0.25 * light[0]
-
-
-def test_colour_of_a_lamp_is_that_of_its_glow():
-    ours = drawn(fog(100), lamps((40.0, 0.0, 1.5), colour=(2.0, 0.5, 0.25)))[240, ::40]
-    assert ours[:, 0] == pytest.approx(4 * ours[:, 1], rel=1e-4)
-    assert ours[:, 2] == pytest.approx(0.5 * ours[:, 1], rel=1e-4)

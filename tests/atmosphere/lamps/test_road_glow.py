@@ -105,11 +105,6 @@ def read(length: NDArray[np.float32], step: int, values: NDArray[np.float32]) ->
     return count, out
 
 
-def test_pieces_are_as_wide_as_light_allows() -> None:
-    for focal_length, pixels in [(50.0, 1), (144.0, 1), (576.9, 6), (5000.0, 8)]:
-        assert road_glow.piece_length(focal_length) == pixels
-
-
 def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_pixel() -> None:
     values = np.linspace(3.0, 5.0, 101, dtype=np.float32)
     count, out = read(PLANE, 8, values)
@@ -124,6 +119,8 @@ def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_p
     values = np.sin(np.arange(101)).astype(np.float32)
     assert read(PLANE, 1, values)[0] == 101
     assert np.array_equal(read(PLANE, 1, values)[1], values)
+    for focal_length, pixels in [(50.0, 1), (144.0, 1), (576.9, 6), (5000.0, 8)]:
+        assert road_glow.piece_length(focal_length) == pixels
 
 
 def test_points_lie_at_their_distance_along_the_ray() -> None:

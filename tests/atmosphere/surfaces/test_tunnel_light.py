@@ -24,9 +24,6 @@ def test_the_skys_share_is_the_integral_over_the_portal() -> None:
         integrand = z * distance / (np.pi * squared**2)
         integral = float(integrand.sum()) * (HALF_WIDTH / n) * (HEIGHT / n)
         assert sky_share(distance, HALF_WIDTH, HEIGHT) == pytest.approx(integral, rel=2e-3)
-
-
-def test_limits_of_the_skys_share() -> None:
     assert sky_share(0.0, HALF_WIDTH, HEIGHT) == 0.5
     assert sky_share(1e-6, HALF_WIDTH, HEIGHT) == pytest.approx(0.5, abs=1e-5)
     # A portal without end hides, or shows, half of the sky.
@@ -51,12 +48,18 @@ def lit(x: float, distance: float, own: float = 0.0, sky: float = SKY) -> np.nda
     return seen.radiance[..., 1]
 
 
-def test_inside_lamps_alone_light_what_is_far_from_the_portals() -> None:
+def test_inside_lamps_alone_light_what_is_far_from_the_portals_and_shine_in_a_row_under_the_ceiling() -> None:
     deep = lit(250.0, 10.0)[24, 32]
     assert deep == pytest.approx(LAMPS_ON_ROAD / np.pi, rel=0.01)
     # Twice the sky's light outside is none of the lamps' business.
     assert lit(250.0, 10.0, sky=2 * SKY)[24, 32] == pytest.approx(deep, rel=0.01)
     assert lit(250.0, 10.0, own=300.0)[24, 32] == pytest.approx(300.0 + deep, rel=0.01)
+    # A ray that rises by (23.5 − 7) / 60 comes to the ceiling after 13.6 m.
+    ceiling = lit(250.0, 13.6)[7]
+    assert 0.2 < np.median(ceiling[20:44]) / (LAMPS_ON_ROAD / np.pi) < 0.3
+    shining = [lit(float(x), 13.6)[7, 32] for x in range(200, 216)]
+    assert max(shining) > 1e4
+    assert min(shining) < 100.0
 
 
 def test_outside_beside_and_far_away_nothing_changes() -> None:
@@ -68,12 +71,3 @@ def test_outside_beside_and_far_away_nothing_changes() -> None:
     assert light.is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))
     assert not light.is_seen_by(CameraPose((5000.0, 0.0, 1.4), 0.0))
     assert not TunnelLight((), SKY).is_seen_by(CameraPose((0.0, 0.0, 1.4), 0.0))
-
-
-def test_lamps_shine_in_a_row_under_the_ceiling_which_is_darker_than_the_road() -> None:
-    # A ray that rises by (23.5 − 7) / 60 comes to the ceiling after 13.6 m.
-    ceiling = lit(250.0, 13.6)[7]
-    assert 0.2 < np.median(ceiling[20:44]) / (LAMPS_ON_ROAD / np.pi) < 0.3
-    shining = [lit(float(x), 13.6)[7, 32] for x in range(200, 216)]
-    assert max(shining) > 1e4
-    assert min(shining) < 100.0

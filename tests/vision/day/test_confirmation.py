@@ -46,9 +46,6 @@ def test_fog_that_shows_in_both_counts_with_what_camera_and_models_leave_open(lo
     least = math.hypot(OWN.standard_deviation, SCALE * OWN.extinction)
     assert least < found.standard_deviation < math.hypot(least, 1.1 * confirmation.MODEL_DEVIATION * OWN.extinction)
     assert SCALE <= found.common_deviation < 0.2
-
-
-def test_the_interval_spans_a_day_model_that_differs(looked):
     denser = replace(FOG, extinction=0.04, deviation=0.003, median=0.04, interval=(67.0, 86.0))
     low, high = once(looked, OWN, denser).visibility_interval
     assert low < 75.0

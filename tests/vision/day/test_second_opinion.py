@@ -48,9 +48,6 @@ def test_an_estimate_that_is_agreed_with_stays_with_the_calibration_in_its_inter
     assert said(OWN, replace(AGREES, response_deviation=0.1, is_even=False))[0] == found
     unsure, _ = said(OWN, replace(AGREES, response_deviation=0.1, is_sure=False))
     assert unsure.common_deviation == pytest.approx(SCALE)
-
-
-def test_in_a_drive_it_is_looked_at_again_from_time_to_time(said):
     assert said(OWN, AGREES, (0.0, 0.1, 0.2, PERIOD + 0.1))[1] == 2
     assert said(OWN, replace(SILENT, outside=0.9), (0.0, 0.1, 0.2))[1] == 3
 

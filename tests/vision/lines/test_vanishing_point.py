@@ -63,6 +63,9 @@ def test_least_squares_of_lines_that_meet_is_where_they_meet():
     point, covariance = vanishing_point.nearest_point(lines, np.array([1 / 4.0, 1 / 9.0]))
     assert point == pytest.approx(POINT)
     assert covariance == pytest.approx(np.diag([4.0, 9.0]), abs=1e-9)
+    assert vanishing_point.residual_scale(np.array([0.1, -0.1, 0.0])) == 1.0
+    assert vanishing_point.residual_scale(np.array([3.0, 0.0, 0.0, 4.0])) == pytest.approx(math.sqrt(25.0 / 2.0))
+    assert vanishing_point.residual_scale(np.array([2.0, 2.0])) == pytest.approx(math.sqrt(8.0))
 
 
 def test_deviation_of_the_point_is_that_of_many_trials():
@@ -79,12 +82,6 @@ def test_deviation_of_the_point_is_that_of_many_trials():
     )
     expected = vanishing_point.nearest_point(exact, weight)[1]
     assert np.cov(found.T) == pytest.approx(expected, abs=0.1 * expected[1, 1])
-
-
-def test_residuals_widen_a_deviation_and_never_narrow_it():
-    assert vanishing_point.residual_scale(np.array([0.1, -0.1, 0.0])) == 1.0
-    assert vanishing_point.residual_scale(np.array([3.0, 0.0, 0.0, 4.0])) == pytest.approx(math.sqrt(25.0 / 2.0))
-    assert vanishing_point.residual_scale(np.array([2.0, 2.0])) == pytest.approx(math.sqrt(8.0))
 
 
 FIRST = math.ceil(ROW) + 20
@@ -112,12 +109,10 @@ def test_exact_lines_meet_exactly_in_rows_of_the_whole_image():
     lines = [line_through(300.0, 50.0, slope) for slope in (-2.0, 2.5)]
     point = vanishing_point.published_vanishing_point(lines, 7)
     assert (point.column, point.row) == pytest.approx((300.0, 57.0), abs=1e-9)
-
-
-@pytest.mark.parametrize("slopes", [(), (1.2,), (0.8, 1.1), (1.0, 1.0, 1.0)])
-def test_too_few_lines_and_parallel_ones_have_no_point(slopes):
-    lines = [line_through(300.0 + i, 50.0, slope) for i, slope in enumerate(slopes)]
-    assert vanishing_point.published_vanishing_point(lines, 0) is None
+    # Too few lines and parallel ones have no point.
+    for slopes in ((), (1.2,), (0.8, 1.1), (1.0, 1.0, 1.0)):
+        lines = [line_through(300.0 + i, 50.0, slope) for i, slope in enumerate(slopes)]
+        assert vanishing_point.published_vanishing_point(lines, 0) is None
 
 
 def found(image, guess=(325.0, 64.0)):

@@ -71,14 +71,11 @@ def test_smoothing_never_rises_and_keeps_what_falls():
     assert decreasing(np.array([5.0, 3.0, 4.0, 1.0, 2.0, 3.0])) == pytest.approx([4.625, 3.875, 3.125, 2.375, 2, 2])
 
 
-def test_profile_is_indifferent_to_narrow_marks():
+def test_a_profile_is_indifferent_to_narrow_marks_and_has_the_mean_of_a_slope_across():
     image = np.repeat(np.linspace(200, 60, 50, dtype=np.float32)[:, None], 90, axis=1)
     marked = image.copy()
     marked[:, 40:43] = 255
     assert band_profile(marked, Band(0, 89, 0, 49)) == pytest.approx(image[:, 0])
-
-
-def test_a_profile_has_the_mean_of_a_slope_across_whatever_the_bands_width():
     slope = np.arange(300.0, dtype=np.float32) + np.zeros((4, 1), np.float32)
     for width in (1, 2, 47, 48, 49, 200):
         middle = band_profile(slope, Band(10, 9 + width, 0, 3))

@@ -44,12 +44,6 @@ def test_region_does_not_enter_edges_and_goes_round_them():
     assert region[14, 14] == 1
 
 
-def test_equal_steps_are_the_constant_limits_of_the_papers():
-    summed, constant = even(EVEN), constant_limits(50, 5.0, 5.0, 5.0)
-    assert summed.from_seed.tolist() == constant.from_seed.tolist() == [250.0 - 5.0 * row for row in range(50)]
-    assert summed.steps.tolist() == constant.steps.tolist()
-
-
 def test_a_slope_joins_step_by_step_only_as_far_as_the_seed_allows():
     image = np.repeat(np.linspace(157, 60, 98, dtype=np.float32)[:, None], 40, axis=1)
     edges = np.zeros(image.shape, np.uint8)
@@ -57,6 +51,9 @@ def test_a_slope_joins_step_by_step_only_as_far_as_the_seed_allows():
     region = grow_region(image, edges, constant_limits(98, 1.0, 0.5, 10.0))
     assert region.any(axis=1).sum() == 21
     assert not grow_region(image, edges, constant_limits(98, 0.9, 1.0, 10.0))[:-1].any()
+    summed, constant = even(EVEN), constant_limits(50, 5.0, 5.0, 5.0)
+    assert summed.from_seed.tolist() == constant.from_seed.tolist() == [250.0 - 5.0 * row for row in range(50)]
+    assert summed.steps.tolist() == constant.steps.tolist()
 
 
 def test_medians_are_those_of_the_regions_pixels():

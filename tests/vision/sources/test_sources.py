@@ -17,6 +17,10 @@ def test_lamps_are_found_where_they_are() -> None:
     assert len(tree) == 2
     assert np.array([tree.centres(one)[0] for one in range(2)]) == pytest.approx(np.array(TWO)[:, :2], abs=0.3)
     assert tree.nodes[0, :, AREA] == pytest.approx([math.pi * 16, math.pi * 36], rel=0.15)
+    many = tuple((float(x), float(y), 2.5, 300.0) for x in range(0, 320, 20) for y in range(0, 240, 20))
+    tree = source_tree(picture(many))
+    assert len(tree) == 48
+    assert np.isfinite([one.steepness for one in halos_of(tree)]).all()
 
 
 def test_red_lamps_are_as_good_as_white_ones_and_more_bits_change_nothing() -> None:
@@ -87,10 +91,3 @@ def test_pictures_without_lamps_say_why() -> None:
     road[100:103, 10:200] = 255
     assert "shape of a lamp" in source_tree(road).trouble
     assert halos_of(source_tree(road)) == ()
-
-
-def test_lamps_at_the_border_and_many_of_them() -> None:
-    many = tuple((float(x), float(y), 2.5, 300.0) for x in range(0, 320, 20) for y in range(0, 240, 20))
-    tree = source_tree(picture(many))
-    assert len(tree) == 48
-    assert np.isfinite([one.steepness for one in halos_of(tree)]).all()

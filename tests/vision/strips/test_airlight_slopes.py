@@ -193,27 +193,21 @@ def test_an_open_sky_is_the_airlight_within_its_deviation():
     assert (prior.shift, prior.shift_deviation) == (0.0, HORIZON.standard_deviation)
     assert (prior.vignetting, prior.vignetting_deviation) == (0.4, 0.05)
     assert joint_prior(SKY, CAMERA, replace(HORIZON, row=HORIZON.row + 1.7)).shift == pytest.approx(1.7)
-
-
-def test_airlight_is_as_uneven_as_a_sky_that_trees_and_rounding_do_not_explain():
     cloud = [joint_prior(SKY._replace(unevenness=uneven), CAMERA, HORIZON).cloud for uneven in (0.0, 0.015, 0.025, 0.5)]
     assert cloud[:2] == [0.0, 0.0]
     assert 0.0 < cloud[2] < cloud[3] == MOST_CLOUD
 
 
-def test_of_a_clipped_sky_half_of_whose_pixels_are_saturated_the_mean_is_half_a_level_below_the_end():
-    assert clipped(0.5).airlight == pytest.approx(254.5)
-    brightness = [clipped(share).airlight for share in (0.1, 0.3, 0.5, 0.9, 0.97)]
-    assert brightness == sorted(brightness)
-
-
-def test_a_wholly_saturated_sky_may_be_much_brighter_and_hardly_darker():
+def test_a_wholly_saturated_sky_may_be_much_brighter_and_half_saturated_it_is_half_a_level_below_the_end():
     prior = clipped(1.0)
     assert prior.airlight >= 255.0
     assert prior.above == pytest.approx(OVEREXPOSURE * 255.0)
     assert prior.below < 3.0
     # Where but one colour is clipped, the others still show how bright it is.
     assert clipped(0.0).above < 0.5 * prior.above
+    assert clipped(0.5).airlight == pytest.approx(254.5)
+    brightness = [clipped(share).airlight for share in (0.1, 0.3, 0.5, 0.9, 0.97)]
+    assert brightness == sorted(brightness)
 
 
 LARGE = (-2.0, -1.0, 0.0)
@@ -228,12 +222,6 @@ def learnt(*pictures, speed=20.0, period=1.0):
     return memory.chances
 
 
-def test_before_and_after_pictures_that_say_nothing_chances_are_those_beforehand():
-    assert DropletMemory().chances == pytest.approx(DROPLET_CHANCES)
-    assert learnt((), (), ()) == pytest.approx(DROPLET_CHANCES)
-    assert learnt(*[(0.0, 0.0, 0.0)] * 5) == pytest.approx(DROPLET_CHANCES)
-
-
 def test_a_picture_counts_by_the_road_in_it_that_is_new():
     standing = learnt(*[LARGE] * 50, speed=0.0)
     assert standing == pytest.approx(DROPLET_CHANCES)
@@ -243,6 +231,9 @@ def test_a_picture_counts_by_the_road_in_it_that_is_new():
     # As often as one likes: the way decides.
     often, seldom = learnt(*[LARGE] * 101, period=0.05), learnt(*[LARGE] * 6, period=1.0)
     assert often == pytest.approx(seldom, abs=0.02)
+    assert DropletMemory().chances == pytest.approx(DROPLET_CHANCES)
+    assert learnt((), (), ()) == pytest.approx(DROPLET_CHANCES)
+    assert learnt(*[(0.0, 0.0, 0.0)] * 5) == pytest.approx(DROPLET_CHANCES)
 
 
 def test_over_a_way_pictures_overrule_what_is_usual_one_alone_cannot_and_all_is_forgotten():

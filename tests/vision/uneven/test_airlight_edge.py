@@ -63,13 +63,10 @@ def test_what_stands_all_along_the_horizon_or_a_clipped_sky_tells_of_none():
     assert airlight_edge(drawn(0.0015, 150.0), GEOMETRY, CAMERA, clipped, fitted(0.0015), 0.2) is None
 
 
-def test_an_unsure_horizon_hides_fronts_that_are_near_to_it():
+def test_an_unsure_horizon_and_a_crest_hide_fronts():
     seen = drawn(0.0015, 240.0)
     assert airlight_edge(seen, GEOMETRY, CAMERA, SKY, fitted(0.0015), 0.2) is not None
     assert airlight_edge(seen, GEOMETRY, CAMERA, SKY, fitted(0.0015), 2.0) is None
-
-
-def test_rows_that_a_crest_hides_do_not_count():
     hidden = GEOMETRY.distance > 90.0
     crest = GEOMETRY._replace(
         below=np.where(hidden, 1.2, GEOMETRY.below), distance=np.where(hidden, 664.0, GEOMETRY.distance)

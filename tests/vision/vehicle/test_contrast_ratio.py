@@ -67,15 +67,9 @@ def test_boxes_are_plain_means_and_share_pixels_by_area():
     means, noise = box_means(PICTURE, np.array([7.25]), np.array([10.0]), 1.0)
     assert means[0, 0] == pytest.approx(0.75 * PICTURE[7, 10] + 0.25 * PICTURE[8, 10])
     assert noise == pytest.approx(0.75**2 + 0.25**2)
-
-
-def test_a_slope_is_seen_at_the_middle_of_a_box_of_any_width():
     slope = np.arange(30.0)[:, None] + 2.0 * np.arange(40.0)
     means, _ = box_means(slope, np.array([11.0]), np.array([17.0]), 4.6)
     assert means[0, 0] == pytest.approx(11.0 + 2.0 * 17.0)
-
-
-def test_the_border_is_not_shared_with_what_is_beyond():
     means, _ = box_means(np.full((30, 40), 0.7), np.array([-0.5, 29.4]), np.array([-1.0, 40.0]), 4.0)
     assert means == pytest.approx(np.full((2, 2), 0.7))
     outside, noise = box_means(PICTURE, np.array([-9.0, 50.0]), np.array([-9.0, 60.0]), 4.0)

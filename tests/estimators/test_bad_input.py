@@ -4,13 +4,12 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import cache
 from itertools import islice, product
 
 import numpy as np
 import pytest
 
-from fogsim.core.registry import parameters
 from fogsim.errors import FogSimError, InputError
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, SignSighting
@@ -213,15 +212,6 @@ def test_other_variants_are_as_careful(method, options):
             assert found.valid == (found.standard_deviation < math.inf)
 
 
-def test_a_calibration_that_is_no_number_cannot_be_made():
-    for value in ODD:
-        for key in ("focal_length", "mount_height", "pitch", "roll"):
-            with pytest.raises(InputError, match=key):
-                dataclasses.replace(CAMERA, **{key: value})
-        with pytest.raises(InputError, match="principal_point must be two finite numbers"):
-            dataclasses.replace(CAMERA, principal_point=(value, 10.0))
-
-
 GREY = np.full((ROWS, COLS), 90, np.uint8)
 WRONG_IMAGES = {
     "none": (None, "an array of uint8 or an array of uint16, got None"),
@@ -242,14 +232,32 @@ WRONG_IMAGES = {
 }
 
 
+WRONG_TIMES = (
+    (PERIOD, r"before that of an earlier one, 0\.8 s, got 0\.4 s; call reset\(\)"),
+    (math.nan, "time must be a number, finite, got nan"),
+    (math.inf, "time must be a number, finite, got inf"),
+    (-math.inf, "time must be a number, finite, got -inf"),
+    (None, "time must be a number, finite, got None"),
+    ("3", "time must be a number, finite, got '3'"),
+)
+OTHER_CAMERAS = {"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}
+
+
 @pytest.mark.parametrize("method", METHODS)
-def test_an_image_of_the_wrong_kind_is_told_and_leaves_no_trace(method, sequence, undisturbed):
+def test_frames_that_cannot_be_are_told_and_leave_no_trace(method, sequence, undisturbed):
     """The error says what was expected and what came, and later estimates are those of a drive without the frame."""
     disturbed = make(method, CAMERA)
     for index, frame in enumerate(sequence):
         for image, told in WRONG_IMAGES.values() if index in (0, 3) else ():
             with pytest.raises(InputError, match=told):
                 disturbed.update(observation(image, index))
+        for time, told in WRONG_TIMES if index == 3 else ():
+            with pytest.raises(InputError, match=told):
+                disturbed.update(observation(frame, frame=Frame(time, frame, CAMERA)))
+        for changes in OTHER_CAMERAS if index == 3 else ():
+            other = Frame(PERIOD * index, GREY, dataclasses.replace(CAMERA, **changes))
+            with pytest.raises(InputError, match="camera must be that of the estimator"):
+                disturbed.update(observation(GREY, frame=other))
         assert said(disturbed.update(observation(frame, index))) == undisturbed(method)[index]
 
 
@@ -309,30 +317,9 @@ def test_an_odd_sign_is_refused_or_made_nothing_of(method, sequence):
     frames = sequence[:5]
     odd = product(("value", "distance", "lateral", "diameter"), (*ODD, -1.0, 0.0, 1e9))
     # To other methods than those of signs, all of them mean the same: nothing.
-    for field, value in odd if method in FOR_SIGNS else islice(odd, 0, None, 5):
+    for field, value in odd if method in FOR_SIGNS else islice(odd, 1):
         sign = dataclasses.replace(observation(GREY).signs[0], **{field: value})
         sound_or_told(method, frames, *[{"signs": (sign,)}] * len(frames))
-
-
-WRONG_TIMES = (
-    (PERIOD, r"before that of an earlier one, 0\.8 s, got 0\.4 s; call reset\(\)"),
-    (math.nan, "time must be a number, finite, got nan"),
-    (math.inf, "time must be a number, finite, got inf"),
-    (-math.inf, "time must be a number, finite, got -inf"),
-    (None, "time must be a number, finite, got None"),
-    ("3", "time must be a number, finite, got '3'"),
-)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_time_that_no_clock_shows_is_told_and_leaves_no_trace(method, sequence, undisturbed):
-    disturbed = make(method, CAMERA)
-    for index, image in enumerate(sequence):
-        assert said(disturbed.update(observation(image, index))) == undisturbed(method)[index]
-        if index == 2:
-            for time, told in WRONG_TIMES:
-                with pytest.raises(InputError, match=told):
-                    disturbed.update(observation(image, frame=Frame(time, image, CAMERA)))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -342,22 +329,3 @@ def test_time_may_stand_and_begins_anew_after_a_reset(method, sequence):
         check_sound(estimator.update(observation(sequence[0], frame=Frame(time, sequence[0], CAMERA))), method)
     estimator.reset()
     check_sound(estimator.update(observation(sequence[0])), method)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_frame_of_another_camera_is_told(method):
-    estimator = make(method, CAMERA)
-    for changes in ({"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}):
-        other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
-        with pytest.raises(InputError, match="camera must be that of the estimator"):
-            estimator.update(observation(GREY, frame=other))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_parameter_that_is_none_is_told(method):
-    """By the registry and by the class itself: with the parameter's name and what came."""
-    values = ("x", None, [1.0], math.nan, math.inf, -math.inf, -1.0, 1e300, 1j)
-    for (name, default), value in product(parameters(ESTIMATORS[method]).items(), values):
-        for build in (partial(make, method), ESTIMATORS[method]) if value != default else ():
-            with pytest.raises(InputError, match=rf"{name}\b.* must be .*got {re.escape(repr(value))}"):
-                build(CAMERA, **{name: value})

@@ -42,12 +42,6 @@ def test_patches_cost_the_same_share_in_every_fog():
     assert found.max() < 1.3 * found.min()
 
 
-def test_the_bound_without_priors_is_in_proportion_to_the_noise():
-    noisy, quiet = (extinction_bound(CAMERA, replace(SCENE, noise=noise)) for noise in (4.0, 2.0))
-    assert noisy == pytest.approx(2.0 * quiet)
-    assert extinction_bound(CAMERA, replace(SCENE, noise=0.001)) == pytest.approx(quiet / 2000.0)
-
-
 def test_patches_hide_more_than_a_good_camera_wins():
     good = replace(SCENE, noise=0.01)
     assert extinction_bound(CAMERA, replace(good, **PATCHES)) > 100.0 * extinction_bound(CAMERA, good)
@@ -132,8 +126,9 @@ def differences(function, at, steps):
     return [(function(*(at + step)) - function(*(at - step))) / (2.0 * step.sum()) for step in np.diag(steps)]
 
 
-def test_patches_are_those_whose_edges_lie_anywhere():
-    deviation, length, noise = 0.05, 4.0, 1.0
+@pytest.mark.parametrize("deviation", [0.0, 0.05])
+def test_patches_are_those_whose_edges_lie_anywhere(deviation):
+    length, noise = 4.0, 2.0
     truth, steps = np.array([0.03, 200.0, 60.0, 0.0]), np.array([1e-6, 1e-2, 1e-2, 1e-6])
     *_, pixels, near, far = row_levels(SMALL, *truth)
     alike, phases = np.zeros((len(near), len(near))), 200
@@ -168,50 +163,9 @@ def test_patches_are_those_whose_edges_lie_anywhere():
     assert extinction_bound(SMALL, scene) == pytest.approx(np.linalg.inv(information)[0, 0] ** 0.5, rel=2e-3)
 
 
-@pytest.mark.parametrize("deviation", [pytest.param(0.0, marks=pytest.mark.nightly), TENTH])
-def test_least_squares_are_as_good_as_the_bound(deviation):
-    """Gauss–Newton on rows of the model, the pitch drawn from its prior; spreads of 2000 are known to 1.6 %."""
-    rng, draws = np.random.default_rng(5), 2000
-    truth, steps = np.array([0.03, 200.0, 60.0, 0.0]), np.array([1e-6, 1e-2, 1e-2, 1e-6])
-    pixels = row_levels(SMALL, *truth)[2]
-    sky = SMALL.width * np.count_nonzero(np.arange(120) <= SMALL.horizon_row - 1.0)
-
-    def seen(*values):
-        """All that is measured, in its deviations: rows, the sky, and the pitch as it is told."""
-        return np.concatenate(
-            (row_levels(SMALL, *values)[0] * pixels**0.5, [values[1] * sky**0.5, values[3] / (deviation or 1e-9)])
-        )
-
-    slopes = np.array(differences(seen, truth, steps))
-    errors = []
-    for _ in range(draws):
-        true = truth + np.array([0.0, 0.0, 0.0, rng.normal(0.0, deviation)])
-        measured = seen(*true) + rng.normal(0.0, 1.0, len(pixels) + 2)
-        # What is told of the pitch is 0, whatever it is.
-        measured[-1] = 0.0
-        fitted = truth.copy()
-        for _ in range(3):
-            fitted += np.linalg.solve(slopes @ slopes.T, slopes @ (measured - seen(*fitted)))
-        errors.append(fitted[0] - truth[0])
-    bound = extinction_bound(SMALL, replace(SCENE, extinction=0.03, noise=1.0, pitch_deviation=deviation))
-    assert np.std(errors) == pytest.approx(bound, rel=0.06)
-    assert abs(np.mean(errors)) < 4.0 * bound / draws**0.5
-
-
-@pytest.mark.parametrize(
-    ("option", "expected"),
-    [
-        ({"extinction": -0.01}, "FoggyRoad: extinction must be a number 0 … 10 1/m, got -0.01"),
-        ({"noise": 0.0}, "FoggyRoad: noise must be a number 0.001 … 1e.06 grey levels, got 0.0"),
-        ({"airlight": math.nan}, "FoggyRoad: airlight must be a number 0 … 1e.06 grey levels, got nan"),
-        ({"road": math.inf}, "FoggyRoad: road must be a number 0 … 1e.06 grey levels, got inf"),
-        ({"lanes": 1.5}, "FoggyRoad: lanes must be a whole number 1 … 20, got 1.5"),
-        ({"lane_width": 0.0}, "FoggyRoad: lane_width must be a number 0.1 … 100 m, got 0.0"),
-        ({"pitch_deviation": -1.0}, "FoggyRoad: pitch_deviation must be a number 0 … 0.2 rad, got -1.0"),
-        ({"patch_deviation": 3.0}, "FoggyRoad: patch_deviation must be a number 0 … 1, got 3.0"),
-        ({"patch_length": 0.0}, "FoggyRoad: patch_length must be a number 0.01 … 1000 m, got 0.0"),
-    ],
-)
-def test_what_no_road_can_be_is_refused(option, expected):
-    with pytest.raises(InputError, match=expected):
-        replace(SCENE, **option)
+def test_what_no_road_can_be_is_refused():
+    below = dict.fromkeys(("noise", "lane_width", "patch_length"), 0.0) | {"extinction": -0.01, "pitch_deviation": -1.0}
+    other = {"airlight": math.nan, "road": math.inf, "lanes": 1.5, "patch_deviation": 3.0}
+    for name, value in (below | other).items():
+        with pytest.raises(InputError, match=f"FoggyRoad: {name} must be a (whole )?number .*, got {value}"):
+            replace(SCENE, **{name: value})

@@ -1,6 +1,7 @@
 """Visibility from two cameras: pairs of pictures made here, and drives."""
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -17,8 +18,10 @@ BASELINE, AIRLIGHT, DARK = 0.5, 200.0, 10.0
 DISPARITIES = (3, 4, 5, 6, 8, 10, 12, 15, 20)
 QUIET = (EARLY, "traffic.events=[]", "clocks.camera_period_s=1", "clocks.decision_period_s=1", "duration_s=4")
 SMALL = ("camera.width=320", "camera.height=240", "estimators=[negru2013]")
+RIG = "camera.stereo={baseline_m: 0.4, baseline_error_percent: 10}"
 
 
+@functools.cache
 def pair(
     visibility: float, disparities: tuple[int, ...] = DISPARITIES, shift: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -114,25 +117,24 @@ def test_a_drive_in_fog_is_read_by_a_rig():
     assert np.median([one.visibility for one in told]) == pytest.approx(120.0, rel=0.15)
 
 
-def test_a_second_camera_changes_nothing_of_the_first():
-    alone, rig = drive(*SMALL), drive(*SMALL, "camera.stereo={}")
-    for one, other in zip(alone, rig, strict=True):
+@pytest.fixture(scope="module")
+def rig() -> list[Step]:
+    return drive(*SMALL, RIG)
+
+
+def test_a_second_camera_changes_nothing_of_the_first_and_has_the_error_of_its_calibration(rig):
+    for one, other in zip(drive(*SMALL), rig, strict=True):
         assert one.observation.right is None
         np.testing.assert_array_equal(one.observation.image, other.observation.image)
         assert one.traffic.position.tolist() == other.traffic.position.tolist()
         assert other.observation.right.image.shape == other.observation.image.shape
         assert not np.array_equal(other.observation.right.image, other.observation.image)
+        assert other.observation.right.baseline == pytest.approx(0.44)
 
 
-def test_what_the_rig_is_told_has_the_errors_of_its_calibration():
-    steps = drive(*SMALL, "camera.stereo={baseline_m: 0.4, baseline_error_percent: 10}")
-    assert steps[0].observation.right.baseline == pytest.approx(0.44)
-
-
-def test_both_pictures_are_late_together():
-    fault = "sensors.faults=[{sensor: camera, fault: latency, delay_s: 1}]"
-    prompt, late = drive(*SMALL, "camera.stereo={}"), drive(*SMALL, "camera.stereo={}", fault)
-    for before, now in zip(prompt[1:], late[2:], strict=False):
+def test_both_pictures_are_late_together(rig):
+    late = drive(*SMALL, RIG, "sensors.faults=[{sensor: camera, fault: latency, delay_s: 1}]")
+    for before, now in zip(rig[1:], late[2:], strict=False):
         if np.array_equal(before.observation.image, now.observation.image):
             np.testing.assert_array_equal(before.observation.right.image, now.observation.right.image)
             break

@@ -16,18 +16,10 @@ from country import random_country
 from flat_road import Road, photograph, scan
 from windscreen import draw, small_scenes
 
-from fogsim.estimators import ESTIMATORS, make
-from fogsim.offline import NIGHT_METHODS
+from fogsim.estimators import make
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
+from tests.estimators.test_metamorphic import METHODS
 
-OF_SIGNS = {"belaroussi2015", "sign_contrast"}
-"""They need a map, which these pictures do not have."""
-
-OTHER_SENSORS = {"hautiere2006_stereo", "gabb2014", "scatterometer"}
-"""A second camera to the right is another rig when mirrored, a vehicle that stays in sight gives bounds alone (below),
-and a scatterometer looks at no picture."""
-
-METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - OTHER_SENSORS - set(NIGHT_METHODS))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0)
 DRIVEN = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0), np.radians(-3.0))
 

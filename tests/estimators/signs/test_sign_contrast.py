@@ -1,6 +1,7 @@
 """sign_contrast on painted signs: the fog behind the light of a face, and what wrong signs and maps do."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,13 +21,9 @@ def drive(visibility: float, *, along: float = 0.0, **how):
     estimator = make("sign_contrast", CAMERA)
     for i, d in enumerate(WAY):
         seen = observed(d, visibility, time=0.2 * i, **how)
-        told = tuple(type(s)(s.sign_id, s.kind, s.value, s.distance + along, *_rest(s)) for s in seen.signs)
-        found = estimator.update(type(seen)(seen.frame, seen.speed, None, told))
+        told = tuple(replace(sign, distance=sign.distance + along) for sign in seen.signs)
+        found = estimator.update(replace(seen, signs=told))
     return found
-
-
-def _rest(sign):
-    return sign.lateral, sign.diameter, sign.height, sign.facing
 
 
 @pytest.mark.parametrize("visibility", [80.0, 150.0, 300.0])

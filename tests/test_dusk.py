@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.camera import mounted_pose
-from fogsim.scenario import build
 from fogsim.simulation.ego.daylight import Ramp, in_daylight
-from fogsim.simulation.ego.view_rendering import ViewRenderer
-from fogsim.values import Lamp, SignMap
-from tests.test_grades import SETTINGS, road, traffic
+from fogsim.values import Lamp
+from tests.test_grades import placed
 
 DUSK = "timeline=[{when: time >= 1 s, do: {light: {illuminance: 0.05 lx, over: 60 s, course: factors}}}]"
 LIT = Lamp.POSITION | Lamp.LOW_BEAM
@@ -20,14 +17,7 @@ Picture = Callable[[float], np.ndarray]
 
 def pictures(*settings: str) -> Iterator[Picture]:
     """What the camera of one scenario gets by an illuminance [lx]."""
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
-    view_renderer, state = (
-        ViewRenderer(build.world_config(scenario), build.camera_config(scenario), road(0.0), SignMap()),
-        traffic(0.0, 400.0, LIT),
-    )
-    pose = mounted_pose(
-        build.camera_config(scenario).on(), state.position[0], 0.0, build.camera_config(scenario).mount().setback, 0.0
-    )
+    view_renderer, state, pose = placed(0.0, settings, LIT)
     clear = view_renderer.fog
 
     def picture(illuminance: float) -> np.ndarray:

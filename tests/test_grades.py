@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from fogsim.simulation.ego.fog_truth import fog_truth
 from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import (
     Camera,
+    CameraPose,
     Command,
     FogField,
     Lamp,
@@ -72,20 +74,17 @@ def traffic(grade: float, station: float, lamps: Lamp = Lamp.POSITION) -> Traffi
     )
 
 
+def placed(grade: float, settings: Sequence[str], lamps: Lamp) -> tuple[ViewRenderer, TrafficState, CameraPose]:
+    """What draws the road, the ego and the other car on it, and the camera's pose."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
+    camera, state = build.camera_config(scenario), traffic(grade, 400.0, lamps)
+    pose = mounted_pose(camera.on(), state.position[0], 0.0, camera.mount().setback, float(state.grade[0]))
+    return ViewRenderer(build.world_config(scenario), camera, road(grade), SignMap()), state, pose
+
+
 def look(grade: float, *settings: str, lamps: Lamp = Lamp.POSITION) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instance ids, distances and radiance."""
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
-    view_renderer, state = (
-        ViewRenderer(build.world_config(scenario), build.camera_config(scenario), road(grade), SignMap()),
-        traffic(grade, 400.0, lamps),
-    )
-    pose = mounted_pose(
-        build.camera_config(scenario).on(),
-        state.position[0],
-        0.0,
-        build.camera_config(scenario).mount().setback,
-        float(state.grade[0]),
-    )
+    view_renderer, state, pose = placed(grade, settings, lamps)
     view, radiance = view_renderer.render(state, 0, pose, 0.0)
     view_renderer.close()
     return view.instance.copy(), view.distance.copy(), radiance.copy()

@@ -112,13 +112,6 @@ def test_drivers_who_see_through_fog_drive_in_it_as_in_clear_air() -> None:
         np.testing.assert_array_equal(position, step.traffic.position)
 
 
-def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
-    steps = list(fogsim.run(small("clocks.camera_period_s=0.5"), seed=1))
-    assert len(steps) == 9
-    moved = np.diff([s.route_position for s in steps])
-    assert np.all(moved > 10.0)  # half a second at more than 20 m/s
-
-
 @pytest.mark.parametrize(
     "visibility", [50.0, *(pytest.param(one, marks=pytest.mark.nightly) for one in (100.0, 200.0))]
 )

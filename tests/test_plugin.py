@@ -14,6 +14,7 @@ import fogsim
 from fogsim.core.randomness import spawn_streams
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.scenario import build
+from fogsim.simulation.plugin import AttachedSession
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, EgoControl, Lamp, SpeedAdvice, Step
@@ -35,10 +36,10 @@ def connection(sumo_process: Callable) -> Iterator[Any]:
         yield connection
 
 
-def users_loop(api: Any, steps: int, **options: Any) -> list[Step | None]:
+def users_loop(api: Any, steps: int) -> list[Step | None]:
     """What a user writes."""
     seen = []
-    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL, **options) as session:
+    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL) as session:
         for _ in range(steps):
             api.simulationStep()
             step = session.observe()
@@ -46,6 +47,14 @@ def users_loop(api: Any, steps: int, **options: Any) -> list[Step | None]:
                 session.advise(step)
             seen.append(step)
     return seen
+
+
+def observed(api: Any, session: AttachedSession, steps: int) -> Iterator[Step]:
+    """What a session sees of the ego in so many steps."""
+    for _ in range(steps):
+        api.simulationStep()
+        if (step := session.observe()) is not None:
+            yield step
 
 
 def test_steps_come_while_the_ego_is_on_the_road(libsumo: Any) -> None:
@@ -79,12 +88,9 @@ def test_traci_shows_the_same_as_libsumo(libsumo: Any, connection: Any) -> None:
 def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) -> None:
     session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=SMALL, drivers=False)
     speeds = []
-    for _ in range(88):
-        libsumo.simulationStep()
-        step = session.observe()
-        if step is not None:
-            speeds.append(float(step.traffic.speed[step.ego]))
-            session.advise(step, Command(SpeedAdvice(4.0)))
+    for step in observed(libsumo, session, 88):
+        speeds.append(float(step.traffic.speed[step.ego]))
+        session.advise(step, Command(SpeedAdvice(4.0)))
     assert len(speeds) > 10
     assert speeds[-1] <= 4.0 + 1e-6
     session.close()
@@ -100,12 +106,7 @@ def test_clocks_of_a_scenario_give_way_to_the_simulations_step(libsumo: Any) -> 
     """The motorway's five frames of 0.1 s between two decisions would be 2.5 s here."""
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=30"])
     session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, drivers=False)
-    limits = []
-    for _ in range(76):
-        libsumo.simulationStep()
-        step = session.observe()
-        if step is not None:
-            limits.append(session.advise(step).advice)
+    limits = [session.advise(step).advice for step in observed(libsumo, session, 76)]
     session.close()
     # Advice decides about its rise at each step, if it decides at each.
     assert len(limits) > 3
@@ -209,10 +210,7 @@ def test_the_users_own_subscriptions_keep_their_results(connection: Any) -> None
 def test_a_scenario_gives_fog_and_camera(libsumo: Any) -> None:
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=50"])
     session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, net=GRID / "grid.net.xml")
-    step = None
-    while step is None:
-        libsumo.simulationStep()
-        step = session.observe()
+    step = next(observed(libsumo, session, 100))
     session.close()
     assert step.truth.visibility == pytest.approx(50.0)
 
@@ -304,12 +302,9 @@ def test_a_timeline_is_played_in_the_users_loop_and_all_is_given_back(libsumo: A
     settings = (*SMALL, f"timeline=[{{name: slow, when: time >= 1 s, do: {do}}}, {{when: time > 99 s, do: {do}}}]")
     libsumo.simulationStep(40.0)
     mode = libsumo.vehicle.getSpeedMode(EGO)
-    begun, last = [], None
+    begun = []
     session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=settings)
-    for _ in range(24):
-        libsumo.simulationStep()
-        last = session.observe()
-        assert last is not None
+    for last in observed(libsumo, session, 24):
         session.advise(last)
         session.advise(last)  # the same step begins nothing twice
         begun += [(one.name, one.time) for one in last.begun]
@@ -317,7 +312,6 @@ def test_a_timeline_is_played_in_the_users_loop_and_all_is_given_back(libsumo: A
     with pytest.warns(UnplayedWarning, match=r"timeline\.1 .*its condition never held"):
         session.close()
     assert begun == [("slow", 1.0)]
-    assert last is not None
     assert last.traffic.speed[last.ego] == pytest.approx(5.0)
     assert last.truth.visibility == pytest.approx(60.0)
     assert last.traffic.lamps[last.ego] & (Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT)

@@ -9,7 +9,6 @@ import pytest
 from tests.helpers.command import run_script
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
-SLOW = pytest.mark.nightly
 
 
 def records(name: str, *arguments: str) -> list[dict[str, Any]]:
@@ -20,109 +19,50 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
     return result
 
 
+QUICK = {
+    "junctions.py --seeds 1 --minutes 2 --visibility 20": (
+        "visibility_m crossings accepted_least_s refused_most_s collisions_per_1000 impact_mps"
+    ),
+    "metrics.py --frames none --vehicles 6 --seconds 4 --block 2": (
+        "frames vehicles_read ms_step ms_metrics share share_low share_high blocks"
+    ),
+    "traffic.py --vehicles 20 --seconds 1": "vehicles ms_sumo ms_total ratio",
+}
+"""Keys of the records of benchmarks by command."""
+
+SLOW = {
+    "loop.py --size 64x48 --steps 3 --repeat 1": "env camera vehicles steps_per_s",
+    "photograph_roads.py --images 1": "pool method visibility_m pictures valid_share",
+    "environments.py --env fogsim/FogAdvisory-v1 --steps 2 --repeat 1 --resets 1 --no-workers": (
+        "env camera vehicles steps_per_s peer_steps_per_s reset_ms reset_other_ms"
+    ),
+    "sign_detector.py --pictures painted --kinds stop --visibilities 100 --distances 20 40 --draws 1 --frames 0": (
+        "pictures kind operating_range_m recall_half_pct false_alarms_with false_alarms_without"
+    ),
+    "resets.py --resets 2 --part environment": "ms_median growth_kib_per_reset",
+    "estimator_accuracy.py --cameras 1 --scenes 1 --draws 1": "method visibility median_pct p95_pct valid_share ms",
+    "told_calibration.py --cameras 1 --scenes 1 --visibilities 100 --methods negru2013": (
+        "error method visibility marks valid_share median_pct median_size_pct p95_size_pct"
+    ),
+    "lead_accuracy.py --cameras 1 --vehicles 1 --step 10 --methods huang2015_lead": (
+        "method visibility airlight camera vehicle median_pct p95_pct coverage ms"
+    ),
+    "restoration.py --vehicles 1 --step 1 --visibilities 100": (
+        "pool visibility_m method psnr_db ssim e r s_pct sift_range_m range_ratio ms"
+    ),
+    "frames.py --size 64x48 --frames 2 --repeat 1": "renderer light width height samples ms_median ms_min ms_render",
+    "renderers.py --renderers 4 --frames 8 --renderer cpu": "growth_kib_per_renderer growth_kib_per_1000_frames",
+    "grades.py --visibility 100 --duration 1 --drawings 1": "V_met road method frames valid bias median p95 held",
+}
+
+
 @pytest.mark.parametrize(
-    ("name", "arguments", "keys"),
-    [
-        pytest.param(
-            "loop.py",
-            ("--size", "64x48", "--steps", "3", "--repeat", "1"),
-            {"env", "camera", "vehicles", "steps_per_s"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "photograph_roads.py",
-            ("--images", "1"),
-            {"pool", "method", "visibility_m", "pictures", "valid_share"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "environments.py",
-            ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
-            {"env", "camera", "vehicles", "steps_per_s", "peer_steps_per_s", "reset_ms", "reset_other_ms"},
-            marks=SLOW,
-        ),
-        (
-            "junctions.py",
-            ("--seeds", "1", "--minutes", "2", "--visibility", "20"),
-            {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},
-        ),
-        pytest.param(
-            "sign_detector.py",
-            (
-                *("--pictures", "painted", "--kinds", "stop", "--visibilities", "100"),
-                *("--distances", "20", "40", "--draws", "1", "--frames", "0"),
-            ),
-            {"pictures", "kind", "operating_range_m", "recall_half_pct", "false_alarms_with", "false_alarms_without"},
-            marks=SLOW,
-        ),
-        (
-            "metrics.py",
-            ("--frames", "none", "--vehicles", "6", "--seconds", "4", "--block", "2"),
-            {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},
-        ),
-        pytest.param(
-            "resets.py", ("--resets", "2", "--part", "environment"), {"ms_median", "growth_kib_per_reset"}, marks=SLOW
-        ),
-        pytest.param(
-            "estimator_accuracy.py",
-            ("--cameras", "1", "--scenes", "1", "--draws", "1"),
-            {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "told_calibration.py",
-            ("--cameras", "1", "--scenes", "1", "--visibilities", "100", "--methods", "negru2013"),
-            {"error", "method", "visibility", "marks", "valid_share", "median_pct", "median_size_pct", "p95_size_pct"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "lead_accuracy.py",
-            ("--cameras", "1", "--vehicles", "1", "--step", "10", "--methods", "huang2015_lead"),
-            {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "restoration.py",
-            ("--vehicles", "1", "--step", "1", "--visibilities", "100"),
-            {
-                "pool",
-                "visibility_m",
-                "method",
-                "psnr_db",
-                "ssim",
-                "e",
-                "r",
-                "s_pct",
-                "sift_range_m",
-                "range_ratio",
-                "ms",
-            },
-            marks=SLOW,
-        ),
-        pytest.param(
-            "frames.py",
-            ("--size", "64x48", "--frames", "2", "--repeat", "1"),
-            {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "renderers.py",
-            ("--renderers", "4", "--frames", "8", "--renderer", "cpu"),
-            {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
-            marks=SLOW,
-        ),
-        pytest.param(
-            "grades.py",
-            ("--visibility", "100", "--duration", "1", "--drawings", "1"),
-            {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
-            marks=SLOW,
-        ),
-        ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
-    ],
+    ("command", "keys"),
+    [*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.nightly) for one in SLOW.items())],
 )
-def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:
-    for record in records(name, *arguments):
-        assert keys <= set(record)
+def test_records(command: str, keys: str) -> None:
+    for record in records(*command.split()):
+        assert set(keys.split()) <= set(record)
 
 
 @pytest.mark.nightly

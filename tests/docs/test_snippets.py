@@ -22,16 +22,10 @@ import typer
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.cli.app import app
 from fogsim.scenario import catalogue, load_scenario
+from tests.docs.test_tables import PAGES
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-TEXTS = {
-    str(page.relative_to(CHECKOUT)): page.read_text(encoding="utf-8")
-    for page in (
-        *(CHECKOUT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
-        *sorted((CHECKOUT / "docs").glob("**/*.md")),
-        *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
-    )
-}
+TEXTS = {str(page.relative_to(CHECKOUT)): page.read_text(encoding="utf-8") for page in PAGES}
 PYTHON = {page: re.findall(r"```python\n(.*?)```", text, re.DOTALL) for page, text in TEXTS.items()}
 LINES = {page: re.findall(r"^(?:    )?(fogsim .*)$", text, re.MULTILINE) for page, text in TEXTS.items()}
 """Command lines that stand by themselves."""

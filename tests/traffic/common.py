@@ -17,10 +17,7 @@ DATA = Path(__file__).resolve().parents[1] / "data"
 MOTORWAY = DATA.parents[1] / "scenarios" / "motorway_fog_bank"
 NET = MOTORWAY / "motorway.net.xml"
 QUIET = ("--no-step-log", "true", "--no-warnings", "true")
-CROWD = (
-    *("--net-file", str(NET), "--route-files", str(ROUTES)),
-    *("--step-length", "0.1", "--seed", "5", *QUIET),
-)
+CROWD = (*("--net-file", str(NET), "--route-files", str(ROUTES)), *("--step-length", "0.1", "--seed", "5", *QUIET))
 """SUMO's command line for the motorway's own traffic."""
 
 SETUP = TrafficSetup(

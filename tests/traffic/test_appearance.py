@@ -14,12 +14,9 @@ from fogsim.traffic.appearance import (
 from fogsim.values import Lamp
 
 
-def test_body_kinds() -> None:
-    assert [body_kind(c) for c in ("passenger", "delivery", "trailer", "coach")] == ["car", "van", "truck", "bus"]
-    assert [body_kind(c) for c in ("bicycle", "tram", "emergency", "taxi")] == ["motorcycle", "bus", "van", "car"]
-
-
-def test_a_shape_or_a_length_tells_what_a_class_left_at_cars_does_not() -> None:
+def test_body_kinds_by_class_or_by_the_shape_or_length_where_the_class_is_left_at_cars() -> None:
+    classes = ("passenger", "delivery", "trailer", "coach", "bicycle", "tram", "emergency", "taxi")
+    assert [body_kind(c) for c in classes] == ["car", "van", "truck", "bus", "motorcycle", "bus", "van", "car"]
     shapes = ("truck/semitrailer", "bus/coach", "passenger/sedan", "passenger/van", "unknown")
     assert [body_kind("passenger", shape) for shape in shapes] == ["truck", "bus", "car", "van", "car"]
     assert body_kind("bus", "truck") == "bus"
@@ -44,18 +41,12 @@ def test_signals_to_lamps() -> None:
     assert lamps_from_many_signals(signals).tolist() == [lamps_from_signals(s) for s in signals]
 
 
-def test_published_eye_heights() -> None:
+def test_eye_heights_are_the_published_ones_by_class_shape_or_length() -> None:
     classes = ("passenger", "truck", "coach", "bus", "motorcycle", "bicycle")
     assert [eye_height(one) for one in classes] == [1.08, 2.33, 1.8, 1.8, 1.35, 1.4]
-
-
-def test_a_type_that_says_only_by_its_shape_or_length_what_it_is() -> None:
     assert eye_height("passenger", "bus/coach") == eye_height("bus")
     assert eye_height("passenger", "", 16.5) == eye_height("trailer")
     assert eye_height("passenger", "passenger/sedan", 4.5) == eye_height("taxi") == eye_height("custom1")
-
-
-def test_every_class_and_shape_that_is_known_has_a_height() -> None:
     heights = [eye_height(name) for name in BODY_KINDS] + [eye_height("passenger", shape) for shape in SHAPE_KINDS]
     assert all(1.0 < height < 3.0 for height in heights)
     assert {*BODY_KINDS.values(), *SHAPE_KINDS.values()} <= EYE_HEIGHTS.keys()

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import SimulationError, SimulationRunningError
-from fogsim.traffic import (
-    BrakeEvent,
-    LampFailureEvent,
-    LaneChangeEvent,
-    Traffic,
-    Trigger,
-    libsumo_traffic,
-)
+from fogsim.traffic import BrakeEvent, LampFailureEvent, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
 from tests.traffic.common import SETUP, running, seen
 
@@ -110,30 +103,24 @@ def test_the_same_seed_replays_exactly(traffic: Traffic) -> None:
     assert positions() != first
 
 
-def test_a_second_simulation_in_one_process_is_refused(traffic: Traffic) -> None:
+def test_a_process_has_one_simulation_until_it_is_closed(traffic: Traffic) -> None:
     with pytest.raises(SimulationRunningError, match="run this one in its own process"):
         libsumo_traffic(SETUP).start(1)
     assert seen(traffic)  # the first goes on
+    traffic.close()
+    traffic.close()
+    with pytest.raises(SimulationError, match="not been started, or is closed"):
+        traffic.observe()
 
 
-def test_an_ego_that_does_not_exist_ends_the_simulation_with_its_name() -> None:
+def test_what_cannot_be_begun_is_told_and_leaves_nothing_running(tmp_path: Path) -> None:
+    routes = tmp_path / "broken.rou.xml"
+    routes.write_text('<routes><vehicle id="ego" depart="0" route="nowhere"/></routes>', encoding="utf-8")
+    with pytest.raises(SimulationError, match="nowhere"):  # in SUMO's own words
+        libsumo_traffic(replace(SETUP, routes=(routes,))).start(1)
     traffic = libsumo_traffic(replace(SETUP, ego="nobody", warm_up_limit=5.0))
     with pytest.raises(SimulationError, match=r"the ego 'nobody' did not appear within 5"):
         traffic.start(1)
     other = libsumo_traffic(SETUP)
     other.start(1)  # nothing is left running
     other.close()
-
-
-def test_what_sumo_refuses_is_told_in_its_own_words(tmp_path: Path) -> None:
-    routes = tmp_path / "broken.rou.xml"
-    routes.write_text('<routes><vehicle id="ego" depart="0" route="nowhere"/></routes>', encoding="utf-8")
-    with pytest.raises(SimulationError, match="nowhere"):
-        libsumo_traffic(replace(SETUP, routes=(routes,))).start(1)
-
-
-def test_closing_twice_is_allowed_and_a_closed_simulation_says_so(traffic: Traffic) -> None:
-    traffic.close()
-    traffic.close()
-    with pytest.raises(SimulationError, match="not been started, or is closed"):
-        traffic.observe()

@@ -61,9 +61,7 @@ def test_a_parked_ego_keeps_its_place_without_limit_and_leader_and_drives_on(par
     # From place to place as far as it drives, to the very end.
     assert after[-1].route_position == pytest.approx(after[-1].traffic.position[after[-1].ego, 0], abs=0.2)
     assert len(parked) == 601
-
-
-def test_others_are_flagged_where_they_park(parked: list[Step]) -> None:
+    # Others are flagged where they park.
     last = parked[-1].traffic
     flags = dict(zip(last.ids, last.off_lanes.tolist(), strict=True))
     assert flags == {"behind": False, "ego": False, "parked1": True, "parked2": True}
@@ -88,15 +86,12 @@ def test_metrics_leave_parked_vehicles_out(tmp_path: Path) -> None:
     assert with_parked == without
 
 
-def test_the_table_has_the_flag_and_no_limit(tmp_path: Path) -> None:
-    record_run(scenario("park", "ego", 20.0), 0, tmp_path / "run", recorders=["table"])
+def test_the_table_has_the_flag_and_no_limit_and_parked_vehicles_have_no_equipment(tmp_path: Path) -> None:
+    equipped, steps = scenario("park", "ego", 20.0, "traffic.equipped=1.0"), list[Step]()
+    record_run(equipped, 0, tmp_path / "run", recorders=["table"], watch=steps.append)
+    assert {one.vehicle_id for step in steps for one in step.equipped} == {"behind"}
     rows = pq.read_table(tmp_path / "run" / "steps.parquet", columns=["off_lanes", "speed_limit_mps"]).to_pylist()
     assert {(row["off_lanes"], row["speed_limit_mps"]) for row in rows} == {(False, LIMIT), (True, None)}
-
-
-def test_parked_vehicles_have_no_equipment() -> None:
-    steps = fogsim.run(scenario("park", "ego", 8.0, "traffic.equipped=1.0"))
-    assert {one.vehicle_id for step in steps for one in step.equipped} == {"behind"}
 
 
 def test_a_taxi_waits_takes_a_passenger_and_waits_again() -> None:
@@ -178,18 +173,14 @@ def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(connec
 def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
     command = Command(advice=SpeedAdvice(6.0), advised_speeds={"parked1": 6.0}, advice_reach=math.inf)
     with running(build.traffic_setup(scenario("park", "ego")), even(60.0), seed=0) as traffic:
+        # Nor does a script change a lane, or let a vehicle depart, next to a parked one.
+        asked = ChangeLane("parked1", 1), Depart("new", like="parked1", gap=30.0, speed=5.0)
+        assert traffic.begin(asked) == asked
         speeds = [float(one.state.speed[one.ego]) for one in driven(traffic, 600, command)]
         get = load_libsumo().vehicle
         assert 0.0 < get.getMaxSpeed("parked1") <= get.getMaxSpeed("behind") <= 60.0
     assert speeds[400] == pytest.approx(0.0)
     assert speeds[-1] == pytest.approx(6.0, abs=0.1)
-
-
-def test_a_script_changes_no_lane_and_departs_no_vehicle_beside_a_parked_one() -> None:
-    with running(build.traffic_setup(scenario("park", "ego")), seed=0) as traffic:
-        change = ChangeLane("parked1", 1)
-        joins = Depart("new", like="parked1", gap=30.0, speed=5.0)
-        assert traffic.begin([change, joins]) == (change, joins)
 
 
 def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:

@@ -17,14 +17,7 @@ from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, libsumo
 from fogsim.traffic.drivers.speed_choice import too_fast
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import (
-    Command,
-    FogField,
-    Lamp,
-    SpeedAdvice,
-    TrafficSnapshot,
-    TrafficState,
-)
+from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
 from tests.traffic.common import DATA, SETUP, seen
 
 GRID = DATA / "grid" / "grid.sumocfg"
@@ -69,7 +62,7 @@ def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
 
     def in_fog(traffic: Traffic) -> list[TrafficSnapshot]:
         traffic.enter_fog(FOG)
-        return drive(traffic, 1, steps=120)
+        return drive(traffic, 1, steps=60)
 
     with contextlib.closing(libsumo_traffic(setup)) as here:
         expected = in_fog(here)

@@ -1,4 +1,4 @@
-"""What of a script was not played, and why."""
+"""What of a script was not played, and why; each pair of vehicles collides once, however often it is reported."""
 
 from typing import Any
 
@@ -8,7 +8,8 @@ import highway_env  # noqa: F401 - registers its environments
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import BrakeEvent, Event, LaneChangeEvent, Trigger
 from fogsim.traffic.highway import HighwayTraffic
-from fogsim.values import Command, Reason, Unplayed, UnplayedEvent
+from fogsim.traffic.setup import CollisionLog
+from fogsim.values import Collision, Command, Reason, Unplayed, UnplayedEvent
 from tests.traffic.common import DATA, running
 
 GRID = DATA / "grid" / "grid.sumocfg"
@@ -50,3 +51,13 @@ def test_highway_env_tells_it_too_and_without_a_script_whom_it_keeps_in_lane() -
         traffic.start(1)
         traffic.advance(Command())
         assert traffic.unplayed() == Unplayed(told, ("lead",))
+
+
+def test_a_pair_collides_once_whoever_is_the_collider_and_is_given_once() -> None:
+    log = CollisionLog()
+    first, other = Collision(1.0, "a", "b", 5.0), Collision(1.1, "b", "c", 2.0)
+    log.add([first])
+    log.add([Collision(1.1, "b", "a", 4.0), other])
+    assert log.take() == (first, other)
+    log.add([Collision(1.2, "a", "b", 3.0)])
+    assert log.take() == ()

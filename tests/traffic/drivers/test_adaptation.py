@@ -40,9 +40,6 @@ def test_thresholds_rise_into_the_night_and_are_those_of_the_day_from_1000_lx_on
     assert np.all(ratios[light >= 1000.0] == 1.0)
     lamps = np.array([adaptation(lux).eye_threshold for lux in light])
     assert np.all(np.diff(lamps) >= 0.0)
-
-
-def test_no_jump_where_adrians_branches_meet() -> None:
-    join = (0.6 - HEAD_LAMP_LUMINANCE) * math.pi / 0.406
+    join = (0.6 - HEAD_LAMP_LUMINANCE) * math.pi / 0.406  # of Adrian's branches
     below, above = (adaptation(join * share).eye_threshold for share in (0.9999, 1.0001))
     assert above / below == pytest.approx(1.0, abs=1e-3)

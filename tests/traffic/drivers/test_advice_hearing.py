@@ -55,13 +55,10 @@ def test_a_sign_is_read_where_the_stretch_begins_and_kept_in_mind_to_its_end() -
     assert hearing.listen(Command(), 1.0) == {Display.MESSAGE_SIGN: {"second": 15.0}}
     road.positions["second"] = 2001.0
     assert hearing.listen(Command(), 1.0) == {}
-
-
-def test_who_comes_from_a_ramp_has_not_passed_the_sign() -> None:
     road = Road(first=980.0)
     hearing = AdviceHearing(road)
     drive(road, hearing, 20.0, display=Display.MESSAGE_SIGN)
-    road.positions["ramp"] = 1600.0
+    road.positions["ramp"] = 1600.0  # who comes from a ramp has not passed the sign
     assert drive(road, hearing, 20.0, display=Display.MESSAGE_SIGN) == [{"first": 20.0}]
 
 

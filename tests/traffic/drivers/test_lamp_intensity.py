@@ -16,33 +16,28 @@ from fogsim.traffic.drivers.lamp_intensity import (
     intensity_toward,
     rear_intensity,
 )
-from fogsim.values import Lamp
+from fogsim.values import Beam, Lamp
 from fogsim.values.light import Side, dark_on
 from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 
 LIT = int(Lamp.POSITION | Lamp.LOW_BEAM)
 
 
-def test_light_above_the_cut_off_is_that_of_measured_low_beams() -> None:
-    """Half a degree to one degree up, the mean of left and right of UMTRI-2004-23, within a factor of 2."""
+def test_light_is_that_of_measured_beams() -> None:
+    """Low beams half a degree to one degree up, the mean of left and right of UMTRI-2004-23, within a factor of 2."""
+
+    def measured(beam: Beam, degrees: float, up: float) -> float:
+        return float(luminous_intensity(beam, np.radians([-degrees, degrees]), np.radians(up)).mean())
+
     for degrees in [1.0, 2.0, 5.0, 10.0, 20.0]:
-        aside = np.radians([-degrees, degrees])
-        measured = [luminous_intensity(low_beam(), aside, np.radians(up)).mean() for up in (0.5, 1.0)]
-        assert 0.5 * min(measured) < beam_intensity(LIT, degrees) < 2.0 * max(measured)
-
-
-def test_light_of_a_high_beam_is_that_of_measured_ones() -> None:
+        low = [measured(low_beam(), degrees, up) for up in (0.5, 1.0)]
+        assert 0.5 * min(low) < beam_intensity(LIT, degrees) < 2.0 * max(low)
     for degrees in [0.0, 2.0, 5.0, 10.0, 20.0]:
-        measured = luminous_intensity(high_beam(), np.radians([-degrees, degrees]), 0.0).mean()
-        assert beam_intensity(int(Lamp.HIGH_BEAM), degrees) == pytest.approx(measured, rel=0.35)
-
-
-@pytest.mark.parametrize("degrees", [5.0, 10.0, 20.0])
-def test_own_light_to_the_side_is_that_of_measured_low_beams(degrees: float) -> None:
-    aside = np.radians([-degrees, degrees])
-    measured = luminous_intensity(low_beam(), aside, np.radians(-1.5)).mean()
-    ahead = float(luminous_intensity(low_beam(), 0.0, np.radians(-1.5)))
-    assert head_lamp_share(np.radians(degrees)) == pytest.approx(measured / ahead, rel=0.2)
+        high = measured(high_beam(), degrees, 0.0)
+        assert beam_intensity(int(Lamp.HIGH_BEAM), degrees) == pytest.approx(high, rel=0.35)
+    for degrees in [5.0, 10.0, 20.0]:
+        own = measured(low_beam(), degrees, -1.5) / measured(low_beam(), 0.0, -1.5)
+        assert head_lamp_share(np.radians(degrees)) == pytest.approx(own, rel=0.2)
 
 
 def test_each_side_shows_its_own_lamps() -> None:
@@ -55,6 +50,8 @@ def test_each_side_shows_its_own_lamps() -> None:
     assert intensity_toward(int(Lamp.STOP), 5.0, 30.0, 0.0) == 0.0
     assert intensity_toward(0, 12.0, -2.5, 30.0) == 0.0
     assert intensity_toward(int(Lamp.POSITION), 5.0, 30.0, 30.0) == pytest.approx(10.0 * 0.030)
+    lamps = (Lamp.POSITION | Lamp.STOP, Lamp.REAR_FOG | Lamp.STOP, Lamp.LOW_BEAM)
+    assert [rear_intensity(int(lit)) for lit in lamps] == [100.0, 200.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -62,16 +59,12 @@ def test_each_side_shows_its_own_lamps() -> None:
     [(Lamp.POSITION, SignalLobe.SIGNAL), (Lamp.STOP, SignalLobe.SIGNAL), (Lamp.REAR_FOG, SignalLobe.REAR_FOG)],
 )
 def test_drivers_see_rear_lamps_as_bright_from_aside_as_pictures_show_them(lamp: Lamp, lobe: SignalLobe) -> None:
-    table = SIGNAL_LOBES[lobe]
+    table, least = SIGNAL_LOBES[lobe], LEAST_INTENSITY if lamp is Lamp.POSITION else 0.0
     for degrees in (0.0, 3.0, 5.0, 14.0, 20.0, 44.0, 75.0, 85.0):
         aside = 30.0 * np.tan(np.radians(degrees))
         drawn = float(luminous_intensity(table, np.radians(min(degrees, 80.0)), 0.0)) / FULL
         seen = intensity_toward(int(lamp), 5.0, -35.0, aside)
-        assert seen == pytest.approx(max(drawn * rear_intensity(int(lamp)), _least(lamp)), rel=1e-6)
-
-
-def _least(lamp: Lamp) -> float:
-    return LEAST_INTENSITY if lamp is Lamp.POSITION else 0.0
+        assert seen == pytest.approx(max(drawn * rear_intensity(int(lamp)), least), rel=1e-6)
 
 
 def test_the_lit_road_is_as_bright_as_the_flux_of_measured_low_beams_makes_it() -> None:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from fogsim.traffic.drivers.adaptation import DAY_EYE_THRESHOLD, HEAD_LAMP_LUMINANCE, adaptation, airlight_luminance
-from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.traffic.drivers.sight import DriverSight, inherent_contrast
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Lamp
 
 DAY, NIGHT, DARK = DriverSight(10_000.0), DriverSight(0.01), DriverSight(0.0)
 DARK_THRESHOLD = adaptation(0.0).eye_threshold
@@ -62,6 +61,7 @@ def test_in_clear_air_by_day_everything_is_seen_and_at_night_what_the_headlamps_
     assert reach(DARK, math.inf, (1.0, 0.0, 1.0)) == pytest.approx(55.0, abs=1e-3)
     assert reach(DriverSight(0.0, headlamp_reach=80.0), math.inf, (1.0, 0.0, 1.0)) == pytest.approx(80.0, abs=1e-3)
     assert reach(DARK, math.inf, (1.0, 0.0, 0.25)) == pytest.approx(27.5, abs=1e-3)
+    assert DARK.depth_limit(1.0, 1.0, 0.0, 0.0) == -math.inf  # without any light
 
 
 @pytest.mark.parametrize("visibility", [30.0, 100.0])
@@ -70,10 +70,6 @@ def test_at_night_the_light_of_the_own_head_lamps_goes_through_the_fog_twice(vis
     assert (55.0 / farthest) ** 2 * math.exp(-2.0 * extinction_from_visibility(visibility) * farthest) == pytest.approx(
         1.0, rel=1e-4
     )
-
-
-def test_without_any_light_nothing_is_seen() -> None:
-    assert DARK.depth_limit(1.0, 1.0, 0.0, 0.0) == -math.inf
 
 
 def test_the_limit_is_where_shares_of_the_threshold_add_up_to_one() -> None:
@@ -85,12 +81,6 @@ def test_the_limit_is_where_shares_of_the_threshold_add_up_to_one() -> None:
     shares = math.exp(body - together) + math.exp(lamp - together) + math.exp(2.0 * (own - together))
     assert shares == pytest.approx(1.0)
     assert together > max(body, lamp, own)
-
-
-def test_the_brightest_lit_lamp_counts_and_an_unlit_vehicle_has_none() -> None:
-    assert rear_intensity(int(Lamp.POSITION | Lamp.STOP)) == 100.0
-    assert rear_intensity(int(Lamp.REAR_FOG | Lamp.STOP)) == 200.0
-    assert rear_intensity(int(Lamp.LOW_BEAM)) == 0.0
 
 
 def test_dusk_is_continuous() -> None:
@@ -125,6 +115,10 @@ def test_the_limit_falls_with_distance_and_so_does_sight_with_extinction() -> No
 
 
 def test_bounds_hold_and_are_close() -> None:
+    assert DAY.sure_distance(0.0) == DAY.hidden_distance(0.0) == math.inf
+    assert NIGHT.sure_distance(0.0) < 1.0
+    assert NIGHT.hidden_distance(0.0) > math.sqrt(BRIGHTEST / 1.1e-5)
+    assert NIGHT.hidden_distance(0.02, brightest=600.0) > NIGHT.hidden_distance(0.02)
     for visibility in [30.0, 300.0]:
         for illuminance in [0.01, 1.0, 9.9, 10_000.0]:
             sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
@@ -137,13 +131,6 @@ def test_bounds_hold_and_are_close() -> None:
                 assert k * distance <= sight.depth_limit(distance, white, 0.0, 0.0)
             for distance in np.geomspace(hidden, 10.0 * hidden, 50):
                 assert k * distance > sight.depth_limit(distance, 1.0, BRIGHTEST)
-
-
-def test_bounds_in_clear_air() -> None:
-    assert DAY.sure_distance(0.0) == DAY.hidden_distance(0.0) == math.inf
-    assert NIGHT.sure_distance(0.0) < 1.0
-    assert NIGHT.hidden_distance(0.0) > math.sqrt(BRIGHTEST / 1.1e-5)
-    assert NIGHT.hidden_distance(0.02, brightest=600.0) > NIGHT.hidden_distance(0.02)
 
 
 def test_glare_raises_both_thresholds() -> None:

@@ -120,12 +120,6 @@ def test_who_trusts_a_sign_takes_its_speed_for_safe() -> None:
     assert desired_speed(distrusting, driver, own, 30.0, told(60.0 / KMH)) * KMH == pytest.approx(29.0, rel=0.03)
 
 
-def test_advice_may_be_believed_less_before_the_fog_is_seen() -> None:
-    setup, driver = DriverSetup(unaffected, compliance=Compliance(foreseen=0.25)), DriverTraits(1.0)
-    assert desired_speed(setup, driver, 30.0, math.inf, told(20.0)) == pytest.approx(27.5)
-    assert desired_speed(setup, driver, 30.0, 100.0, told(20.0)) == pytest.approx(20.0)
-
-
 def test_a_driver_desires_the_least_of_own_speed_choice_and_advice() -> None:
     setup, driver = DriverSetup(within_sight, spread=0.0), DriverTraits(1.2)
     chosen = 1.2 * within_sight(60.0)
@@ -134,6 +128,9 @@ def test_a_driver_desires_the_least_of_own_speed_choice_and_advice() -> None:
     assert desired_speed(setup, driver, 40.0, 60.0, told(8.0, 1.0)) == pytest.approx(chosen)  # within the delay
     assert desired_speed(setup, driver, 40.0, 60.0, told(8.0, 3.0)) == 8.0
     assert desired_speed(setup, DriverTraits(1.2, moved_from=1.0), 40.0, 60.0, told(8.0)) == pytest.approx(chosen)
+    foreseeing = DriverSetup(unaffected, compliance=Compliance(foreseen=0.25))  # believes less before the fog is seen
+    assert desired_speed(foreseeing, DriverTraits(1.0), 30.0, math.inf, told(20.0)) == pytest.approx(27.5)
+    assert desired_speed(foreseeing, DriverTraits(1.0), 30.0, 100.0, told(20.0)) == pytest.approx(20.0)
 
 
 def test_traits_depend_on_nothing_but_seed_and_id_and_have_the_spread_that_is_asked_for() -> None:

@@ -13,13 +13,7 @@ from fogsim.core.kinematics import safe_speed
 from fogsim.errors import InputError
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
 from fogsim.traffic.drivers.sight import leader_reach
-from fogsim.traffic.drivers.speed_choice import (
-    SpeedChoice,
-    driver_traits,
-    too_fast,
-    unaffected,
-    within_sight,
-)
+from fogsim.traffic.drivers.speed_choice import SpeedChoice, driver_traits, too_fast, unaffected, within_sight
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.values import Command, Display, SpeedAdvice, Stretch, StretchAdvice
 from tests.traffic.common import even, heard, seen
@@ -111,9 +105,12 @@ def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, fl
     assert heard(seen(road.traffic).state) == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
 
 
-def test_advice_that_all_follow_sets_every_target_speed() -> None:
-    road = Road(exact(rate=1.0, strength=1.0))
-    assert road.drive(12.0, advised(road)).targets() == pytest.approx([15.0] * len(road.others))
+def test_advice_that_all_follow_sets_every_target_speed_after_the_delay() -> None:
+    road = Road(exact(rate=1.0, strength=1.0, delay=4.0))
+    command = advised(road)
+    assert road.drive(3.8, command).targets() == [FAST] * len(road.others)
+    assert max(road.drive(1.4, command).targets()) < FAST
+    assert road.drive(8.0, command).targets() == pytest.approx([15.0] * len(road.others))
     # And who is no longer advised drives as before.
     assert road.drive(1.5).targets() == [FAST] * len(road.others)
 
@@ -172,13 +169,6 @@ def test_the_egos_advice_reaches_those_near_it() -> None:
 def test_a_stretch_that_the_road_does_not_have_is_refused(stretch: Stretch, message: str) -> None:
     with pytest.raises(InputError, match=message):
         Road(exact()).drive(0.1, Command(stretches=(StretchAdvice(15.0, stretch),)))
-
-
-def test_advice_is_followed_after_the_delay() -> None:
-    road = Road(exact(delay=4.0))
-    command = advised(road)
-    assert road.drive(3.8, command).targets() == [FAST] * len(road.others)
-    assert max(road.drive(1.4, command).targets()) < FAST
 
 
 def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:

@@ -7,6 +7,8 @@ from fogsim.errors import InputError
 from fogsim.traffic.road.configuration import OVERRIDES, check_configured_files, configured_files, ignored_options
 from fogsim.traffic.road.unsafe_outputs import check_outputs
 
+NET = Path(__file__).parents[2] / "data" / "grid" / "grid.net.xml"
+
 
 def config(folder: Path, content: str) -> Path:
     path = folder / "a.sumocfg"
@@ -21,16 +23,8 @@ def test_files_are_relative_to_the_configuration(tmp_path: Path) -> None:
         "</input></configuration>",
     )
     assert configured_files(path) == (tmp_path / "nets/a.net.xml", (tmp_path / "b.add.xml", Path("/c.add.xml")))
-
-
-def test_short_names_and_no_additional_files(tmp_path: Path) -> None:
-    assert configured_files(config(tmp_path, '<configuration><n value="a.net.xml"/></configuration>')) == (
-        tmp_path / "a.net.xml",
-        (),
-    )
-
-
-def test_what_is_no_configuration(tmp_path: Path) -> None:
+    short = config(tmp_path, '<configuration><n value="a.net.xml"/></configuration>')
+    assert configured_files(short) == (tmp_path / "a.net.xml", ())
     for content, message in [("<configuration", "not XML"), ("<configuration/>", "names no network")]:
         with pytest.raises(InputError, match=message):
             configured_files(config(tmp_path, content))
@@ -46,14 +40,8 @@ def test_options_that_cannot_hold_here_are_told_with_the_reason(tmp_path: Path) 
     assert random == "random=true is left out: a run must depend on its seed alone"
     assert OVERRIDES[:4] == ("--remote-port", "0", "--random", "false")
     assert OVERRIDES[4:6] == ("--xml-validation", "never")  # a schema may lie at any address
-
-
-def test_options_that_hold_as_they_are_need_no_word(tmp_path: Path) -> None:
     for text in ['<remote-port value="0"/>', '<random value="False"/>', "<random/>"]:
         assert ignored_options(config(tmp_path, f"<configuration>{text}</configuration>")) == ()
-
-
-NET = Path(__file__).parents[2] / "data" / "grid" / "grid.net.xml"
 
 
 def test_options_that_reach_outside_the_runs_folder_are_refused(

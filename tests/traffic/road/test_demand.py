@@ -18,14 +18,11 @@ def demand_of(folder: Path, text: str, *wanted: str, **options: int) -> Demand:
     return read_demand([file], wanted, **options)
 
 
-def test_who_can_come(tmp_path: Path) -> None:
+def test_who_can_come_and_who_never_can(tmp_path: Path) -> None:
     for vehicle in ["ego", "t", "own", "f.0", "f.2", "g.0", "g.123456"]:
         demand = demand_of(tmp_path, VEHICLES, vehicle)
         assert demand.found == {vehicle}
         assert not demand.lacks(vehicle)
-
-
-def test_who_can_never_come(tmp_path: Path) -> None:
     for vehicle in ["egoo", "EGO", "r", "f", "f.3", "f.00", "f.01", "f.-1", "f.", "f.1.0", ".0", "g"]:
         demand = demand_of(tmp_path, VEHICLES, "ego", vehicle)
         assert demand.lacks(vehicle)
@@ -70,15 +67,11 @@ def test_nothing_is_claimed_where_vehicles_may_come_from_elsewhere(tmp_path: Pat
         "",
     ]:
         assert not demand_of(tmp_path, text, "ego").lacks("ego")
-
-
-def test_files_that_are_not_there_claim_nothing(tmp_path: Path) -> None:
-    for name in ("none.rou.xml", "$HOME/a.rou.xml", "x" * 5000):
+    for name in ("none.rou.xml", "$HOME/a.rou.xml", "x" * 5000, "."):
         assert not read_demand([tmp_path / name], ["ego"]).lacks("ego")
-    assert not read_demand([tmp_path], ["ego"]).lacks("ego")
 
 
-def test_packed_files(tmp_path: Path) -> None:
+def test_packed_and_large_files(tmp_path: Path) -> None:
     file = tmp_path / "a.rou.xml.gz"
     file.write_bytes(gzip.compress(VEHICLES.encode()))
     demand = read_demand([file], ["ego", "egoo"])
@@ -86,19 +79,22 @@ def test_packed_files(tmp_path: Path) -> None:
     assert demand.lacks("egoo")
     file.write_bytes(file.read_bytes()[:100])
     assert not read_demand([file], ["egoo"]).lacks("egoo")
-
-
-def test_a_large_file_is_not_read_to_its_end(tmp_path: Path) -> None:
     text = VEHICLES + " " * 300_000
     assert demand_of(tmp_path, text, "egoo", most_bytes=1_000_000).lacks("egoo")
     assert not demand_of(tmp_path, text, "egoo", most_bytes=100_000).lacks("egoo")
 
 
 @pytest.mark.parametrize(
-    ("option", "lacks"),
-    [("", True), ('<load-state value="s.xml"/>', False), ('<scale value="1.5"/>', False), ("<seed v='3'/>", True)],
+    ("option", "lacks", "routes"),
+    [
+        ("", True, 1),
+        ('<load-state value="s.xml"/>', False, 0),
+        ('<scale value="1.5"/>', False, 0),
+        ("<seed v='3'/>", True, 1),
+        ('<device.rerouting.probability value="1"/>', True, 0),
+    ],
 )
-def test_vehicles_of_a_configuration(tmp_path: Path, option: str, lacks: bool) -> None:
+def test_vehicles_and_ways_of_a_configuration(tmp_path: Path, option: str, lacks: bool, routes: int) -> None:
     (tmp_path / "a.rou.xml").write_text(VEHICLES, encoding="utf-8")
     (tmp_path / "b.add.xml").write_text('<additional><vehicle id="late" depart="9"/></additional>', encoding="utf-8")
     config = tmp_path / "a.sumocfg"
@@ -111,15 +107,7 @@ def test_vehicles_of_a_configuration(tmp_path: Path, option: str, lacks: bool) -
     assert demand.lacks("egoo") is lacks
     assert not demand.lacks("ego")
     assert not demand.lacks("late")
-
-
-def test_ways_that_a_configuration_lets_change_are_not_claimed(tmp_path: Path) -> None:
-    (tmp_path / "a.rou.xml").write_text(VEHICLES, encoding="utf-8")
-    config = tmp_path / "a.sumocfg"
-    rerouting = '<device.rerouting.probability value="1"/>'
-    for option, routes in (("", 1), (rerouting, 0)):
-        config.write_text(f'<configuration><r value="a.rou.xml"/>{option}</configuration>', encoding="utf-8")
-        assert len(read_configured_demand(config, ["ego"]).routes) == routes
+    assert len(demand.routes) == routes
 
 
 FLOWS = """<routes>
@@ -138,7 +126,4 @@ def test_rates_are_added_up_by_type(tmp_path: Path) -> None:
     found = read_flows([tmp_path / "my.rou.xml"])
     assert found.rates == pytest.approx({"car": 300.0, "truck": 100.0, "bus": 60.0 + 360.0 + 36.0 + 20.0})
     assert (found.flows, dict(found.single), found.is_whole) == (5, {"DEFAULT_VEHTYPE": 1.0}, True)
-
-
-def test_a_missing_file_leaves_the_demand_incomplete(tmp_path: Path) -> None:
     assert not read_flows([tmp_path / "none.rou.xml"]).is_whole

@@ -80,18 +80,16 @@ def test_a_signal_stands_to_the_right_and_speaks_to_those_who_drive_along(tmp_pa
     assert (sign.sign_id, sign.kind, sign.diameter) == ("xodr.s", "speed_limit", 0.6)
     assert sign.value == pytest.approx(80 / 3.6)
     assert sign.position == pytest.approx((10 + 40 + 1000, 20 - 6 - 10, 5 + 0.4 + 2 + 0.3))
-    assert sign.heading == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize(
-    ("t", "orientation", "heading"),
-    [("-6", "none", 0.0), ("6", "none", math.pi), ("-6", "-", math.pi), ("6", "+", 0.0)],
-)
-def test_whom_a_signal_speaks_to(tmp_path: Path, t: str, orientation: str, heading: float) -> None:
-    (sign,) = opendrive_signs(
-        file(tmp_path, f'<signal id="s" s="40" t="{t}" orientation="{orientation}" type="274" value="80"/>')
-    )
-    assert sign.heading == pytest.approx(heading)
+    for t, orientation, heading in [
+        (-6, "+", 0.0),
+        (-6, "none", 0.0),
+        (6, "none", math.pi),
+        (-6, "-", math.pi),
+        (6, "+", 0),
+    ]:
+        text = f'<signal id="s" s="40" t="{t}" orientation="{orientation}" type="274" value="80"/>'
+        (sign,) = opendrive_signs(file(tmp_path, text))
+        assert sign.heading == pytest.approx(heading)
 
 
 def test_what_a_signal_says(tmp_path: Path) -> None:
@@ -106,9 +104,7 @@ def test_what_a_signal_says(tmp_path: Path) -> None:
         (sign,) = opendrive_signs(file(tmp_path, f'<signal id="s" s="40" t="-6" {attributes}/>'))
         assert sign.kind == kind
         assert sign.value == pytest.approx(value)
-
-
-def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:
+    # Lights that change are no signs.
     assert opendrive_signs(file(tmp_path, '<signal id="s" s="4" t="-6" dynamic="yes" type="1000001"/>')) == []
 
 
@@ -131,16 +127,11 @@ def test_signals_that_cannot_be_placed(tmp_path: Path) -> None:
     ]:
         with pytest.raises(InputError, match=message):
             opendrive_signs(file(tmp_path, signals, geometries))
-
-
-def test_what_is_no_opendrive_file(tmp_path: Path) -> None:
     path = tmp_path / "a.xodr"
-    path.write_text("<net/>", encoding="utf-8")
-    with pytest.raises(InputError, match="expected <OpenDRIVE> at its top, got <net>"):
-        opendrive_signs(path)
-    path.write_text("<OpenDRIVE", encoding="utf-8")
-    with pytest.raises(InputError, match="not XML"):
-        opendrive_signs(path)
+    for text, message in [("<net/>", "expected <OpenDRIVE> at its top, got <net>"), ("<OpenDRIVE", "not XML")]:
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=message):
+            opendrive_signs(path)
 
 
 @pytest.mark.parametrize(("p_range", "scale"), [("arcLength", 1.0), ("normalized", 200.0)])

@@ -69,13 +69,6 @@ def test_places_farther_along_a_road_count_along_its_reference_line(
             lanes.farther(found, beyond)
 
 
-def test_what_is_no_road_is_told(tmp_path: Path) -> None:
-    file = tmp_path / "no.xodr"
-    file.write_text("<OpenDRIVE><header/></OpenDRIVE>", encoding="utf-8")
-    with pytest.raises(InputError, match=r"no\.xodr: "):
-        read_opendrive_lanes(opendrive_net(file), file)
-
-
 def test_what_says_nothing_stops_no_conversion(tmp_path: Path) -> None:
     text = ROAD.read_text(encoding="utf-8")
     file = tmp_path / "empty.xodr"
@@ -85,11 +78,13 @@ def test_what_says_nothing_stops_no_conversion(tmp_path: Path) -> None:
     assert opendrive_net(file) == opendrive_net(ROAD)
 
 
-def test_traffic_on_the_left_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "left.xodr"
-    file.write_text(ROAD.read_text(encoding="utf-8").replace('rule="RHT"', 'rule="LHT"'), encoding="utf-8")
-    with pytest.raises(InputError, match=r"left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"):
-        opendrive_net(file)
+def test_what_is_no_road_and_traffic_on_the_left_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "bad.xodr"
+    left = ROAD.read_text(encoding="utf-8").replace('rule="RHT"', 'rule="LHT"')
+    for text, told in (("<OpenDRIVE><header/></OpenDRIVE>", ""), (left, "road '7': rule=\"LHT\": expected right-hand")):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=rf"bad\.xodr: {told}"):
+            read_opendrive_lanes(opendrive_net(file), file)
 
 
 def test_a_closed_road_is_driven_round_and_round(tmp_path: Path) -> None:

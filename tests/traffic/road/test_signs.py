@@ -64,18 +64,12 @@ def test_a_polygon_is_a_sign_in_its_middle(tmp_path: Path) -> None:
             '<poly id="q" type="fogsim.sign.stop" angle="9" shape=""><param key="value" value="3"/></poly>',
             "poly 'q'.*expected a shape",
         ),
+        ("<poi", "not XML"),
     ],
 )
 def test_signs_that_say_nothing(tmp_path: Path, shape: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         sign_map(read_net(NET), [additional(tmp_path, shape)])
-
-
-def test_what_is_no_additional_file(tmp_path: Path) -> None:
-    file = tmp_path / "broken.add.xml"
-    file.write_text("<additional><poi", encoding="utf-8")
-    with pytest.raises(InputError, match="not XML"):
-        sign_map(read_net(NET), [file])
 
 
 def test_signals_of_an_opendrive_file_are_moved_as_the_net_was(tmp_path: Path) -> None:
@@ -92,11 +86,7 @@ def test_signals_of_an_opendrive_file_are_moved_as_the_net_was(tmp_path: Path) -
     sign = sign_map(read_net(net), [roads]).signs[-1]
     assert sign.position[:2] == pytest.approx((520.0, -35.0))
     assert geographic_position(read_net(net)) is None
-
-
-def test_a_net_that_says_nothing_about_where_it_is(tmp_path: Path) -> None:
-    net = tmp_path / "one.net.xml"
-    net.write_text(ONE_EDGE.format(location=""), encoding="utf-8")
+    net.write_text(ONE_EDGE.format(location=""), encoding="utf-8")  # which says nothing about where it is
     assert geographic_position(read_net(net)) is None
     assert [sign.sign_id for sign in sign_map(read_net(net), []).signs] == ["limit.e"]
 

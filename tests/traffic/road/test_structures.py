@@ -20,16 +20,10 @@ WALL = """<additional>
 
 def test_a_polygon_is_a_structure_by_its_type(tmp_path: Path) -> None:
     file = tmp_path / "a.add.xml"
-    file.write_text(WALL, encoding="utf-8")
+    # A corner that is there twice counts once.
+    file.write_text(WALL.replace("0,0,1.5 10", "0,0,1.5 0,0,1.5 10"), encoding="utf-8")
     (wall,) = structures([file, tmp_path / "map.xodr"])
     assert (wall.structure_id, wall.kind, wall.width, wall.bottom, wall.top) == ("w", StructureKind.WALL, 0.3, 0.0, 3.0)
-    np.testing.assert_array_equal(wall.line, [[0.0, 0.0, 1.5], [10.0, 0.0, 2.0]])
-
-
-def test_a_corner_that_is_told_twice_counts_once(tmp_path: Path) -> None:
-    file = tmp_path / "a.add.xml"
-    file.write_text(WALL.replace("0,0,1.5 10", "0,0,1.5 0,0,1.5 10"), encoding="utf-8")
-    (wall,) = structures([file])
     np.testing.assert_array_equal(wall.line, [[0.0, 0.0, 1.5], [10.0, 0.0, 2.0]])
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from fogsim.traffic import AttachedTraffic
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
@@ -76,23 +77,20 @@ def test_the_egos_pose_follows_a_smoothstep() -> None:
     assert smoothing.smoothed(end) is end
 
 
-def test_who_changes_back_on_the_way_neither_jumps_nor_turns_at_once() -> None:
-    smoothing, shown = LaneChangeSmoothing(), []
-    for k in range(100):
-        lane = 1 if 10 <= k < 25 else 0
-        shown.append(smoothing.smoothed(ego_at(0.1 * k, 2.0 * k, 3.5 * lane, f"road_{lane}")))
-    y = np.array([state.position[0, 1] for state in shown])
+def course(*lanes: int) -> NDArray[np.float64]:
+    """Shown places across a road whose lanes are 3.5 m wide, for the ego's lane in each step [m]."""
+    smoothing = LaneChangeSmoothing()
+    states = (ego_at(0.1 * k, 2.0 * k, 3.5 * lane, f"road_{lane}") for k, lane in enumerate(lanes))
+    return np.array([smoothing.smoothed(state).position[0, 1] for state in states])
+
+
+def test_who_changes_back_on_the_way_neither_jumps_nor_turns_at_once_and_two_lanes_at_once_take_longer() -> None:
+    y = course(*[0] * 10, *[1] * 15, *[0] * 75)
     assert np.abs(np.diff(y)).max() < LARGEST_STEP
     assert np.abs(np.diff(y, 2)).max() < 0.05
     assert 1.0 < y.max() < 3.5
     assert y[-1] == 0.0
-
-
-def test_two_lanes_at_once_take_longer() -> None:
-    smoothing, y = LaneChangeSmoothing(), []
-    for k in range(80):
-        lane = 2 if k >= 10 else 0
-        y.append(float(smoothing.smoothed(ego_at(0.1 * k, 2.0 * k, 3.5 * lane, f"road_{lane}")).position[0, 1]))
+    y = course(*[0] * 10, *[2] * 70)
     assert np.abs(np.diff(y)).max() < LARGEST_STEP
     assert y[-1] == 7.0
 
@@ -107,13 +105,10 @@ def test_bends_and_moves_by_hand_are_no_changes_of_lane() -> None:
     assert smoothing.smoothed(carried) is carried
     lifted = ego_at(1.7, 500.0 - 30.0, 27.0, "road_5", heading=np.pi / 2)
     assert smoothing.smoothed(lifted) is lifted
-
-
-def test_a_turn_within_one_step_is_no_change_of_lane() -> None:
     smoothing = LaneChangeSmoothing()
     smoothing.smoothed(ego_at(0.0, 0.0, 0.0, "road_0"))
-    turned = ego_at(1.0, 8.0, 2.0, "side_0", heading=np.pi / 2)
-    assert smoothing.smoothed(turned) is turned
+    within_one_step = ego_at(1.0, 8.0, 2.0, "side_0", heading=np.pi / 2)
+    assert smoothing.smoothed(within_one_step) is within_one_step
 
 
 def test_who_leaves_on_the_way_is_forgotten() -> None:

@@ -47,11 +47,6 @@ def test_what_sumo_would_not_take_is_told_by_its_key() -> None:
             with_options(f"={{{name}: {str(value).lower() if isinstance(value, bool) else value}}}")
 
 
-def test_options_that_fit_have_no_mistakes() -> None:
-    fitting = {"tripinfo-output": "a.xml", "scale": 2, "time-to-teleport": "60", "precision": 6, "threads": 1}
-    assert option_mistakes(fitting) == {}
-
-
 def test_where_sumo_cannot_be_asked_it_refuses_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fogsim.traffic.sumo.options.known_options", dict)
     scenario = with_options("={no-such-option: 1}")
@@ -76,7 +71,9 @@ def test_options_are_written_flat_or_as_set_makes_them_and_take_the_place_of_usu
     assert "--step-method.ballistic" not in arguments
 
 
-def test_files_of_the_scenarios_folder_are_found_and_outputs_stay_bare() -> None:
+def test_options_that_fit_have_no_mistakes_and_files_of_the_scenarios_folder_are_found_but_outputs_stay_bare() -> None:
+    fitting = {"tripinfo-output": "a.xml", "scale": 2, "time-to-teleport": "60", "precision": 6, "threads": 1}
+    assert option_mistakes(fitting) == {}
     scenario = with_options("={weight-files: motorway.rou.xml, tripinfo-output: trips.xml}")
     options = dict(traffic_setup(scenario).sumo_options)
     assert options == {"weight-files": str(ROAD.directory / "motorway.rou.xml"), "tripinfo-output": "trips.xml"}

@@ -65,14 +65,10 @@ def test_who_is_advised_slows_down_as_gently_as_asked(drive: Any, model: str, ha
     assert first[-1] == pytest.approx(ADVISED, abs=0.7)
     slowing = -np.diff(first) / STEP
     assert 1.5 < slowing.max() <= hardest
+    # Advice that is raised lets them speed up again.
+    assert speeds(traffic, 8.0, ADVISED + 6.0)["first"][-1] == pytest.approx(ADVISED + 6.0, abs=0.7)
     # And who is advised no more drives as before, by the vehicle's own acceleration.
     assert speeds(traffic, 15.0)["first"][-1] == pytest.approx(FAST, abs=0.5)
-
-
-def test_advice_that_is_raised_lets_them_speed_up_again(drive: Any) -> None:
-    traffic, _ = drive(UNAFFECTED, 1.0)
-    speeds(traffic, 9.0, ADVISED)
-    assert speeds(traffic, 8.0, ADVISED + 6.0)["first"][-1] == pytest.approx(ADVISED + 6.0, abs=0.7)
 
 
 def test_who_follows_advice_half_way_goes_no_farther(drive: Any) -> None:
@@ -81,21 +77,18 @@ def test_who_follows_advice_half_way_goes_no_farther(drive: Any) -> None:
     assert speeds(traffic, 14.0, ADVISED)["first"][-1] == pytest.approx((FAST + ADVISED) / 2.0, abs=0.7)
 
 
-def test_fog_that_thickens_slows_down_as_gently(drive: Any) -> None:
-    traffic, _ = drive(DriverSetup(within_sight, spread=0.0), 5.0)
-    traffic.enter_fog(even(30.0))
-    first = np.array(speeds(traffic, 10.0)["first"])
-    assert first[-1] == pytest.approx(within_sight(30.0), abs=0.3)
-    assert 1.9 < (-np.diff(first) / STEP).max() <= 2.1
-
-
 def test_who_enters_has_been_in_that_fog_before(drive: Any) -> None:
     """Nobody comes along at 30 m/s and brakes for the fog at the edge of the network."""
-    _, told = drive(DriverSetup(within_sight, spread=0.0), 20.0)
+    traffic, told = drive(DriverSetup(within_sight, spread=0.0), 20.0)
     # In SUMO's own departure step it is still as fast as its demand says.
     assert told["late"][0] == FAST
     assert max(told["late"][1:]) <= within_sight(60.0) + 0.05
     assert min(told["late"][1:]) > within_sight(60.0) - 0.5
+    # Fog that thickens slows them down as gently as advice.
+    traffic.enter_fog(even(30.0))
+    first = np.array(speeds(traffic, 10.0)["first"])
+    assert first[-1] == pytest.approx(within_sight(30.0), abs=0.3)
+    assert 1.9 < (-np.diff(first) / STEP).max() <= 2.1
 
 
 @pytest.mark.parametrize(("rate", "entering"), [(1.0, ADVISED), (0.0, FAST)])

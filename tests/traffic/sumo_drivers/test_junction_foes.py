@@ -36,17 +36,11 @@ def foes_met(libsumo: Any) -> set[str]:
     return met
 
 
-def test_foes_are_sumos_own(tmp_path: Path) -> None:
+def test_foes_are_sumos_own_and_none_where_nobody_has_the_right_of_way(tmp_path: Path) -> None:
+    assert unregulated_junctions(tmp_path / "elsewhere.net.xml") == frozenset()
     with crossing(tmp_path, "priority") as libsumo:
         assert not unregulated_junctions(tmp_path / "cross.net.xml")
         assert foes_met(libsumo) == {first for first, _ in CROSSING_WAYS}
-
-
-def test_where_nobody_has_the_right_of_way_there_are_none(tmp_path: Path) -> None:
     with crossing(tmp_path, "unregulated") as libsumo:
         assert "B1" in unregulated_junctions(tmp_path / "cross.net.xml")
         assert foes_met(libsumo) == set()
-
-
-def test_a_network_that_is_elsewhere_is_not_looked_into(tmp_path: Path) -> None:
-    assert unregulated_junctions(tmp_path / "elsewhere.net.xml") == frozenset()

@@ -12,12 +12,7 @@ from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.oncoming_glare import (
-    LAMP_HEIGHT,
-    MOST_GLARE,
-    OncomingGlare,
-    most_glare,
-)
+from fogsim.traffic.sumo_drivers.oncoming_glare import LAMP_HEIGHT, MOST_GLARE, OncomingGlare, most_glare
 from fogsim.traffic.sumo_drivers.perception import LeaderSight
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps
 from fogsim.traffic.sumo_lanes.directions import OppositeEdges
@@ -54,10 +49,11 @@ def veil(api: Any, observer: str, target: str, visibility: float, own_lamps: Own
     return OncomingGlare(view(api, visibility)).veil(observer, target, own_lamps)
 
 
-def test_the_other_side_of_a_road_leads_back(api: Any) -> None:
+def test_the_other_side_of_a_road_leads_back_and_by_day_nothing_dazzles(api: Any) -> None:
     opposite = OppositeEdges(api)
     assert opposite.of("B0C0") == ("C0B0",)
     assert opposite.of(":B0_0") == opposite.of("") == ()
+    assert [most_glare(lux) for lux in (1000.0, 999.0)] == [0.0, MOST_GLARE]
 
 
 def test_the_veil_is_that_of_the_lamps_that_come(api: Any) -> None:
@@ -93,30 +89,19 @@ def test_high_beams_that_follow_dazzle_in_the_mirrors(api: Any) -> None:
     assert veil(api, "me", "leader", math.inf, {"leader": int(Lamp.HIGH_BEAM), "coming": ALL_DARK}) == 0.0
 
 
-def test_own_high_beams_show_an_unlit_leader_from_farther(api: Any) -> None:
+def test_own_high_beams_show_an_unlit_leader_from_farther_and_a_dazzled_driver_sees_it_later(api: Any) -> None:
+    """The same leader, 50 m ahead: in thin fog it is seen by head lamps alone, and not against high beams."""
     pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
     dark: OwnLamps = {"leader": ALL_DARK, "coming": ALL_DARK}
 
-    def sees(visibility: float, lamps: Lamp) -> bool:
-        sight = LeaderSight(view(api, visibility, 40.0), api.vehicle.getSpeed, 0.5)
-        return sight.assess(pairs, {**dark, "me": int(lamps)})[0][0]
+    def assess(visibility: float, reach: float, lamps: OwnLamps) -> tuple[list[bool], list[float]]:
+        return LeaderSight(view(api, visibility, reach), api.vehicle.getSpeed, 0.5).assess(pairs, {**dark, **lamps})
 
-    assert [sees(3000.0, Lamp.LOW_BEAM), sees(3000.0, Lamp.HIGH_BEAM), sees(100.0, Lamp.HIGH_BEAM)] == [
-        False,
-        True,
-        False,
-    ]
-
-
-def test_a_dazzled_driver_sees_an_unlit_leader_later(api: Any) -> None:
-    """The same leader, 50 m ahead in thin fog: by head lamps alone it is seen, against high beams it is not."""
-    pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
-    sight = LeaderSight(view(api, 1e5), api.vehicle.getSpeed, 0.5)
-    dark: OwnLamps = {"leader": ALL_DARK}
-    assert sight.assess(pairs, {**dark, "coming": ALL_DARK}) == ([True], [0.0])
-    assert sight.assess(pairs, {**dark, **HIGH_BEAM})[0] == [False]
-
-
-def test_by_day_there_is_none(api: Any) -> None:
-    assert most_glare(1000.0) == 0.0
-    assert most_glare(999.0) == MOST_GLARE
+    for visibility, lamp, seen in (
+        (3000.0, Lamp.LOW_BEAM, False),
+        (3000.0, Lamp.HIGH_BEAM, True),
+        (100.0, Lamp.HIGH_BEAM, False),
+    ):
+        assert assess(visibility, 40.0, {"me": int(lamp)})[0] == [seen]
+    assert assess(1e5, 55.0, {}) == ([True], [0.0])
+    assert assess(1e5, 55.0, HIGH_BEAM)[0] == [False]

@@ -10,14 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import FieldAccess
-from fogsim.traffic import (
-    Compliance,
-    DriverSetup,
-    DriverSight,
-    LampFailureEvent,
-    TrafficSetup,
-    Trigger,
-)
+from fogsim.traffic import Compliance, DriverSetup, DriverSight, LampFailureEvent, TrafficSetup, Trigger
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import unaffected, within_sight
@@ -183,10 +176,7 @@ def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> 
     assert leaves_its_lane(setup, None)
     assert leaves_its_lane(setup, SeesFrom(400.0))
     assert not leaves_its_lane(setup, SeesFrom(40.0))
-
-
-def test_a_lane_change_model_that_cannot_be_told_keeps_seeing(setup: TrafficSetup) -> None:
-    assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")
+    assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")  # which cannot be told
 
 
 def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(setup: TrafficSetup) -> None:

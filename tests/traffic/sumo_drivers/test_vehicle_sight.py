@@ -65,9 +65,6 @@ def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows() -> None:
         assert line[LINE] == pytest.approx(distance)
         if bearing is not None:
             assert abs(math.degrees(line[BEARING])) == pytest.approx(abs(bearing), abs=1e-9)
-
-
-def test_the_line_climbs_to_a_vehicle_that_is_higher() -> None:
     (line,) = sight_of(two_vehicles(35.0, 0.0, 0.0, height=4.0), even(100.0), DAY).lines_of_sight(PAIR)
     assert line[LINE] == pytest.approx(math.hypot(30.0, 4.0))
 
@@ -106,6 +103,8 @@ def test_sight_goes_through_the_fog_that_lies_on_its_line() -> None:
     assert sight_of(behind, fog, DAY).sees(PAIR, DARK) == [False]
     assert sight_of(aside, fog, DAY).sees(PAIR, DARK) == [True]
     assert sight_of(aside, fog, DAY).sees([], DARK) == []
+    nowhere = two_vehicles(-1073741824.0, -1073741824.0, 0.0)
+    assert sight_of(nowhere, even(100.0), DAY).sees(PAIR, {}) == [False]
 
 
 def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
@@ -120,8 +119,3 @@ def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
         return max(distance for distance, view in views.items() if view.sees(PAIR, DARK)[0])
 
     assert farthest("truck") / farthest("passenger") == pytest.approx((2.33 - 1.2) / (1.5 - 1.2), rel=0.04)
-
-
-def test_a_vehicle_that_is_nowhere_is_not_seen() -> None:
-    nowhere = two_vehicles(-1073741824.0, -1073741824.0, 0.0)
-    assert sight_of(nowhere, even(100.0), DAY).sees(PAIR, {}) == [False]

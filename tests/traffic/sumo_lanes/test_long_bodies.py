@@ -156,18 +156,13 @@ def test_a_train_on_the_crossing_is_near_wherever_its_front_is(link: LibsumoLink
     assert sight.sees(pairs, {}) == [True]
 
 
-def test_an_ego_on_rails_runs_and_is_shown_no_light_of_the_road() -> None:
+def test_an_ego_on_rails_runs_and_is_shown_no_light_of_the_road(link: LibsumoLink) -> None:
+    """Every letter that is no light is none, and no head stands where a link is not controlled."""
     settings = ("renderer=none", "estimators=[]", "fog.visibility_m=300", "duration_s=20")
     steps = list(fogsim.run(scenario_from_config(RAILS, "train", settings), seed=1))
     assert steps[-1].route_position - steps[0].route_position > 200.0
     assert {step.signal_ahead for step in steps} == {None}
-
-
-def test_no_head_stands_where_a_link_is_not_controlled() -> None:
     assert {head.lane_id for head in read_net(CASES / "rails.net.xml").signal_heads} == {"e0_0"}
-
-
-def test_every_letter_that_is_no_light_is_none(link: LibsumoLink) -> None:
     api = begun(link, "-c", str(RAILS))
     link.step()
     assert {api.vehicle.getNextTLS("train")[0][1:4:2]} == {(-1, "M")}

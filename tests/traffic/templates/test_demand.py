@@ -53,16 +53,6 @@ def test_the_road_is_full_at_first_and_the_seed_varies_it(tmp_path: Path) -> Non
     assert found[1] != found[2]
 
 
-def test_actors_have_the_whole_way_as_their_route() -> None:
-    root = ET.fromstring(written("motorway", ())[1])  # noqa: S314 - our own text
-    routes = {one.get("id"): one.get("edges") for one in root.iter("route")}
-    vehicles = {one.get("id"): one for one in root.iter("vehicle")}
-    assert routes["route.slow"] == "same_way same_way.1 same_way.2"
-    assert [vehicles[name].get("departEdge") for name in ("ego", "slow")] == ["1", "1"]
-    # The first cut is 30 m behind the ego, which is 4.6 m long, and the lane across it has SUMO's least length.
-    assert float(vehicles["ego"].get("departPos") or "") == pytest.approx(30.0 + 4.6 - 0.1)
-
-
 def test_some_turn_where_roads_meet() -> None:
     root = ET.fromstring(written("crossing", (("south", 0.1),), turning=0.5)[1])  # noqa: S314 - our own text
     periods = {one.get("id"): one.get("period") for one in root.iter("flow") if one.get("period")}
@@ -71,8 +61,16 @@ def test_some_turn_where_roads_meet() -> None:
     assert routes["route.south.left.0"] == "south same_way.back"
 
 
-def test_heavy_vehicles_keep_to_the_right_and_are_as_many_as_said() -> None:
+def test_actors_have_the_whole_way_as_their_route_and_heavy_vehicles_keep_to_the_right_and_are_as_many_as_said() -> (
+    None
+):
     root = ET.fromstring(written("motorway", ())[1])  # noqa: S314 - our own text
+    routes = {one.get("id"): one.get("edges") for one in root.iter("route")}
+    vehicles = {one.get("id"): one for one in root.iter("vehicle")}
+    assert routes["route.slow"] == "same_way same_way.1 same_way.2"
+    assert [vehicles[name].get("departEdge") for name in ("ego", "slow")] == ["1", "1"]
+    # The first cut is 30 m behind the ego, which is 4.6 m long, and the lane across it has SUMO's least length.
+    assert float(vehicles["ego"].get("departPos") or "") == pytest.approx(30.0 + 4.6 - 0.1)
     mixes = {
         one.get("id"): {kind.get("id"): float(kind.get("probability") or "") for kind in one}
         for one in root.iter("vTypeDistribution")

@@ -77,11 +77,6 @@ expect:
 """
 
 
-def test_persons_are_kept_as_they_are_written_out(scenario: Path) -> None:
-    loaded = fogsim.load_scenario(scenario)
-    assert override(loaded, []).actors == loaded.actors
-
-
 @pytest.fixture
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "cache"))
@@ -91,7 +86,9 @@ def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_who_steps_out_of_the_fog_is_struck_and_it_is_a_collision(scenario: Path) -> None:
-    steps = list(fogsim.run(fogsim.load_scenario(scenario), seed=1))
+    loaded = fogsim.load_scenario(scenario)
+    assert override(loaded, []).actors == loaded.actors  # as they are written out
+    steps = list(fogsim.run(loaded, seed=1))
     (hit,) = steps[-1].collisions
     assert (hit.collider, hit.victim) == ("ego", "child")
     assert hit.impact_speed > 20.0
@@ -122,9 +119,6 @@ def test_mistakes_about_persons_are_told(scenario: Path) -> None:
         with pytest.raises(InputError) as refused:
             fogsim.load_scenario(scenario)
         assert told in str(refused.value)
-
-
-def test_persons_per_hour_need_somewhere_to_walk(scenario: Path) -> None:
     plain = TEXT.replace(", zebra_crossings: [400 m]", "").replace(", crosses_at: 400 m", "")
     scenario.write_text(plain.replace("fog:", "demand: {persons: {across: 60 persons/h}}\nfog:"), encoding="utf-8")
     with pytest.raises(InputError, match=r"demand.persons.across_pph: .*give road.footways: true and road.zebra_cross"):

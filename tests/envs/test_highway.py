@@ -43,17 +43,6 @@ def test_gymnasiums_checker_finds_nothing(continuous: bool, caplog: pytest.LogCa
     assert not caplog.records
 
 
-def test_the_action_reaches_the_road(env: gymnasium.Env[Any, Any]) -> None:
-    def speed_after(action: Any) -> float:
-        env.reset(seed=5)
-        for _ in range(8):
-            *_, info = env.step(action)
-        return float(info["speed_mps"])
-
-    slow, free = speed_after(SLOW), speed_after(NO_ADVICE)
-    assert slow < 18.0 < free
-
-
 def test_fog_is_seen_and_told(env: gymnasium.Env[Any, Any]) -> None:
     clear = {"overrides": ["fog.visibility_m=inf"]}
     foggy, info = env.reset(seed=5)
@@ -161,10 +150,6 @@ def test_vector_environments(make: Callable[..., Any]) -> None:
 
 
 def test_bad_arguments() -> None:
-    with pytest.raises(InputError, match="id of highway-env"):
-        gymnasium.make(ID, environment="CartPole-v1")
-    with pytest.raises(InputError, match="visibility must be a number ≥ 1 m"):
-        gymnasium.make(ID, visibility=-1.0)
     with pytest.raises(InputError, match=r"traffic\.ego: .*highway-env's own here.*got 'veh0'"):
         gymnasium.make(ID, overrides=["traffic.ego=veh0"])
     env = gymnasium.make(ID, overrides=["traffic.events=[{kind: lamps_fail, vehicle: led, at_time_s: 0}]"], **SMALL)
@@ -175,7 +160,7 @@ def test_bad_arguments() -> None:
         FogCameraWrapper(gymnasium.make("CartPole-v1"))
 
 
-@pytest.mark.parametrize(("name", "config"), [("highway-v0", FEW), ("merge-v1", {}), ("roundabout-v1", {})])
+@pytest.mark.parametrize(("name", "config"), [("highway-v0", FEW), ("roundabout-v1", {})])
 def test_the_wrapper_adds_a_camera(name: str, config: dict[str, Any]) -> None:
     plain = gymnasium.make(name, config=config)
     env = FogCameraWrapper(

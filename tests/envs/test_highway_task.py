@@ -95,7 +95,3 @@ def test_what_does_not_fit_is_refused(env: gymnasium.Env[Any, Any]) -> None:
         env.reset(seed=1, options={"scenario": "motorway_fog_bank"})
     with pytest.raises(InputError, match="did you mean 'visibility'"):
         env.reset(seed=1, options={"visiblity": 60.0})
-    with pytest.raises(InputError, match="way: expected more than 0 m"):
-        gymnasium.make(ID, way=0.0)
-    with pytest.raises(InputError, match="an id of highway-env"):
-        gymnasium.make(ID, environment="CartPole-v1")

@@ -296,7 +296,6 @@ def test_a_night_that_may_come_is_prepared(light: dict[str, float], prepared: bo
     ("make", "message"),
     [
         (lambda: FogDistribution(visibility=(100.0, 50.0)), "FogDistribution.visibility"),
-        (lambda: FogDistribution(clear_share=1.5), "FogDistribution: clear_share"),
         (lambda: ScenarioDistribution(light={"noon": 1.0}), "unknown name 'noon'"),
         (lambda: ScenarioDistribution(scripts={"lead": 0.0}), "not all 0"),
         (lambda: ScenarioDistribution(lanes=()), "at least one"),

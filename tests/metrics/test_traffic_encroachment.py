@@ -99,7 +99,7 @@ def test_time_between_two_that_cross_squarely() -> None:
     assert found[BELOW_1] == 0.0
 
 
-@pytest.mark.parametrize("degrees", [30.0, 60.0, 120.0, -145.0])
+@pytest.mark.parametrize("degrees", [30.0, -145.0])
 def test_time_between_two_that_cross_aslant(degrees: float) -> None:
     angle = math.radians(degrees)
     found = measured(a=Driver(evenly(3.0)), b=Driver(evenly(6.5, 7.0), angle, ways=NORTHWARDS))

@@ -9,7 +9,6 @@ from fogsim.calibration.staged_road import road_renderer
 from fogsim.errors import UnknownNameError
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import Reproduction
-from fogsim.reproduce import huang2015_published as published
 from fogsim.reproduce.huang2015 import CAMERA, SAMPLES, VEHICLE, reproduce
 from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.reproduce.huang2015_figures import LAST, TABLES, Case, figures, wanted_cases
@@ -36,15 +35,6 @@ def test_one_table_runs_alone_and_an_unknown_one_is_refused() -> None:
     assert {case.interval for case in wanted_cases(figures(["5.3"]), [])} == {5.0}
     with pytest.raises(UnknownNameError, match=r"4\.4"):
         reproduce(table="4.4")
-
-
-def test_printed_first_estimates_are_ten_to_twenty_rows_low_with_the_camera_of_eq_4_11() -> None:
-    off = [
-        1.5 * CAMERA.row_distance * (1.0 / first - 1.0 / true)
-        for true, (first, _) in published.TABLE_4_1.items()
-        if math.isfinite(first)
-    ]
-    assert [round(rows) for rows in off] == [15, 11, 18, 20, 12]
 
 
 def test_ratios_of_table_4_2_are_the_law_s(done) -> None:

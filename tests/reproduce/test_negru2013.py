@@ -1,7 +1,6 @@
 """negru2013's evaluation on our frames, and what the command says of it."""
 
 import json
-import math
 from functools import partial
 from pathlib import Path
 
@@ -33,11 +32,6 @@ def test_every_scene_and_density_of_the_paper_is_there(done) -> None:
     assert len(done.table) == len(done.records) + 1
     assert {len(row) for row in done.table} == {len(done.table[0])}
     assert done.picture.shape == (515, 3 * 688, 3)
-
-
-def test_truth_is_koschmieders(done) -> None:
-    for record in done.records:
-        assert record["visibility_m"] == pytest.approx(math.log(20.0) / record["extinction_per_m"])
 
 
 def test_the_corrected_method_is_near_the_truth_wherever_it_tells(done) -> None:

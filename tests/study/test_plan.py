@@ -118,7 +118,6 @@ def test_a_metric_of_a_users_own_does_not_take_the_column_of_a_factor() -> None:
         ("10", r"10 f0 × 10 f1 × 10 f2 × 10 f3 × 10 f4 × … are 10,000,000,000 runs; at most 100,000 are allowed"),
         ("100000", r"are 100,000,000,000,000 runs; at most"),
         ("1000000000", r"seeds: input should be less than or equal to 100000.*; got 1000000000"),
-        ("1e9", r"seeds: input should be a valid integer"),
     ],
 )
 def test_a_grid_is_counted_before_it_is_built(tmp_path: Path, seeds: str, told: str) -> None:

@@ -34,11 +34,8 @@ def test_circles_share_what_geometry_says() -> None:
 
 def test_blots_take_as_much_light_as_they_cover() -> None:
     """At random over one another, they leave e^(−coverage) on average (a Boolean model of discs)."""
-    left = [
-        passed_light(CAMERA, scattered_blots(CAMERA, 0.3, 0.002, np.random.default_rng(seed))).mean()
-        for seed in range(12)
-    ]
-    assert np.mean(left) == pytest.approx(math.exp(-0.3), rel=0.03)
+    blots = [scattered_blots(CAMERA, 0.3, 0.002, np.random.default_rng(seed)) for seed in range(12)]
+    assert np.mean([passed_light(CAMERA, one).mean() for one in blots]) == pytest.approx(math.exp(-0.3), rel=0.03)
 
 
 def test_a_blot_smaller_than_the_pupil_hides_its_share_of_it_and_is_as_wide() -> None:

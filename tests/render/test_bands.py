@@ -28,7 +28,7 @@ def test_pictures_do_not_depend_on_the_bands(place: Any, monkeypatch: pytest.Mon
             assert np.array_equal(getattr(whole, name), getattr(banded, name)), (name, middle)
 
 
-def test_every_row_is_worked_on_once_and_the_slower_band_gets_fewer(
+def test_every_row_is_worked_on_once_and_a_slower_band_has_fewer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(jit, "processors", lambda: 2)

@@ -18,7 +18,7 @@ from fogsim.values.pinhole import camera_axes
 from tests.render.conftest import drawing_of, joined, mesh, rays, rectangle
 
 CAMERA = Camera(320, 240, 288.0, (160.0, 120.0), 1.38, pitch=math.radians(2.0))
-AHEAD = CameraPose((0.0, 0.0, 1.38), heading=0.0)
+AHEAD, ORIGIN = CameraPose((0.0, 0.0, 1.38), heading=0.0), CameraPose((0.0, 0.0, 0.0), 0.0)
 ILLUMINANCE = 18e3
 WEIGHTS = (0.2126, 0.7152, 0.0722)
 ONE = np.eye(4)[None, :3]
@@ -47,9 +47,8 @@ def drawn(ground: Mesh, illuminance: float = ILLUMINANCE, **shapes: Mesh) -> Ren
 
 def copy_of(shape: str, lamps: int = 0, instance: int = 16) -> Batch:
     transform = np.eye(4, dtype=np.float32)[None]
-    return Batch(
-        shape, transform, np.full((1, 3), 0.4, np.float32), np.array([lamps], np.int32), np.array([instance], np.int32)
-    )
+    paint, one = np.full((1, 3), 0.4, np.float32), np.ones(1, np.int32)
+    return Batch(shape, transform, paint, lamps * one, instance * one)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +86,7 @@ def test_distances_on_walls_are_those_of_their_planes() -> None:
 
 def nearest(triangles: np.ndarray, camera: Camera) -> np.ndarray:
     """Triangle (cast by rays one by one, Möller & Trumbore) that each pixel sees from the origin."""
-    ray = rays(camera, CameraPose((0.0, 0.0, 0.0), 0.0)).reshape(-1, 3)
+    ray = rays(camera, ORIGIN).reshape(-1, 3)
     best, found = np.full(len(ray), np.inf), np.full(len(ray), -1)
     for number, (a, b, c) in enumerate(triangles):
         edge, other = b - a, c - a
@@ -107,13 +106,10 @@ def test_pixels_see_the_triangles_that_their_rays_hit() -> None:
         rng = np.random.default_rng(seed)
         camera = Camera(90, 70, 60.0, (44.0, 33.0), 1.0, roll=0.3)
         middle = rng.normal(size=(120, 1, 3)) * (12.0, 9.0, 6.0)  # many reach behind the camera
-        triangles = (middle + rng.normal(size=(120, 3, 3)) * rng.choice([0.3, 2.0, 9.0], (120, 1, 1))).astype(
-            np.float32
-        )
+        around = rng.normal(size=(120, 3, 3)) * rng.choice([0.3, 2.0, 9.0], (120, 1, 1))
+        triangles = (middle + around).astype(np.float32)
         table = MeshTable.of({"": mesh(triangles)})
-        triangle_ids = CPURasteriser(table).triangle_ids(
-            drawing_of(table, [0], ONE), camera, CameraPose((0.0, 0.0, 0.0), 0.0)
-        )
+        triangle_ids = CPURasteriser(table).triangle_ids(drawing_of(table, [0], ONE), camera, ORIGIN)
         exact = nearest(triangles.astype(float), camera)
         assert (exact >= 0).mean() > 0.5
         assert (triangle_ids != exact).mean() < 1e-3  # edges and depths that rounding decides
@@ -130,9 +126,7 @@ def test_triangles_that_share_edges_leave_no_gap(seed: int) -> None:
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     triangles = np.concatenate((np.stack((a, b, c), axis=2), np.stack((a, c, d), axis=2))).reshape(-1, 3, 3)
     table = MeshTable.of({"": mesh(triangles)})
-    assert (
-        CPURasteriser(table).triangle_ids(drawing_of(table, [0], ONE), camera, CameraPose((0.0, 0.0, 0.0), 0.0)) >= 0
-    ).all()
+    assert (CPURasteriser(table).triangle_ids(drawing_of(table, [0], ONE), camera, ORIGIN) >= 0).all()
 
 
 def test_what_is_seen_has_its_instance_id(place: Any) -> None:
@@ -268,10 +262,8 @@ def test_a_scene_without_triangles_is_sky() -> None:
 
 def test_a_camera_inside_a_vehicle_sees_it_from_inside(place: Any) -> None:
     vehicles = vehicle_batches(place.traffic, None)
-    x, y, _ = place.traffic.position[0] - 2.0 * np.array(
-        [math.cos(place.traffic.heading[0]), math.sin(place.traffic.heading[0]), 0.0]
-    )
-    pose = CameraPose((float(x), float(y), 1.0), float(place.traffic.heading[0]))
+    (x, y, _), heading = place.traffic.position[0], float(place.traffic.heading[0])
+    pose = CameraPose((float(x - 2.0 * math.cos(heading)), float(y - 2.0 * math.sin(heading)), 1.0), heading)
     view = make_renderer("cpu", place.scene, ILLUMINANCE).render(vehicles, CAMERA, pose, lamplight=True)
     assert (view.instance == 16).any()
     assert view.distance.min() >= NEAR

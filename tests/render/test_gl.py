@@ -181,9 +181,7 @@ def test_renderers_give_back_what_they_hold(scene: Scene, renderer: Renderer) ->
     assert held() == before
 
 
-def test_unknown_renderers_and_light_are_refused_and_the_report_names_the_version(
-    scene: Scene, renderer: Renderer
-) -> None:
+def test_unknown_renderers_and_light_are_refused_and_the_version_reported(scene: Scene, renderer: Renderer) -> None:
     with pytest.raises(UnknownNameError, match="pyrender"):
         make_renderer("pyrendr", scene, ILLUMINANCE)
     with pytest.raises(InputError, match="illuminance"):

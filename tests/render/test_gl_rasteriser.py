@@ -49,9 +49,8 @@ def test_both_rasterisers_see_the_same_triangle_of_the_same_copy() -> None:
     rng = np.random.default_rng(4)
     table = soup(rng, (1, 7, 60, 300))
     drawing = drawing_of(table, rng.integers(0, 4, 200), scattered(rng, 200, camera_axes(CAMERA, POSE)))
-    by_opengl, by_numba = (
-        maker(table).triangle_ids(drawing, CAMERA, POSE).copy() for maker in (GLRasteriser, CPURasteriser)
-    )
+    makers = (GLRasteriser, CPURasteriser)
+    by_opengl, by_numba = (maker(table).triangle_ids(drawing, CAMERA, POSE).copy() for maker in makers)
     assert len(np.unique(by_opengl)) > 1000
     # Triangles pierce one another all over the picture, and along those lines either may win.
     assert np.mean(by_opengl == by_numba) > 0.99

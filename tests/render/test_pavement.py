@@ -84,9 +84,8 @@ def test_stretches_keep_the_mean_and_have_their_deviation_at_any_distance() -> N
     assert metres.std() == pytest.approx(1.0)
     for start, extent in ((3.25, 40.0), (PERIOD - 10.0, 50.0), (-7.0, 200.0)):
         fine = start + extent * (np.arange(20_000) + 0.5) / 20_000 - 0.5 * extent
-        assert mean_of_stretches(integral, start, extent) == pytest.approx(
-            metres[np.floor(fine).astype(int) % PERIOD].mean(), abs=2e-3
-        )
+        mean = metres[np.floor(fine).astype(int) % PERIOD].mean()
+        assert mean_of_stretches(integral, start, extent) == pytest.approx(mean, abs=2e-3)
     pose = CameraPose((0.0, 0.0, 1.38), 0.0)
     plain, mended = (view(Pavement(repairs=one), pose) for one in (0.0, 0.1))
     row = 300

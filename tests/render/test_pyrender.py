@@ -68,7 +68,7 @@ def test_so_they_are_at_other_sizes_and_angles(place: Place, three: dict[str, Re
     agree(*(three[name].render(vehicles, TILTED, place.pose) for name in ("pyrender", "cpu")))
 
 
-def test_radiance_is_that_of_the_others_but_for_grain_and_eight_bits_and_so_are_paint_and_lamps(
+def test_radiance_paint_and_lamps_are_as_of_the_others_but_for_grain_and_eight_bits(
     views: dict[str, View],
 ) -> None:
     one, other = views["pyrender"], views["cpu"]

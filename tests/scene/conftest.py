@@ -22,9 +22,8 @@ def carriageway(edge: str, start: tuple[float, float], heading: float, length: f
 
 def street(line: ArrayLike, name: str = "a", speed: float = 13.9, width: float = 3.2) -> Lane:
     """A lane of its own between solid lines, beside which a road ends."""
-    return Lane(
-        name, name, np.asarray(line, np.float64), width, speed, LaneMarking.SOLID, LaneMarking.SOLID, outermost=True
-    )
+    line, solid = np.asarray(line, np.float64), LaneMarking.SOLID
+    return Lane(name, name, line, width, speed, solid, solid, outermost=True)
 
 
 @pytest.fixture(scope="session")

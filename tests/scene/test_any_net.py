@@ -126,9 +126,8 @@ def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:
 def test_street_lamps_stand_on_the_left_where_vehicles_keep_to_it() -> None:
     there = street([[0.0, 0, 0], [200, 0, 0]])
     back = street(there.centreline[::-1] - np.array([0.0, 3.2, 0.0]), "b")
-    scene = build_scene(
-        RoadNetwork((there, back), there.centreline), SignMap(), np.random.default_rng(5), street_lamps=True
-    )
+    network = RoadNetwork((there, back), there.centreline)
+    scene = build_scene(network, SignMap(), np.random.default_rng(5), street_lamps=True)
     heads = street_lamp_heads(scene)
     feet = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape == "street_lamp"]).astype(float)
     index = LaneIndex([there, back])

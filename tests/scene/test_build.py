@@ -50,9 +50,7 @@ def test_trees_stand_clear_of_every_lane(motorway: RoadNetwork, scene: Scene) ->
     assert index.clearance(trunks).min() > 9.0
 
 
-def test_delineators_stand_every_50_m_on_free_sides_only_and_guard_rails_on_fast_roads(
-    scene: Scene, motorway: RoadNetwork
-) -> None:
+def test_delineators_stand_every_50_m_and_rails_along_fast_roads_only(scene: Scene, motorway: RoadNetwork) -> None:
     posts = next(batch for batch in scene.scenery if batch.shape == "delineator").transforms[:, :3, 3]
     right = posts[posts[:, 1] < 0]
     assert np.diff(np.sort(right[:, 0])) == pytest.approx(50.0, abs=0.1)

@@ -65,9 +65,8 @@ def test_the_distance_of_the_road_is_that_of_its_geometry() -> None:
     length = depth * math.sqrt(1.0 + ((v - 59.5) / 150.0) ** 2 + (0.5 / 150.0) ** 2)
     # λ / (v − v_h) is reckoned from the foot of the camera, but for the tilt of its axis.
     assert whole[v, 80] == pytest.approx(length, rel=0.02)
-    assert whole[v, 80] == pytest.approx(
-        CAMERA.mount_height / math.sin(CAMERA.pitch + math.atan((v - 59.5) / 150.0)), rel=1e-3
-    )
+    angle = CAMERA.pitch + math.atan((v - 59.5) / 150.0)
+    assert whole[v, 80] == pytest.approx(CAMERA.mount_height / math.sin(angle), rel=1e-3)
     assert whole[0].min() == FARTHEST
     assert blocks.shape == (30, 40)
 

@@ -101,9 +101,8 @@ def test_a_camera_above_the_fog_sees_into_it() -> None:
 def test_clear_uneven_air_changes_nothing() -> None:
     field = dataclasses.replace(UNEVEN["ground fog"], extinction=0.0)
     view = black_road(SMALL, POSE)
-    bright = dataclasses.replace(
-        view, radiance=np.random.default_rng(0).uniform(0, 9e3, view.radiance.shape).astype("f4")
-    )
+    light = np.random.default_rng(0).uniform(0, 9e3, view.radiance.shape).astype("f4")
+    bright = dataclasses.replace(view, radiance=light)
     assert np.array_equal(Air(field).radiance(bright, SMALL, POSE), bright.radiance)
 
 

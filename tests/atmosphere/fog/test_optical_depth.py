@@ -38,10 +38,7 @@ def test_visibility_inside_and_outside_a_bank() -> None:
     half = np.array([100.0, 50.0, 1.0])
     assert extinction(FIELD, half) == pytest.approx(0.0015 + 0.045 / 2)
     # Where clearings cross there is no less than no fog.
-    clearings = (
-        FogBank((0.0, 0.0), (1.0, 0.0), 100.0, 300.0, 50.0, -0.03),
-        FogBank((0.0, 0.0), (0.0, 1.0), 100.0, 300.0, 50.0, -0.03),
-    )
+    clearings = tuple(FogBank((0.0, 0.0), axis, 100.0, 300.0, 50.0, -0.03) for axis in ((1.0, 0.0), (0.0, 1.0)))
     field = FogField(0.03, AIRLIGHT, clearings, top=60.0)
     assert extinction(field, (200.0, 200.0, 1.0)) == 0.0
     assert optical_depth(field, (200.0, 200.0, 1.0), (220.0, 210.0, 1.0)) == 0.0

@@ -132,9 +132,8 @@ def test_preparing_changes_nothing_and_light_in_the_air_is_computed_once_a_proce
     field, lights = fog(100), Lights(LOW, LightSources.none())
     prepared, fresh = Air(field), Air(field)
     prepared.prepare(CAMERA, [LOW])
-    assert np.array_equal(
-        prepared.radiance(road_view(), CAMERA, POSE, lights), fresh.radiance(road_view(), CAMERA, POSE, lights)
-    )
+    one, other = (air.radiance(road_view(), CAMERA, POSE, lights) for air in (prepared, fresh))
+    assert np.array_equal(one, other)
     OwnLamplight().prepare(CAMERA, LOW)
     monkeypatch.setattr(lamplight, "lit_air", lambda *_: pytest.fail("computed anew"))
     OwnLamplight().prepare(CAMERA, LOW)

@@ -28,9 +28,8 @@ def test_the_sky_over_a_lit_road_is_that_of_photons(droplets):
         field, out = fog(float(row["visibility"])), np.zeros((120, 160, 3), np.float32)
         sources = road_glow.RoadGlow().sources(LOW, CAMERA, POSE, field)
         Halos(droplets).add(out, empty_view(CAMERA), CAMERA, POSE, field, sources)
-        drawn = np.interp(
-            79.5 - 100.0 * math.tan(math.radians(row["up"])), np.arange(120), out[:, 79:81, 1].mean(axis=1)
-        )
+        at = 79.5 - 100.0 * math.tan(math.radians(row["up"]))
+        drawn = np.interp(at, np.arange(120), out[:, 79:81, 1].mean(axis=1))
         assert 0.75 < drawn / row["road"] < 1.5
 
 

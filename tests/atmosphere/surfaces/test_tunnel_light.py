@@ -33,9 +33,8 @@ def test_the_skys_share_is_the_integral_over_the_portal() -> None:
     assert daylight_share(-1e-6, 400.0, HALF_WIDTH, HEIGHT) == pytest.approx(0.5, abs=1e-4)
     assert daylight_share(-40.0, 400.0, HALF_WIDTH, HEIGHT) > 0.999
     for place in (-12.0, 3.0, 150.0):
-        assert daylight_share(place, 400.0, HALF_WIDTH, HEIGHT) == pytest.approx(
-            daylight_share(400.0 - place, 400.0, HALF_WIDTH, HEIGHT)
-        )
+        one, other = (daylight_share(at, 400.0, HALF_WIDTH, HEIGHT) for at in (place, 400.0 - place))
+        assert one == pytest.approx(other)
 
 
 def lit(x: float, distance: float, own: float = 0.0, sky: float = SKY) -> np.ndarray:

@@ -61,9 +61,8 @@ def test_the_road_filter_is_the_dense_law_of_patches_grain_and_shared_noise(rows
         scaled = math.sqrt(3.0) / evidence_kernels.PATCHES * apart
         covariance = np.outer(patches, patches) * (1.0 + scaled) * np.exp(-scaled)
         covariance += np.outer(grain, grain) * np.exp(-apart / evidence_kernels.GRAIN)
-        covariance += 0.004**2 * np.exp(-np.abs(row[:, None] - row) / evidence_kernels.SHARED_ROWS) + np.diag(
-            noise[seen] ** 2
-        )
+        covariance += 0.004**2 * np.exp(-np.abs(row[:, None] - row) / evidence_kernels.SHARED_ROWS)
+        covariance += np.diag(noise[seen] ** 2)
         assert found_evidence(gram, half) == pytest.approx(dense(light[seen], columns[seen], covariance), abs=0.01)
 
 

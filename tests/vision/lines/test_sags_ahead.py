@@ -16,9 +16,8 @@ def test_curvatures_of_neighbouring_pieces_are_alike_and_beginnings_rare():
     assert np.diag(covariance) == pytest.approx(road_course.SAG_DEVIATION**2)
     assert covariance[0, 1] == pytest.approx(road_course.SAG_DEVIATION**2 * np.exp(-KNOTS[1] / road_course.SAG_LENGTH))
     assert road_course.beginning_cost(0.0) == pytest.approx(-2.0 * np.log(road_course.BEGINS))
-    assert road_course.beginning_cost(2.0 * road_course.SAG_DEVIATION) - road_course.beginning_cost(
-        0.0
-    ) == pytest.approx(4.0)
+    steep = road_course.beginning_cost(2.0 * road_course.SAG_DEVIATION)
+    assert steep - road_course.beginning_cost(0.0) == pytest.approx(4.0)
 
 
 def test_without_lines_every_sag_is_as_likely_by_them_and_the_row_stays():

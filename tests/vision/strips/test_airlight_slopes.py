@@ -45,9 +45,8 @@ def darkness(albedo, level):
 
 
 def around(extinction, albedo, droplets):
-    return slant_airlight(
-        FogField(extinction, (1.0,) * 3, top=7.5 / extinction, ground_albedo=albedo), CAMERA.mount_height, droplets
-    )
+    field = FogField(extinction, (1.0,) * 3, top=7.5 / extinction, ground_albedo=albedo)
+    return slant_airlight(field, CAMERA.mount_height, droplets)
 
 
 def shares(angles, extinction, albedo, droplets=Droplets.MODERATE_RADIATION):

@@ -45,10 +45,8 @@ def test_rows_of_a_sag_are_nearer_and_of_a_crest_farther(sag):
     laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, sag=np.full(PIECES, sag)))
     row = int(np.argmin(np.abs(STRAIGHT.distance - 80.0)))
     distance = float(laid.distance[row])
-    rise = 0.5 * sag * distance**2
-    assert STRAIGHT.below[row] == pytest.approx(
-        CAMERA.row_distance / distance * (1.0 - rise / CAMERA.mount_height), rel=1e-6
-    )
+    below = CAMERA.row_distance / distance * (1.0 - 0.5 * sag * distance**2 / CAMERA.mount_height)
+    assert STRAIGHT.below[row] == pytest.approx(below, rel=1e-6)
     assert (distance < STRAIGHT.distance[row]) == (sag > 0)
 
 

@@ -24,9 +24,8 @@ def test_bins_lie_where_the_road_is_seen():
         # Depth is along the optical axis.
         ahead = (distance - CAMERA.mount_height * np.sin(CAMERA.pitch)) / np.cos(CAMERA.pitch)
         _, row = projected(CAMERA, ahead, 0.0)
-        assert np.interp(row - CAMERA.horizon_row, geometry.below[::-1], geometry.distance[::-1]) == pytest.approx(
-            distance, rel=0.01
-        )
+        seen = np.interp(row - CAMERA.horizon_row, geometry.below[::-1], geometry.distance[::-1])
+        assert seen == pytest.approx(distance, rel=0.01)
         for strip, sides in enumerate(SIDES):
             expected = [np.clip(projected(CAMERA, ahead, side)[0], -0.5, CAMERA.width - 0.5) for side in sides]
             found = [np.interp(distance, geometry.distance, side[strip]) for side in (geometry.left, geometry.right)]

@@ -43,9 +43,8 @@ def fitted(k: float):
 
 @pytest.mark.parametrize(("bank", "trees"), [(130.0, 0.0), (180.0, 0.6), (240.0, 0.0), (240.0, 0.6)])
 def test_a_bank_is_found_where_it_begins(bank, trees):
-    place, deviation, extinction = airlight_edge(
-        drawn(0.0015, bank, trees=trees), GEOMETRY, CAMERA, SKY, fitted(0.0015), 0.2
-    )
+    image = drawn(0.0015, bank, trees=trees)
+    place, deviation, extinction = airlight_edge(image, GEOMETRY, CAMERA, SKY, fitted(0.0015), 0.2)
     # Nothing but airlight is left 55 m inside, and the next row that shows it may be much farther.
     assert bank < place < bank + 55.0 + 2.0 * deviation
     assert 2.5 * 0.0015 < extinction <= 0.06
@@ -68,7 +67,6 @@ def test_an_unsure_horizon_and_a_crest_hide_fronts():
     assert airlight_edge(seen, GEOMETRY, CAMERA, SKY, fitted(0.0015), 0.2) is not None
     assert airlight_edge(seen, GEOMETRY, CAMERA, SKY, fitted(0.0015), 2.0) is None
     hidden = GEOMETRY.distance > 90.0
-    crest = GEOMETRY._replace(
-        below=np.where(hidden, 1.2, GEOMETRY.below), distance=np.where(hidden, 664.0, GEOMETRY.distance)
-    )
+    below, distance = np.where(hidden, 1.2, GEOMETRY.below), np.where(hidden, 664.0, GEOMETRY.distance)
+    crest = GEOMETRY._replace(below=below, distance=distance)
     assert airlight_edge(drawn(0.0015, 130.0), crest, CAMERA, SKY, fitted(0.0015), 0.05) is None

@@ -11,11 +11,6 @@ def test_aashto_stopping_sight_distances() -> None:
         assert stopping_sight_distance(kmh / 3.6, 2.5, 3.4) == pytest.approx(metres, abs=0.05)
 
 
-def test_safe_speeds() -> None:
-    for metres, kmh in [(50, 42.5), (100, 68.1), (200, 105.6), (300, 134.9)]:
-        assert safe_speed(metres, 2.5, 3.4) * 3.6 == pytest.approx(kmh, abs=0.05)
-
-
 def test_round_trip_and_limits() -> None:
     for distance in (0.0, 1.0, 60.0, 500.0):
         assert stopping_sight_distance(safe_speed(distance, 1.5, 5.0, 0.03), 1.5, 5.0, 0.03) == pytest.approx(distance)

@@ -45,18 +45,20 @@ def test_sections_go_by_the_nearest_sensor_from_the_beginning_of_a_run():
     assert not any(start < 1000.0 for start in told)
 
 
-def test_wrong_sensors_make_wrong_signs_and_the_truth_does_not():
+@pytest.fixture(scope="module")
+def by_truth() -> Step:
+    """The last step of a run in which signs go by the truth."""
+    return list(fogsim.run(scenario("advice={method: stopping_sight_distance, informed_by: truth}"), 1))[-1]
+
+
+def test_wrong_sensors_make_wrong_signs_and_the_truth_does_not(by_truth: Step):
     told = {one.stretch.start for one in by_sensors("{wrong: 1.0, every_m: 500}")[-1].command.stretches}
-    true = list(fogsim.run(scenario("advice={method: stopping_sight_distance, informed_by: truth}"), 1))
-    assert told != {one.stretch.start for one in true[-1].command.stretches}
+    assert told != {one.stretch.start for one in by_truth.command.stretches}
 
 
-def test_signs_are_read_from_afar():
-    settings = (
-        "advice={method: stopping_sight_distance, informed_by: truth}",
-        "drivers.signs={reading_distance_m: 150}",
-    )
-    near = list(fogsim.run(scenario(*settings[:1]), 1))[-1].command.stretches
+def test_signs_are_read_from_afar(by_truth: Step):
+    truth = "advice={method: stopping_sight_distance, informed_by: truth}"
+    settings, near = (truth, "drivers.signs={reading_distance_m: 150}"), by_truth.command.stretches
     far = list(fogsim.run(scenario(*settings), 1))[-1].command.stretches
     assert [one.stretch.start for one in far] == [one.stretch.start - 150.0 for one in near]
     assert [one.stretch.end for one in far if math.isfinite(one.stretch.end)] == [

@@ -86,8 +86,6 @@ def test_a_braking_leader_is_played(env: gymnasium.Env[Any, Any]) -> None:
     assert info["drawn"]["script"] == "braking_lead"
     with pytest.raises(InputError, match="road: roads and vehicles are highway-env's own"):
         env.reset(seed=1, options={"overrides": ["road={template: motorway, length_m: 1000}"]})
-    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: highway-env moves by"):
-        env.reset(seed=1, options={"overrides": ["clocks.traffic_step_s=0.1"]})
 
 
 def test_what_does_not_fit_is_refused(env: gymnasium.Env[Any, Any]) -> None:

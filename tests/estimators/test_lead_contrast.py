@@ -12,11 +12,11 @@ from fogsim.values.camera_response import respond
 
 LN20 = np.log(20.0)
 CAMERA = Camera(512, 384, 560.0, (255.5, 191.5), 1.35, np.radians(1.5))
-CAMERAS = {
-    "fine": Camera(800, 450, 1100.0, (395.0, 230.0), 1.6, np.radians(2.0), response=Response.SRGB),
-    "high": Camera(480, 360, 480.0, (239.5, 179.5), 2.2, np.radians(4.0), response=Response.GAMMA),
-    "rolled": replace(CAMERA, roll=np.radians(2.0)),
-}
+CAMERAS = (
+    Camera(800, 450, 1100.0, (395.0, 230.0), 1.6, np.radians(2.0), response=Response.SRGB),
+    Camera(480, 360, 480.0, (239.5, 179.5), 2.2, np.radians(4.0), response=Response.GAMMA),
+    replace(CAMERA, roll=np.radians(2.0)),
+)
 SETBACK = 1.7
 SIDE = 2
 RANGES = tuple(float(d) for d in range(25, 91, 5))
@@ -161,21 +161,21 @@ def test_pictures_are_levelled_anew_although_the_reference_is_not_among_them():
     assert estimator.update(observations[12]).method == "lead_contrast"
 
 
-@pytest.mark.parametrize("name", sorted(CAMERAS))
-def test_other_cameras(name):
-    camera = CAMERAS[name]
-    assert abs(off(every(drive(120, away(), 3, camera), camera)[-1], 120)) < 0.06
+LANE_CHANGE = [(Rear(d, aside=float(np.clip(0.3 * (i - 5), 0.0, 2.4))),) for i, d in enumerate(RANGES)]
 
 
-def test_a_motorcycle():
-    rears = away(width=0.65, height=1.5, body=0.12)
-    estimates = every(drive(150, rears, 5))
-    assert abs(off(estimates[-1], 150)) < 0.08
-
-
-def test_a_vehicle_that_comes_nearer_or_stands_aside():
-    assert abs(off(every(drive(150, away(RANGES[::-1]), 1))[-1], 150)) < 0.06
-    assert abs(off(every(drive(150, away(aside=1.0), 2))[-1], 150)) < 0.06
+@pytest.mark.parametrize(
+    ("visibility", "rears", "seed", "camera", "most"),
+    [
+        *((120, away(), 3, camera, 0.06) for camera in CAMERAS),
+        pytest.param(150, away(width=0.65, body=0.12), 5, CAMERA, 0.08, id="a motorcycle"),
+        pytest.param(150, away(RANGES[::-1]), 1, CAMERA, 0.06, id="comes nearer"),
+        pytest.param(150, away(aside=1.0), 2, CAMERA, 0.06, id="aside"),
+        pytest.param(150, LANE_CHANGE, 6, CAMERA, 0.08, id="changes lane"),
+    ],
+)
+def test_other_cameras_vehicles_and_courses(visibility, rears, seed, camera, most):
+    assert abs(off(every(drive(visibility, rears, seed, camera), camera)[-1], visibility)) < most
 
 
 def test_valid_within_twenty_metres():
@@ -199,11 +199,6 @@ def test_a_biased_range_and_setback_change_little():
     assert biased == pytest.approx(plain, rel=0.05)
     near, far = (every(drive(120, away()), setback=setback)[-1].extinction for setback in (0.7, 2.7))
     assert near == pytest.approx(far, rel=0.05)
-
-
-def test_a_lane_change_is_followed():
-    rears = [(Rear(d, aside=float(np.clip(0.3 * (i - 5), 0.0, 2.4))),) for i, d in enumerate(RANGES)]
-    assert abs(off(every(drive(150, rears, 6))[-1], 150)) < 0.08
 
 
 def test_a_gap_in_the_track_does_no_harm():

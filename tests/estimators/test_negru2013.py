@@ -20,28 +20,25 @@ def visibilities(render, road, seeds, **options):
 
 
 @pytest.mark.parametrize(
-    ("visibility", "bound", "response", "airlight"),
+    ("visibility", "bound", "camera", "response", "airlight"),
     [
-        (20, 10, Response.LINEAR, 120.0),
-        (50, 10, Response.GAMMA, 200.0),
-        (100, 10, Response.SRGB, 120.0),
-        (200, 10, Response.LINEAR, 120.0),
-        (200, 10, Response.SRGB, 120.0),
-        (400, 25, Response.GAMMA, 200.0),
+        (20, 0.10, None, Response.LINEAR, 120.0),
+        (50, 0.10, None, Response.GAMMA, 200.0),
+        (100, 0.10, None, Response.SRGB, 120.0),
+        (200, 0.10, None, Response.LINEAR, 120.0),
+        (200, 0.10, None, Response.SRGB, 120.0),
+        (400, 0.25, None, Response.GAMMA, 200.0),
+        *((visibility, 0.10, SMALL, Response.LINEAR, 200.0) for visibility in (50, 100, 200)),
+        *((visibility, 0.10, WIDE, Response.GAMMA, 200.0) for visibility in (100, 400)),
     ],
 )
-def test_recovers_visibility_on_a_foreign_renderers_frames(render, road, visibility, bound, response, airlight):
-    scene = road.but(visibility=visibility, airlight=airlight, camera=replace(road.camera, response=response))
+def test_recovers_visibility_on_a_foreign_renderers_frames(render, road, visibility, bound, camera, response, airlight):
+    told = replace(camera or road.camera, response=response)
+    scene = road.but(visibility=visibility, airlight=airlight, camera=told)
     error = visibilities(render, scene, range(3)) / visibility - 1
-    assert np.median(np.abs(error)) < bound / 100
-
-
-@pytest.mark.parametrize(("camera", "visibility"), [(SMALL, 50), (SMALL, 100), (SMALL, 200), (WIDE, 100), (WIDE, 400)])
-def test_recovers_visibility_with_other_cameras(render, road, camera, visibility):
-    error = visibilities(render, road.but(visibility=visibility, camera=camera), range(3)) / visibility - 1
     # With the small camera the inflection of 200 m is 1.5 rows below the horizon: one of three may not be seen.
-    assert np.isfinite(error).sum() >= 2
-    assert np.nanmedian(np.abs(error)) < 0.10
+    assert np.isfinite(error).sum() >= (2 if camera else 3)
+    assert np.nanmedian(np.abs(error)) < bound
 
 
 def test_interval_covers_the_truth(render, road):
@@ -92,13 +89,9 @@ def test_a_lead_vehicle_does_not_clear_the_fog(render, road, visibility, paint):
 def test_a_wall_across_the_road_is_no_fog_and_no_clear_air(render, road, wall, foot):
     image = render(road.but(visibility=1e6))
     image[200:foot] = wall
-    assert not estimate(image, road.camera).valid
-
-
-def test_an_obstacle_is_named_as_the_reason(render, road):
-    image = render(road.but(visibility=1e6))
-    image[200:300] = 20
-    assert "below the horizon" in str(estimate(image, road.camera).diagnostics["reason"])
+    found = estimate(image, road.camera)
+    assert not found.valid
+    assert wall != 20 or "below the horizon" in str(found.diagnostics["reason"])
 
 
 def test_diagnostics_say_what_was_found(render, road):

@@ -89,6 +89,13 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
     return start
 
 
+@pytest.fixture
+def libsumo() -> Iterator[Any]:
+    """A town that a user simulates in this process."""
+    with libsumo_in_town() as library:
+        yield library
+
+
 @pytest.fixture(params=["libsumo", "traci"])
 def api(request: pytest.FixtureRequest, sumo_process: SumoProcess) -> Iterator[Any]:
     """A town that a user simulates, in this process and over a connection."""

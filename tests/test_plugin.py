@@ -18,16 +18,10 @@ from fogsim.simulation.plugin import AttachedSession
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, EgoControl, Lamp, SpeedAdvice, Step
-from tests.helpers.attached import ARGUMENTS, GRID, libsumo_in_town, traci_in_town
+from tests.helpers.attached import ARGUMENTS, GRID, traci_in_town
 
 SMALL = ("camera.width=96", "camera.height=72")
 EGO = "veh18"  # departs at 36 s and drives through the whole town
-
-
-@pytest.fixture
-def libsumo() -> Iterator[Any]:
-    with libsumo_in_town() as library:
-        yield library
 
 
 @pytest.fixture

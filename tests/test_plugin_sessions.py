@@ -46,19 +46,19 @@ def top_speeds(api: Any) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("first", [0, 1])
-def test_the_lower_advice_holds_until_its_session_is_closed(api: Any, first: int) -> None:
+def test_the_lower_advice_holds_until_its_session_is_closed(libsumo: Any, first: int) -> None:
     """And whoever is closed first, everybody has the own top speed at the end."""
-    drive(api, 10)
-    sessions = [session(api, EGO, *ADVISED), session(api, OTHER_EGO, *ADVISED)]
+    drive(libsumo, 10)
+    sessions = [session(libsumo, EGO, *ADVISED), session(libsumo, OTHER_EGO, *ADVISED)]
     speeds = [4.0, 8.0]
-    drive(api, 30, *zip(sessions, speeds, strict=True))
-    assert set(top_speeds(api).values()) == {4.0}
+    drive(libsumo, 30, *zip(sessions, speeds, strict=True))
+    assert set(top_speeds(libsumo).values()) == {4.0}
     sessions[first].close()
-    assert set(top_speeds(api).values()) == {speeds[1 - first]}
-    drive(api, 4, (sessions[1 - first], speeds[1 - first]))
-    assert set(top_speeds(api).values()) == {speeds[1 - first]}
+    assert set(top_speeds(libsumo).values()) == {speeds[1 - first]}
+    drive(libsumo, 4, (sessions[1 - first], speeds[1 - first]))
+    assert set(top_speeds(libsumo).values()) == {speeds[1 - first]}
     sessions[1 - first].close()
-    assert min(top_speeds(api).values()) > 50.0
+    assert min(top_speeds(libsumo).values()) > 50.0
 
 
 def test_all_on_a_stretch_are_advised_as_long_as_they_are_there(api: Any) -> None:
@@ -103,31 +103,30 @@ def test_all_that_two_sessions_change_is_given_back(api: Any) -> None:
     assert {v: conduct(api, v) for v in api.vehicle.getIDList()} == {v: before[v] for v in api.vehicle.getIDList()}
 
 
-def test_what_the_user_sets_meanwhile_stays(api: Any) -> None:
-    drive(api, 10)
-    one = session(api, EGO, *ADVISED)
-    drive(api, 20, (one, 4.0))
-    vehicle, another = sorted(top_speeds(api))[:2]
-    api.vehicle.setMaxSpeed(vehicle, 20.0)
-    drive(api, 2, (one, 5.0))
-    assert api.vehicle.getMaxSpeed(vehicle) == 5.0
-    api.vehicle.setMaxSpeed(another, 12.0)
+def test_what_the_user_sets_meanwhile_stays(libsumo: Any) -> None:
+    drive(libsumo, 10)
+    one = session(libsumo, EGO, *ADVISED)
+    drive(libsumo, 20, (one, 4.0))
+    vehicle, another = sorted(top_speeds(libsumo))[:2]
+    libsumo.vehicle.setMaxSpeed(vehicle, 20.0)
+    drive(libsumo, 2, (one, 5.0))
+    assert libsumo.vehicle.getMaxSpeed(vehicle) == 5.0
+    libsumo.vehicle.setMaxSpeed(another, 12.0)
     one.close()
-    assert (api.vehicle.getMaxSpeed(vehicle), api.vehicle.getMaxSpeed(another)) == (20.0, 12.0)
+    assert (libsumo.vehicle.getMaxSpeed(vehicle), libsumo.vehicle.getMaxSpeed(another)) == (20.0, 12.0)
 
 
-def test_a_session_of_another_simulation_gives_nothing_back_here() -> None:
-    with libsumo_in_town() as libsumo:
-        one = session(libsumo, EGO, *ADVISED)
-        drive(libsumo, 20, (one, 4.0))
-        libsumo.load(ARGUMENTS)
-        drive(libsumo, 8)
-        other = session(libsumo, OTHER_EGO, *ADVISED)
-        drive(libsumo, 6, (other, 4.0))
-        assert set(top_speeds(libsumo).values()) == {4.0}
-        one.close()
-        assert set(top_speeds(libsumo).values()) == {4.0}
-        other.close()
+def test_a_session_of_another_simulation_gives_nothing_back_here(libsumo: Any) -> None:
+    one = session(libsumo, EGO, *ADVISED)
+    drive(libsumo, 20, (one, 4.0))
+    libsumo.load(ARGUMENTS)
+    drive(libsumo, 8)
+    other = session(libsumo, OTHER_EGO, *ADVISED)
+    drive(libsumo, 6, (other, 4.0))
+    assert set(top_speeds(libsumo).values()) == {4.0}
+    one.close()
+    assert set(top_speeds(libsumo).values()) == {4.0}
+    other.close()
 
 
 def test_a_session_may_outlive_its_simulation() -> None:
@@ -137,16 +136,16 @@ def test_a_session_may_outlive_its_simulation() -> None:
     one.close()
 
 
-def test_a_vehicle_that_bears_the_id_of_another_is_met_anew(api: Any) -> None:
-    api.route.add("mine", ["C0B0", "B0A0"])
-    api.vehicle.add("mine", "mine")
-    one = session(api, EGO, *ADVISED)
-    drive(api, 10, (one, 4.0))
-    assert api.vehicle.getMaxSpeed("mine") == 4.0
-    api.vehicle.remove("mine")
-    api.vehicle.add("mine", "mine")
-    api.vehicle.setMaxSpeed("mine", 21.0)
-    drive(api, 10, (one, 4.0))
-    assert api.vehicle.getMaxSpeed("mine") == 4.0
+def test_a_vehicle_that_bears_the_id_of_another_is_met_anew(libsumo: Any) -> None:
+    libsumo.route.add("mine", ["C0B0", "B0A0"])
+    libsumo.vehicle.add("mine", "mine")
+    one = session(libsumo, EGO, *ADVISED)
+    drive(libsumo, 10, (one, 4.0))
+    assert libsumo.vehicle.getMaxSpeed("mine") == 4.0
+    libsumo.vehicle.remove("mine")
+    libsumo.vehicle.add("mine", "mine")
+    libsumo.vehicle.setMaxSpeed("mine", 21.0)
+    drive(libsumo, 10, (one, 4.0))
+    assert libsumo.vehicle.getMaxSpeed("mine") == 4.0
     one.close()
-    assert api.vehicle.getMaxSpeed("mine") == 21.0
+    assert libsumo.vehicle.getMaxSpeed("mine") == 21.0

@@ -21,7 +21,7 @@ from fogsim.scenario import catalogue
 from tests.helpers.command import Command, run_command, run_python
 
 FOGSIM = (sys.executable, "-m", "fogsim")
-SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=1", "--set", EARLY)
+SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=0.5", "--set", EARLY)
 RARE = ("--set", "clocks.camera_period_s=1", "--set", "clocks.decision_period_s=1")
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet", "video.mp4", "report.html"}
@@ -47,13 +47,12 @@ def test_a_run_writes_everything(finished: Path) -> None:
 
 def test_steps_and_video_have_a_row_and_a_frame_for_each_camera_period(finished: Path) -> None:
     table = parquet.read_table(finished / "steps.parquet")
-    assert table.num_rows == 11
-    assert table.column("time_s").to_pylist() == pytest.approx([0.1 * i for i in range(11)])
+    assert table.column("time_s").to_pylist() == pytest.approx([0.1 * i for i in range(6)])
     video = imageio.improps(finished / "video.mp4", plugin="FFMPEG")
     assert video.shape[1:] == imageio.imread(finished / "video.mp4", plugin="FFMPEG", index=0).shape
     metadata = imageio.immeta(finished / "video.mp4", plugin="FFMPEG")
     assert metadata["fps"] == pytest.approx(10.0)
-    assert metadata["duration"] == pytest.approx(1.1, abs=0.11)
+    assert metadata["duration"] == pytest.approx(0.6, abs=0.11)
 
 
 def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, tmp_path: Path) -> None:
@@ -64,23 +63,11 @@ def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, 
         assert (finished / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
-def test_results_are_not_overwritten_unasked(finished: Path, command: Command) -> None:
-    refused = command("run", "motorway_fog_bank", "--out", str(finished), *SMALL)
-    assert refused.returncode == 2
-    assert "--overwrite" in refused.stderr
-    assert "Traceback" not in refused.stderr
-
-
 def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tmp_path: Path) -> None:
     out = tmp_path / "out"
     size = ("--set", EARLY, "--set", "camera.width=160", "--set", "camera.height=120")
-    process = subprocess.Popen(
-        [*FOGSIM, "run", "motorway_fog_bank", "--out", str(out), *size],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    line, pipe = [*FOGSIM, "run", "motorway_fog_bank", "--out", str(out), *size], subprocess.PIPE
+    process = subprocess.Popen(line, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
     partial = out / "unfinished" / "video.mp4.part"
     deadline = time.monotonic() + 120
     while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
@@ -112,7 +99,6 @@ def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, comman
         (["run", "motorway_fog_bank", "--set", "fog.visibility_m=-80"], "greater than or equal to 1; got -80"),
         (["run", "motorway_fog_bank", "--set", "traffic.net=none.net.xml"], "there is no file 'none.net.xml'"),
         (["run", "motorway_fog_bank", "--set", "nonsense"], "expected key.path=value"),
-        (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
         (["validate", "nowhere.yaml"], "there is no such scenario file"),
         (["run", TOWN], "is a SUMO configuration, not a scenario: run it with --sumocfg"),
         (["run", "--sumocfg", __file__, "--ego", "a", "--visibility", "80"], ":1: not XML"),
@@ -121,7 +107,6 @@ def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, comman
         (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),
         (["run", "--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--video"], "--video shows what an ego's"),
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
-        (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a"], "there is no file 'no.sumocfg'"),
         (["validate", "motorway_fog_bank", "--maps", "nowhere"], "--maps nowhere is not a folder"),
         (["schema", "scenery"], "KIND: expected scenario or study, got 'scenery'"),
@@ -136,26 +121,16 @@ def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, comman
 def test_validate_tells_the_good_from_the_bad(tmp_path: Path, command: Command) -> None:
     folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
     assert command("validate", str(folder), "motorway_fog_bank").returncode == 0
-    bad = folder / "scenario.yaml"
-    bad.write_text(bad.read_text(encoding="utf-8").replace("lux", "").replace("width: 640", "width: -1"), "utf-8")
+    bad, text = folder / "scenario.yaml", (folder / "scenario.yaml").read_text(encoding="utf-8")
+    bad.write_text(text.replace("width: 640", "width: -1"), "utf-8")
     done = command("validate", str(folder), "nowhere.yaml", "/dev/zero", "motorway_fog_bank")
     assert done.returncode == 2
     for told in ("camera.width", "nowhere.yaml: there is no such scenario file", "/dev/zero: cannot be read"):
         assert told in done.stderr
     assert "fine: motorway_fog_bank" in done.stdout
-
-
-def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path, command: Command) -> None:
-    folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
-    bad, text = folder / "scenario.yaml", (folder / "scenario.yaml").read_text(encoding="utf-8")
-    for right, wrong in (("ego: ego", "ego: egoo"), ("vehicle: lead", "vehicle: leed")):
-        assert right in text
-        text = text.replace(right, wrong)
-    bad.write_text(text, encoding="utf-8")
-    done = command("validate", str(folder))
-    assert done.returncode == 2
-    for told in ("traffic.ego: there is no vehicle 'egoo'", "traffic.events.0.vehicle: there is no vehicle 'leed'"):
-        assert told in done.stderr
+    # What the files of SUMO do not have is found as well.
+    bad.write_text(text.replace("vehicle: lead", "vehicle: leed"), "utf-8")
+    assert "traffic.events.0.vehicle: there is no vehicle 'leed'" in command("validate", str(folder)).stderr
 
 
 @pytest.mark.filterwarnings("default")  # printed, as in a process of its own
@@ -178,13 +153,6 @@ def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path, command: 
     speed = parquet.read_table(tmp_path / "out" / "steps.parquet").column("speed_mps").to_numpy()
     assert speed.min() < 0.1  # red lights
     assert speed.max() > 10.0
-
-
-def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path, command: Command) -> None:
-    done = command("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "traffic.ego: there is no vehicle '18' in grid.trips.xml; did you mean 'veh18'?" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 def test_list_names_scenarios_and_methods_also_those_of_installed_packages(
@@ -224,10 +192,7 @@ def test_doctor_finds_everything_here(command: Command) -> None:
 def test_version_and_help(command: Command) -> None:
     assert command("--version").stdout.startswith("fogsim ")
     assert "KEY.PATH=VALUE" in command("run", "--help").stdout
-
-
-def test_help_shows_units_and_defaults() -> None:
-    """Rich would read words in square brackets as markup, and drop them."""
+    # Rich would read words in square brackets, such as units, as markup, and drop them.
     commands = typer.main.get_command(app).commands.values()  # type: ignore[attr-defined]  # a group has commands
     texts = [getattr(option, "help", None) or "" for one in commands for option in one.params]
     assert len(texts) > 100

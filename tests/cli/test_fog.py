@@ -8,17 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.helpers.camera_files import camera_yaml
+
 Fog = Callable[..., "CompletedProcess[str]"]
 
-CAMERA_YAML = """\
-width: 40
-height: 30
-focal_length_px: 60
-principal_point_px: [20, 15]
-mount_height_m: 1.4
-pitch_deg: 2
-response: linear
-"""
+CAMERA_YAML = camera_yaml((40, 30), 60, (20, 15), 1.4, 2, "linear")
 
 
 @pytest.fixture
@@ -59,24 +53,19 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
 
 
 def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, fog: Fog) -> None:
+    by_range = ("--depth-kind", "range")
     for arguments, told in [
-        (("--visibility", "80"), "--depth-kind is missing"),
-        (("--visibility", "80", "--depth-kind", "rnage"), "did you mean 'range'"),
-        (("--visibility", "nan", "--depth-kind", "range"), "--visibility: expected a number from"),
-        (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight: expected a pixel value"),
-        (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
-        (("--visibility", "80", "--depth-kind", "range", "--road-plane"), "the flat road; both are given"),
-        (
-            ("--visibility", "80", "--depth-kind", "range", "--ground-albedo", "2"),
-            "--ground-albedo: expected a number from",
-        ),
-        (
-            ("--visibility", "80", "--depth-kind", "range", "--layer-height", "9"),
-            "--layer-height goes with --ground-alb",
-        ),
-        (("--visibility", "80", "--depth-kind", "range", "--horizon-row", "9"), "--horizon-row goes with --road-plane"),
+        (("--depth-kind", "rnage"), "did you mean 'range'"),
+        (("--depth-kind", "range", "--visibility", "nan"), "--visibility: expected a number from"),
+        ((), "--depth-kind is missing"),
+        ((*by_range, "--airlight", "white"), "--airlight: expected a pixel value"),
+        ((*by_range, "--depth", "none.npy"), "none.npy: cannot be read"),
+        ((*by_range, "--road-plane"), "the flat road; both are given"),
+        ((*by_range, "--ground-albedo", "2"), "--ground-albedo: expected a number from"),
+        ((*by_range, "--layer-height", "9"), "--layer-height goes with --ground-alb"),
+        ((*by_range, "--horizon-row", "9"), "--horizon-row goes with --road-plane"),
     ]:
-        done = fog(folder, *arguments)
+        done = fog(folder, "--visibility", "80", *arguments)
         assert done.returncode == 2
         assert told in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1

@@ -16,16 +16,10 @@ from fogsim.offline.restoration import Restored
 from fogsim.offline.source import Picture
 from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
+from tests.helpers.camera_files import camera_yaml
 from tests.helpers.command import Command
 
-CAMERA = """width: 320
-height: 240
-focal_length_px: 288.0
-principal_point_px: [159.5, 119.5]
-mount_height_m: 1.38
-pitch_deg: 2.0
-response: srgb
-"""
+CAMERA = camera_yaml((320, 240), 288, None, 1.38, 2)
 WITH_CAMERA = ("--camera", "camera.yaml")
 FOG = (*WITH_CAMERA, "--visibility", "80")
 
@@ -128,28 +122,20 @@ def test_a_video_in_which_no_fog_is_found_leaves_nothing(folder: Path, foggy: np
     assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "drive.mp4", "fog.png"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
+def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, command: Command) -> None:
+    for arguments, told in [
         (("nofog.png", *FOG), "nofog.png: there is no such file"),
         (("fog.png", *FOG, "--method", "plannar"), "did you mean 'planar'"),
         (("fog.png", *WITH_CAMERA, "--visibility", "0"), "--visibility: expected a number from"),
         (("fog.png", *FOG, "--method", "dark_channel"), "--visibility goes with planar"),
         (("fog.png", *FOG, "--most-gain", "0"), "--most-gain: expected a number from"),
         (("fog.png", *FOG, "--airlight", "white"), "--airlight: expected a pixel value"),
-        (("fog.png", *FOG, "--out", "fog.png", "--overwrite"), "would replace what is read"),
-        (("fog.png", *FOG, "--out", "no/out.png"), "there is no folder no"),
-    ],
-)
-def test_mistakes_end_in_one_line_and_exit_code_2(
-    folder: Path, arguments: tuple[str, ...], told: str, command: Command
-) -> None:
-    out = () if "--out" in arguments else ("--out", "out.png")
-    done = command("restore", *arguments, *out, cwd=folder)
-    assert done.returncode == 2
-    assert told in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert not (folder / "out.png").exists()
+    ]:
+        done = command("restore", *arguments, "--out", "out.png", cwd=folder)
+        assert done.returncode == 2
+        assert told in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+        assert not (folder / "out.png").exists()
 
 
 def test_an_image_of_another_size_is_refused(folder: Path, command: Command) -> None:

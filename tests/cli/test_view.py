@@ -25,14 +25,10 @@ def test_the_picture_is_that_of_the_ego_in_clear_air(tmp_path: Path) -> None:
     assert (picture[50:70, :, 1] > picture[50:70, :, 2] + 15).any()
 
 
-def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mistakes_are_told_before_the_display_and_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    with pytest.raises(InputError, match=r"no display here .*--out FILE\.png") as caught:
+    with pytest.raises(InputError, match=r"^[^\n]*no display here .*--out FILE\.png[^\n]*$"):
         view_command("motorway_fog_bank")
-    assert "\n" not in str(caught.value)
-
-
-def test_mistakes_are_told_before_the_display_and_the_run(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'motorway_fog_bank'"):
         view_command("motorway_fog_bnk")
     out = tmp_path / "view.png"
@@ -45,13 +41,9 @@ def test_mistakes_are_told_before_the_display_and_the_run(tmp_path: Path) -> Non
 
 
 def test_an_instant_after_the_end_is_refused(tmp_path: Path) -> None:
+    settings = [EARLY, "camera.width=32", "camera.height=24", "duration_s=0.2"]
     with pytest.raises(InputError, match=r"--at 60: the run ends after 0\.2 s \(time\)"):
-        view_command(
-            "motorway_fog_bank",
-            at=60.0,
-            out=tmp_path / "view.png",
-            settings=[EARLY, "camera.width=32", "camera.height=24", "duration_s=0.2"],
-        )
+        view_command("motorway_fog_bank", at=60.0, out=tmp_path / "view.png", settings=settings)
 
 
 def test_what_is_around_the_ego_is_what_its_camera_sees() -> None:

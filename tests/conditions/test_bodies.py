@@ -14,10 +14,8 @@ def test_the_distance_between_two_bodies() -> None:
         (Body(14.0, 0.0, 0.0, 4.0, 2.0), 10.0),  # ahead: its rear is at x = 10 m
         (Body(-7.0, 0.0, 0.0, 4.0, 2.0), 3.0),  # behind: the rear is at x = −4 m
         (Body(0.0, 5.0, 0.0, 4.0, 2.0), 3.0),  # next to it: sides at y = 1 m and y = 4 m
-        (
-            Body(3.0, 5.0, math.pi, 4.0, 2.0),
-            math.hypot(3.0, 3.0),
-        ),  # oncoming: its front is at x = 3 m, a side at y = 4 m
+        # Oncoming: its front is at x = 3 m, a side at y = 4 m.
+        (Body(3.0, 5.0, math.pi, 4.0, 2.0), math.hypot(3.0, 3.0)),
         (Body(2.0, 2.0, math.pi / 4, 1.0, 0.2), None),  # askew: between the nearest corner and the corner of the front
         (Body(-2.0, 3.0, math.pi / 2, 6.0, 0.5), 0.0),  # across it, with no corner in the other
         (CAR, 0.0),

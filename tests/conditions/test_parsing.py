@@ -16,10 +16,7 @@ def test_one_test_of_a_signal() -> None:
         ("ego.collision", Flag(Reference("X.collision", ("ego",)))),
         ("not ego.collision", Not(Flag(Reference("X.collision", ("ego",))))),
         ("gap(ego, slow) < -3 m", Comparison(Reference("gap(X, Y)", ("ego", "slow")), "<", Quantity(-3.0, "-3", "m"))),
-        (
-            "flow.0.acceleration < -3 m/s²",
-            Comparison(Reference("X.acceleration", ("flow.0",)), "<", Quantity(-3.0, "-3", "m/s²")),
-        ),
+        ("flow.0.speed < -3 m/s", Comparison(Reference("X.speed", ("flow.0",)), "<", Quantity(-3.0, "-3", "m/s"))),
         ("warning is fog_ahead", Comparison(Reference("warning"), "==", Word("fog_ahead"))),
         ("warning is  not none", Comparison(Reference("warning"), "!=", Word("none"))),
         ('"0".lane == right', Comparison(Reference("X.lane", ("0",)), "==", Word("right"))),

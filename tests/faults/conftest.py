@@ -1,30 +1,19 @@
-"""Commands that are told to end in the middle."""
+"""Commands that end in the middle."""
 
-import dataclasses
 import json
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
 
 
-@dataclasses.dataclass(frozen=True)
-class Ended:
-    """How a command ended.
-
-    Attributes
-    ----------
-    code : int
-        Exit code; negative for a signal that killed it.
-    said : str
-        What it wrote to stdout and stderr.
-    taken : int
-        Steps that its recorders had taken in for sure.
-    """
+class Ended(NamedTuple):
+    """Exit code (negative: a signal killed it), what was printed, and steps that the recorders had for certain."""
 
     code: int
     said: str
@@ -50,8 +39,6 @@ class Nursery:
             log = str(self._folder / f"{self._number}.log")
             attempts.append({"arguments": command, "signals": [], "hold": None, "log": log})
         attempts[0] |= {"signals": signals, "hold": hold}
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         self._process.stdin.write(json.dumps(attempts) + "\n")
         self._process.stdin.flush()
         codes = json.loads(self._process.stdout.readline())
@@ -63,14 +50,10 @@ class Nursery:
         taken = seen.read_text(encoding="utf-8") if seen.exists() else ""
         return Ended(code, log.read_text(encoding="utf-8"), int(taken or 0))
 
-    def close(self) -> None:
-        """End it."""
-        self._process.communicate()
-
 
 @pytest.fixture(scope="session")
 def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
     """Process that runs commands."""
     made = Nursery(tmp_path_factory.mktemp("nursery"))
     yield made
-    made.close()
+    made._process.communicate()

@@ -15,19 +15,7 @@ LONG = 250.0
 def drawn_run(
     steps: int = STEPS, *, pause: float = 0.0, seen: Path | None = None, hold: int | None = None
 ) -> Generator[Step, None, None]:
-    """Give steps of 0.1 s, and note in a file how many of them have been taken in.
-
-    Parameters
-    ----------
-    steps : int
-        How many.
-    pause : float
-        Time before each [s].
-    seen : Path or None
-        The file.
-    hold : int or None
-        Number of a step that does not come.
-    """
+    """Give steps of 0.1 s after a pause [s] each, but not that of number `hold`, and note how many have been taken."""
     for index in range(steps):
         if seen is not None:
             seen.write_text(str(index), encoding="utf-8")

@@ -8,15 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-CAMERA = """\
-width: 80
-height: 60
-focal_length_px: 70
-principal_point_px: [39.5, 29.5]
-mount_height_m: 1.3
-pitch_deg: 0
-response: srgb
-"""
+from tests.helpers.camera_files import camera_yaml
+
 FULL = "error: the operating system refused: [Errno 28] No space left on device"
 ESTIMATE = "-m fogsim estimate photo.png --camera camera.yaml --method negru2013 --json"
 
@@ -49,7 +42,7 @@ def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
     tmp_path: Path, command: str, code: int, told: str
 ) -> None:
     Image.new("RGB", (80, 60)).save(tmp_path / "photo.png")
-    (tmp_path / "camera.yaml").write_text(CAMERA, encoding="utf-8")
+    (tmp_path / "camera.yaml").write_text(camera_yaml((80, 60), 70), encoding="utf-8")
     ended, _, said = run_in_shell(command, tmp_path)
     # A kernel that is not in the cache yet is announced.
     assert [line for line in said.splitlines() if not line.startswith("fogsim: comp")] == told.splitlines()
@@ -58,9 +51,10 @@ def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
 
 def test_text_that_the_encoding_lacks_is_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
-    code, printed, said = run_in_shell("-m fogsim list", tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    code, printed, said = run_in_shell("-m fogsim run --help", tmp_path)
     assert (code, said) == (0, "")
-    assert "grades of \\xb12 and" in printed
+    assert "NAME=VALUE,\\u2026" in printed
 
 
 OPENED = """\

@@ -1,9 +1,11 @@
 """Recorders that fail on the way or at the end, and what the others keep."""
 
+import contextlib
 import json
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pyarrow import parquet
@@ -28,9 +30,8 @@ def record(out: Path, **options: object) -> RecordedRun:
     return record_run(fogsim.load_scenario("motorway_fog_bank"), 1, out, **options)  # type: ignore[arg-type]
 
 
-def manifest(out: Path) -> dict[str, object]:
-    content: dict[str, object] = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
-    return content
+def manifest(out: Path) -> dict[str, Any]:
+    return json.loads((out / "manifest.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture
@@ -47,31 +48,23 @@ def encoders(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return ids
 
 
-def test_an_encoder_that_dies_ends_the_run_and_costs_only_the_video(tmp_path: Path, encoders: list[int]) -> None:
+@pytest.mark.parametrize(
+    ("index", "why"), [(5, "the video encoder has ended"), (STEPS - 1, "the video could not be written")]
+)
+def test_an_encoder_that_dies_ends_the_run_and_costs_only_the_video(
+    tmp_path: Path, encoders: list[int], index: int, why: str
+) -> None:
     def kill(step: Step) -> None:
-        if step.index == 5:
+        if step.index == index:
             os.kill(encoders[0], signal.SIGKILL)
 
-    with pytest.raises(RecorderError, match=r"the recorder video failed: FogSimError: the video encoder has ended"):
+    with pytest.raises(RecorderError, match=f"the recorder video failed: FogSimError: {why}"):
         record(tmp_path, recorders=("table", "video"), watch=kill)
-    told = manifest(tmp_path)
-    assert told["status"] == "failed"
-    assert list(told["failed_recorders"]) == ["video"]  # type: ignore[call-overload]  # a mapping
-    assert str(told["message"]).startswith("video: FogSimError: the video encoder has ended")
+    found = manifest(tmp_path)
+    assert (found["status"], [*found["failed_recorders"]]) == ("failed", ["video"])
+    assert found["message"].startswith(f"video: FogSimError: {why}")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["manifest.json", "metrics.json", "steps.parquet"]
-    assert len(parquet.read_table(tmp_path / "steps.parquet")) >= 6
-
-
-def test_an_encoder_that_dies_at_the_end_is_told_too(tmp_path: Path, encoders: list[int]) -> None:
-    def kill(step: Step) -> None:
-        if step.index == STEPS - 1:
-            os.kill(encoders[0], signal.SIGKILL)
-
-    with pytest.raises(RecorderError, match=r"the recorder video failed: FogSimError: the video could not be written"):
-        record(tmp_path, recorders=("table", "video"), watch=kill)
-    assert manifest(tmp_path)["status"] == "failed"
-    assert len(parquet.read_table(tmp_path / "steps.parquet")) == STEPS
-    assert not list(tmp_path.rglob("*.part"))
+    assert len(parquet.read_table(tmp_path / "steps.parquet")) >= index + 1
 
 
 def test_an_encoder_that_was_stopped_is_not_waited_for_for_ever(
@@ -89,36 +82,28 @@ def test_an_encoder_that_was_stopped_is_not_waited_for_for_ever(
     assert manifest(tmp_path)["status"] == "interrupted"
 
 
-def test_ctrl_c_while_a_whole_run_is_closed_makes_it_partial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("again", [False, True])
+def test_ctrl_c_while_a_whole_run_is_closed_makes_it_partial_and_tears_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, again: bool
+) -> None:
     close = ReportRecorder.close
 
     def interrupted(recorder: ReportRecorder, complete: bool) -> None:
-        if complete:
+        if complete or again:
             os.kill(os.getpid(), signal.SIGINT)
         close(recorder, complete)
 
     monkeypatch.setattr(ReportRecorder, "close", interrupted)
-    done = record(tmp_path, recorders=("table", "report"))
-    assert (done.status, manifest(tmp_path)["status"]) == ("interrupted", "interrupted")
+    # The second is held until everything is written, and handled then.
+    with pytest.raises(KeyboardInterrupt) if again else contextlib.nullcontext():
+        assert record(tmp_path, recorders=("table", "report")).status == "interrupted"
+    found = manifest(tmp_path)
+    assert found["status"] == "interrupted"
+    assert found["files"] == ["manifest.json", "metrics.json", "report.html", "steps.parquet"]
     assert "PARTIAL" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert parquet.read_schema(tmp_path / "steps.parquet").metadata[b"fogsim.complete"] == b"false"
     assert json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))["complete"] is False
     assert len(parquet.read_table(tmp_path / "steps.parquet")) == STEPS
-
-
-def test_ctrl_c_twice_while_a_run_is_closed_tears_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    close = ReportRecorder.close
-
-    def interrupted(recorder: ReportRecorder, complete: bool) -> None:
-        os.kill(os.getpid(), signal.SIGINT)
-        close(recorder, complete)
-
-    monkeypatch.setattr(ReportRecorder, "close", interrupted)
-    # The second is held until everything is written, and handled then.
-    with pytest.raises(KeyboardInterrupt):
-        record(tmp_path, recorders=("table", "report"))
-    assert manifest(tmp_path)["status"] == "interrupted"
-    assert manifest(tmp_path)["files"] == ["manifest.json", "metrics.json", "report.html", "steps.parquet"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

@@ -64,14 +64,11 @@ def test_an_expectation_that_decides_nothing(tmp_path: Path) -> None:
 
 
 def test_a_condition_that_never_applies(tmp_path: Path) -> None:
+    always = "ego.speed > 3 km/h"
+    others = {"while": f"always: {always}", "whenever": f"require: {always}", "require": "whenever: ego.collision"}
     for condition, why in NEVER_TRUE[:4]:
-        for key in ["while", "whenever", "require"]:
-            others = {
-                "while": "always: ego.speed > 3 km/h",
-                "whenever": "require: ego.speed > 3 km/h",
-                "require": "whenever: ego.collision",
-            }
-            line = refused(tmp_path, f"expect: {{safe: {{{key}: '{condition}', {others[key]}}}}}")
+        for key, other in others.items():
+            line = refused(tmp_path, f"expect: {{safe: {{{key}: '{condition}', {other}}}}}")
             assert f"expect.safe.{key}: " in line
             assert why in line
 
@@ -91,7 +88,7 @@ def test_times_bounds_and_names_that_decide_nothing(tmp_path: Path) -> None:
         ("{never: ego.collision, for_at_least: 3 s}", "this cannot be decided: the run lasts 2 s; got 3 s"),
         (
             "{whenever: time > 1 s, require: ego.collision, within: 1.5 s}",
-            "this would test nothing: time > 1 s is never true: time is at least 0 s and at most 0.5 s (within 1.5 s",
+            "at least 0 s and at most 0.5 s (within 1.5 s",
         ),
         ("{always: time <= 2 s}", "this cannot fail: time <= 2 s is always true"),
         ("{always: ego.speed >= 0 or ego.collision}", "this cannot fail"),

@@ -23,7 +23,7 @@ from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.scenario.variation import VariationKeys
 from fogsim.study.plan import StudyFile
 
-MARKED = ["file.yaml:100: x", ":smile: [red]a[/]", "[link=x]y"]
+MARKED = ["file.yaml:100: x", ":smile: [red]a[/]", "[link=x]y", r"back\slash [red]"]
 
 
 @pytest.mark.parametrize("text", MARKED)
@@ -152,10 +152,7 @@ def test_key_paths_are_those_of_the_file() -> None:
 
 def test_a_value_that_fits_none_of_several_types_is_one_mistake(tmp_path: Path) -> None:
     for written, line in [
-        (
-            "actors: {ego: {lane: 3.5}}",
-            "actors.ego.lane: input should be 'right' or 'left', or a valid integer; got 3.5",
-        ),
+        ("actors: {ego: {lane: 3.5}}", "actors.ego.lane: input should be 'right' or 'left', or a valid integer"),
         (r'actors: {"a\nb": {}}', r"actors.'a\nb': a name has visible characters"),
         ("traffic: {sumo_options: {'a b': 1}}", "traffic.sumo_options.a b: string should match pattern"),
     ]:

@@ -17,18 +17,11 @@ from fogsim.cli.app import app
 from fogsim.core.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
 from fogsim.errors import InputError
 from fogsim.recorders.video import Encoder, encoder_command
+from tests.helpers.camera_files import camera_yaml
 
 LONG = "x" * 300
 
-CAMERA = """
-width: 40
-height: 30
-focal_length_px: 60
-principal_point_px: [20, 15]
-mount_height_m: 1.4
-pitch_deg: 2
-response: linear
-"""
+CAMERA = camera_yaml((40, 30), 60, (20, 15), 1.4, 2, "linear")
 
 TEST = """
 name: quick

@@ -57,13 +57,11 @@ def test_a_child_that_is_killed_is_told(hosted: HostedLoop) -> None:
         hosted.advance(Command())
 
 
-def test_a_child_imports_nothing_from_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_child_imports_nothing_from_the_working_directory_and_no_forked_process_keeps_it_alive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "contextlib.py").write_text("raise ImportError('of the working directory')")
     monkeypatch.chdir(tmp_path)
-    HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"])).close()
-
-
-def test_a_forked_process_does_not_keep_a_child_alive() -> None:
     loop = HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"]))
     inherited = os.dup(loop._connection.fileno())
     loop.close()
@@ -125,7 +123,6 @@ def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, messa
 
 def test_a_limit_that_is_no_time_is_refused() -> None:
     for timeout in [0.0, float("nan")]:
-        with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
-            gymnasium.make(ID, timeout=timeout, **SMALL)
-        with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
-            make_vector(ID, timeout=timeout, **SMALL)
+        for make in (gymnasium.make, make_vector):
+            with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
+                make(ID, timeout=timeout, **SMALL)

@@ -44,15 +44,12 @@ def test_a_sumo_that_waits_for_another_client_is_told(sumo_process: Callable) ->
         traffic.close()
 
 
-def test_a_limit_that_is_none(sumo_process: Callable) -> None:
+def test_a_limit_that_is_none_and_those_that_are_no_time(sumo_process: Callable) -> None:
     with sumo_process(ARGUMENTS) as (port, _):
         traffic = fogsim.connect(town(), HOST, port, timeout=float("inf"))
         traffic.start(1)
         assert traffic.observe() is not None
         traffic.close()
-
-
-def test_a_limit_that_is_no_time_is_refused() -> None:
     for timeout in [0.0, -1.0, float("nan")]:
         with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
             fogsim.connect(town(), timeout=timeout)

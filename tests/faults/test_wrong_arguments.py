@@ -130,6 +130,8 @@ def fast() -> Iterator[gymnasium.Env[Any, Any]]:
 
 
 def test_a_reset_that_is_refused_leaves_the_episode_as_it_was(fast: gymnasium.Env[Any, Any]) -> None:
+    fast.reset(seed=3)
+    expected = fast.step([12, 0])[0], fast.reset(seed=4)[0]
     for arguments in [
         {"options": 5},
         {"options": {"overides": []}},
@@ -147,8 +149,6 @@ def test_a_reset_that_is_refused_leaves_the_episode_as_it_was(fast: gymnasium.En
         {"seed": 1.5},
         {"seed": "x"},
     ]:
-        fast.reset(seed=3)
-        expected = fast.step([12, 0])[0], fast.reset(seed=4)[0]
         fast.reset(seed=3)
         refusal(fast.reset, **arguments)
         refusal(fast.step, "x")

@@ -231,11 +231,7 @@ def test_values_that_mean_something_else_are_refused(tmp_path: Path) -> None:
         (at_3, at_3.replace("none", "falling"), "what has begun does not end again"),
         ('value="3" rule="greaterThan"', 'value="3" rule="notEqualTo"', "rule: FogSim has no 'notEqualTo' here"),
         ('frictionScaleFactor="1"', 'frictionScaleFactor="0.5"', "RoadCondition: roads are dry"),
-        (
-            '<Fog visualRange="200"/>',
-            '<Precipitation precipitationType="rain" intensity="1"/>',
-            "rain and snow are not",
-        ),
+        ('<Fog visualRange="200"/>', '<Precipitation precipitationType="rain" intensity="1"/>', "rain and snow are no"),
         ('<Center x="1.4" y="0"', '<Center x="1.4" y="0.5"', "Center: y: a body lies about its reference point"),
     ]:
         with pytest.raises(InputError, match=told):

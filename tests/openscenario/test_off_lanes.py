@@ -238,10 +238,7 @@ def test_what_cannot_be_followed_is_refused(tmp_path: Path) -> None:
     for action, told in [
         (_follows((0, place), (None, there)), "expected a number for time, got 'nothing'"),
         (_follows((0, relative.format("Lane", "dLane"))), "outside Init, where Ego is by then is not known"),
-        (
-            _follows((0, place), (4, there)).replace('"relative"', '"absolute"'),
-            "times count from the beginning of the action",
-        ),
+        (_follows((0, place), (4, there)).replace('"relative"', '"absolute"'), "from the beginning of the action"),
         (_follows((0, place), (4, there)).replace('"false"', '"true"'), "closed: write the first"),
         (_entity("Late", f"<AddEntityAction>{relative.format('Road', 'dt')}</AddEntityAction>"), "a place on the map"),
         (_entity("Late", "<AddEntityAction/>"), "expected Position inside"),

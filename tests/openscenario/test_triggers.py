@@ -10,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.openscenario.parameters import evaluated
 from fogsim.scenario.loading import load_scenario
-from tests.openscenario.writing import DATA, changed, entry
+from tests.openscenario.writing import DATA, changed, entry, lane, world
 
 STANDS = '<Condition name="stands" delay="0" conditionEdge="none">'
 STAND_STILL = '<StandStillCondition duration="0.5"/>'
@@ -41,60 +41,35 @@ def _between(first: str, last: str, after: str = "") -> str:
 
 
 def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
+    apart = (
+        '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="{}" value="20" freespace="{}" rule="{}"/>'
+    )
+    reach = '<ReachPositionCondition tolerance="2">{}</ReachPositionCondition>'
+    far = '<DistanceCondition value="50" freespace="false" {}>{}</DistanceCondition>'
+    near = '<Position><RelativeObjectPosition entityRef="Lead" dx="2" dy="0"/></Position>'
+    there = '<Position><RoadPosition roadId="7" s="200" t="-5"/></Position>'
     for condition, told in [
         ('<SpeedCondition value="3" rule="lessThan"/>', "ego.speed < 3 m/s"),
         ('<AccelerationCondition value="-2" rule="lessOrEqual"/>', "ego.acceleration <= -2 m/s²"),
         ('<RelativeSpeedCondition entityRef="Lead" value="1" rule="lessThan"/>', "speed_difference(ego, Lead) < 1 m/s"),
-        (
-            '<AccelerationCondition value="2" rule="greaterThan"/>',
-            "ego.acceleration > 2 m/s² or ego.acceleration < -2 m/s²",
-        ),
+        ('<AccelerationCondition value="2" rule="greaterThan"/>', "ego.acceleration > 2 m/s² or ego.acceleration < -2"),
         ('<AccelerationCondition direction="longitudinal" value="2" rule="lessThan"/>', "ego.acceleration < 2 m/s²"),
         ('<TraveledDistanceCondition value="30"/>', "ego.driven >= 30 m"),
-        (
-            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="longitudinal" value="20" '
-            'freespace="false" rule="lessThan"/>',
-            # Rear axles: 3.8 m behind the ego's front bumper, 7 m behind the lead's.
-            "distance_along(ego, Lead, 3.8 m, 7 m) < 20 m",
-        ),
-        (
-            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="cartesianDistance" value="20"'
-            ' freespace="false" rule="greaterThan"/>',
-            "distance(ego, Lead, 3.8 m, 7 m) > 20 m",
-        ),
-        (
-            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="euclidianDistance" value="20"'
-            ' freespace="true" rule="greaterThan"/>',
-            "clearance(ego, Lead) > 20 m",
-        ),
+        # Rear axles: 3.8 m behind the ego's front bumper, 7 m behind the lead's.
+        (apart.format("longitudinal", "false", "lessThan"), "distance_along(ego, Lead, 3.8 m, 7 m) < 20 m"),
+        (apart.format("cartesianDistance", "false", "greaterThan"), "distance(ego, Lead, 3.8 m, 7 m) > 20 m"),
+        (apart.format("euclidianDistance", "true", "greaterThan"), "clearance(ego, Lead) > 20 m"),
         ('<SpeedCondition value="0" rule="equalTo"/>', "ego.speed > -0.05 m/s and ego.speed < 0.05 m/s"),
         (
             '<TimeHeadwayCondition entityRef="Lead" value="1" freespace="true" rule="lessThan"/>',
             "headway(ego, Lead, 0 m) < 1 s",
         ),
+        (reach.format(lane(200, -2)), "nearest_to(ego, 3.8 m, 300.000 m, -25.250 m) <= 2 m"),
+        (reach.format(world(300, 40, 'h="1"')), "nearest_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m"),
+        (far.format('rule="lessThan"', near), "distance(ego, Lead, 3.8 m, 5 m) < 50 m"),
+        (far.format('rule="greaterThan"', there), "distance_to(ego, 3.8 m, 300.000 m, -25.000 m) > 50 m"),
         (
-            '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="7" laneId="-2" s="200"/></Position>'
-            "</ReachPositionCondition>",
-            "nearest_to(ego, 3.8 m, 300.000 m, -25.250 m) <= 2 m",
-        ),
-        (
-            '<DistanceCondition value="9" freespace="false" rule="lessThan"><Position><RelativeObjectPosition '
-            'entityRef="Lead" dx="2" dy="0"/></Position></DistanceCondition>',
-            "distance(ego, Lead, 3.8 m, 5 m) < 9 m",
-        ),
-        (
-            '<ReachPositionCondition tolerance="2"><Position><WorldPosition x="300" y="40" h="1"/></Position>'
-            "</ReachPositionCondition>",
-            "nearest_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m",
-        ),
-        (
-            '<DistanceCondition value="50" freespace="false" rule="greaterThan"><Position><RoadPosition roadId="7" '
-            's="200" t="-5"/></Position></DistanceCondition>',
-            "distance_to(ego, 3.8 m, 300.000 m, -25.000 m) > 50 m",
-        ),
-        (
-            '<DistanceCondition value="50" freespace="false" alongRoute="true" rule="greaterThan"><Position>'
-            '<RoadPosition roadId="7" s="200" t="-5"/></Position></DistanceCondition>',
+            far.format('alongRoute="true" rule="greaterThan"', there),
             "ego.position < 153.671 m or ego.position > 253.671 m",
         ),
         ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "ego.collision"),

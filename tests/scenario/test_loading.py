@@ -68,11 +68,7 @@ def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path) -> N
         ("width: 640", "width: 640.0", r"camera\.width: input should be a valid integer; got 640\.0"),
         ("pitch_deg: 2", "pitch_deg: no", r"camera\.pitch_deg: input should be a valid number; got False"),
         ("outside_visibility_m: 2000", "outside_visibility_m: 2e6", r"at most 1e\+06 m, or inf; got 2000000"),
-        (
-            "outside_visibility_m: 2000",
-            "outside_visibility_m: 80m",
-            r"got '80m'; write the number alone, in m, such as 80$",
-        ),
+        ("outside_visibility_m: 2000", "outside_visibility_m: 80m", r"got '80m'; write the number alone, in m"),
         ("duration_s: 200", "duration_s: 200\nstreet_lamps: 1", r"street_lamps: .*valid boolean; got 1"),
         ("traffic_step_s: 0.1", "traffic_step_s: 0.0004", r"greater than or equal to 0\.001; got 0\.0004"),
         ("ego: ego", "ego: ''", r"traffic\.ego: .* at least 1 character; got ''"),
@@ -85,22 +81,14 @@ def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path) -> N
         ("[joint_road,", "[joint_rode,", r"estimators\.0: unknown estimator 'joint_rode'; did you mean 'joint_road'\?"),
         ("fusion: field_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: field_filter"),
         ("reaction_time: 2", "reaction: 2", r"\.yaml:\d+: advice\.parameters\.reaction: .* mean 'reaction_time'\?"),
-        (
-            "reaction_time: 2.0",
-            "reaction_time: a",
-            r"yaml:\d+: advice\.parameters\.reaction_time: .* 0 … 60 s, got 'a'",
-        ),
+        ("reaction_time: 2.0", "reaction_time: a", r"yaml:\d+: advice\.parameters\.reaction_time: .* 60 s, got 'a'"),
         ("camera_period_s: 0.1", "camera_period_s: 0.25", r"clocks: camera_period_s must be a .* multiple .*0\.25 s"),
         ("- kind: brake", "- vehicule: x", r"traffic\.events\.0\.kind: this key is missing"),
         ("deceleration_mps2: 6", "decelerate: 6", r"events\.0\.decelerate: unknown key; did you mean 'deceleration_"),
         ("at_position_m: 1900", "at_position_m: -5", r"traffic\.events\.0\.at_position_m: .*; got -5"),
         ("      at_position_m: 1900\n", "", r"traffic\.events\.0: say when it begins: at_position_m, at_time_s or"),
         ("kind: brake", "kind: jump", r"traffic\.events\.0\.kind: unknown kind 'jump'; known: brake, break_down"),
-        (
-            "illuminance_lx: 10000",
-            "illuminance_lx: -5",
-            r"light\.illuminance_lx: .* greater than or equal to 0; got -5",
-        ),
+        ("illuminance_lx: 10000", "illuminance_lx: -5", r"light\.illuminance_lx: .* than or equal to 0; got -5"),
         ("net: motorway.net.xml", "other: 3", r"traffic\.net: this key is missing"),
     ]:
         with pytest.raises(InputError, match=message):
@@ -173,10 +161,7 @@ def test_advised_stretches_that_do_not_fit() -> None:
         (["drivers.signs.spacing_m=200"], "signs goes with advised: signs, which is missing"),
         (["drivers.equipped_share=0.3"], "equipped_share goes with advised: equipped, which is missing"),
         (["drivers.harmonisation={}"], "harmonisation goes with advised: signs, equipped or law, which is missing"),
-        (
-            ["drivers.advised=stretch", "drivers.advised_stretch={start_m: 9, end_m: 9}"],
-            "start_m must be less than end",
-        ),
+        (["drivers.advised=stretch", "drivers.advised_stretch={start_m: 9, end_m: 9}"], "start_m must be less than"),
         (["drivers.advised=stretch", "drivers.advised_stretch.display=sign"], "display: .*message_sign.*; got 'sign'"),
         (["drivers.advised=somebody"], "advised: .*'ego', 'all', 'stretch', 'signs', 'equipped' or 'law'"),
     ]:

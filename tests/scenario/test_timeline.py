@@ -83,11 +83,7 @@ def test_what_does_not_fit_the_scenario_is_told() -> None:
     for do, setting, told in [
         ("fog: {density: 2}", "fog={visibility_m: inf}", "this multiplies the scenario's fog"),
         ("fog: {visibility: 30 m}", banks, "outside the banks the air is clear; write density"),
-        (
-            "light: {illuminance: 20 lx, course: factors}",
-            "light.illuminance_lx=0",
-            "goes on from the light that there is",
-        ),
+        ("light: {illuminance: 20 lx, course: factors}", "light.illuminance_lx=0", "goes on from the light that"),
     ]:
         text = mistake(f"{{when: time > 1 s, do: {{{do}}}}}", setting)
         assert told in text

@@ -3,6 +3,7 @@
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from early_motorway import ROUTES
@@ -43,8 +44,16 @@ def test_a_sweep_from_file_to_exit_code(file: Path, command: Command, monkeypatc
     # The command lines in the docs are run in processes of their own.
     monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
     monkeypatch.setattr("fogsim.testing.artefacts.ProcessPool", lambda _, work: ThisProcess(work))
+    locked, keep = [], artefacts.keep_artefacts
+
+    def watched(outcomes: Any, out: Path, *rest: Any) -> Any:
+        locked.append((out / LOCK_NAME).exists())
+        return keep(outcomes, out, *rest)
+
+    monkeypatch.setattr(artefacts, "keep_artefacts", watched)
     done = command("test", str(file), "-j", "1", "--junit", "ci/j.xml", "--html", "ci/page.html", cwd=file.parent)
     assert done.returncode == 1, done.stderr
+    assert locked == [True], "evidence is gathered under the lock of the results"
     lines = [line.strip() for line in done.stdout.splitlines()]
     told = "slower.eventually: 1 of 2 cases passed; visibility=5 km: expected eventually ego.speed < 92 km/h"
     assert any(line.startswith("FAILED") and told in line for line in lines)
@@ -130,17 +139,3 @@ def test_pytest_collects_files_and_has_a_fixture(
     assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in told
     assert "short.fog.yaml --case 'visibility=5 km'" in told
     assert "inconclusive: stops.whenever" in told
-
-
-def test_evidence_is_gathered_under_the_lock_of_the_results(
-    file: Path, command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    locked: list[bool] = []
-
-    def keep(_: object, out: Path, *__: object) -> dict[str, str]:
-        locked.append((out / LOCK_NAME).exists())
-        return {}
-
-    monkeypatch.setattr(artefacts, "keep_artefacts", keep)
-    assert command("test", str(file), "-j", "1", cwd=file.parent).returncode == 1
-    assert locked == [True]

@@ -72,7 +72,6 @@ def test_junit_is_by_the_schema(outcomes: list[FileOutcome], tmp_path: Path) -> 
         assert len(set(names)) == len(names)
         assert sum(float(case.attrib["time"]) for case in cases) == pytest.approx(float(suite.attrib["time"]), abs=0.01)
     first = root.find("testsuite/testcase/failure")
-    assert first is not None
     assert first.attrib["type"] == "failed"
     assert (
         "1 of 2 cases passed; run=1: expected ego.ttc >= 1.5 s, came 1.2 s at 34.5 s, 812 m" in first.attrib["message"]
@@ -81,7 +80,6 @@ def test_junit_is_by_the_schema(outcomes: list[FileOutcome], tmp_path: Path) -> 
     assert "with, comma/a0.fog.yaml:7\n" in first.text
     assert "fogsim test 'with, comma/a0.fog.yaml' --case run=1" in first.text
     out = root.find("testsuite/testcase/system-out")
-    assert out is not None
     assert r"run=1: failed: expected" in str(out.text)
     assert r"(<never> fired \x07 & ended, 5 %)" in str(out.text)
 

@@ -2,6 +2,7 @@
 
 import csv
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from fogsim.conditions import Finding, FindingVerdict
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
+from fogsim.scenario.loading import load_cases
 from fogsim.study.execution import result_file
 from fogsim.testing.campaign.comparison import changes, changes_text
 from fogsim.testing.campaign.drawing_plan import Findings
@@ -42,10 +44,16 @@ class Closed:
             watch(run, None)
 
 
-@pytest.fixture
-def campaign(tmp_path: Path) -> Campaign:
-    (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
-    return load_campaign(tmp_path / "drawn.fog.yaml", budget=40)
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    (file := tmp_path_factory.mktemp("campaign") / "drawn.fog.yaml").write_text(SCENARIO)
+    return load_campaign(file, budget=40)
+
+
+@pytest.fixture(scope="module")
+def found(campaign: Campaign) -> Findings:
+    """What it found without interruption, in the folder of its file."""
+    return run_campaign(campaign, campaign.file.parent / "out", Closed())
 
 
 def files(campaign: Campaign, found: Findings, folder: Path) -> dict[str, bytes]:
@@ -55,8 +63,8 @@ def files(campaign: Campaign, found: Findings, folder: Path) -> dict[str, bytes]
     return {name: (folder / name).read_bytes() for name in ("cases.csv", "report.html", "junit.xml")}
 
 
-def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, tmp_path: Path) -> None:
-    whole = files(campaign, run_campaign(campaign, tmp_path / "a", Closed()), tmp_path / "a")
+def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
+    whole = files(campaign, found, tmp_path)
     assert b"<p>Cases: 16 to fill the space" in whole["report.html"]
     for most in (5, 12, 21):
         with pytest.raises(KeyboardInterrupt):
@@ -80,40 +88,32 @@ def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, tmp
     assert "no failure rate" in rate_text(resumed)
 
 
-def test_a_failed_run_is_repeated_when_resumed(campaign: Campaign, tmp_path: Path) -> None:
-    found = run_campaign(campaign, tmp_path / "out", Closed())
-    write_json(
-        result_file(tmp_path / "out" / "results", found.results[0].run), {"status": "failed", "message": "killed"}
-    )
+def test_a_failed_run_is_repeated_when_resumed(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
+    shutil.copytree(campaign.file.parent / "out", tmp_path / "out")
+    first = result_file(tmp_path / "out" / "results", found.results[0].run)
+    write_json(first, {"status": "failed", "message": "killed"})
     resumed = run_campaign(campaign, tmp_path / "out", Closed(1))
     assert [one.message for one in resumed.results] == [None] * 40
 
 
-def test_the_command_of_a_failure_runs_the_same_case(campaign: Campaign, tmp_path: Path) -> None:
-    found = run_campaign(campaign, tmp_path / "a", Closed())
-    junit = files(campaign, found, tmp_path / "a")["junit.xml"].decode()
+def test_the_command_of_a_failure_runs_the_same_case(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
+    junit = files(campaign, found, tmp_path)["junit.xml"].decode()
     failed = next(one for one in found.results if one.has_failed)
     label = re.search(r"--case '([^']+)'", junit)
-    assert label is not None
-    from fogsim.scenario.loading import load_cases
-
     ((case, scenario),) = load_cases(campaign.file, wanted=label[1], is_test=True).cases
     assert (case.seed, scenario) == (failed.run.seed, failed.run.scenario)
 
 
-def test_the_same_cases_before_and_after(campaign: Campaign, tmp_path: Path) -> None:
+def test_the_same_cases_before_and_after(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
     """What changed is found: here each case below 100 m, which the engine no longer lets fail."""
-    before = run_campaign(campaign, tmp_path / "a", Closed())
-    write_cases(tmp_path / "a" / "cases.csv", campaign, before)
-    again = load_campaign(campaign.file, ["light.illuminance_lx=20000"], against=tmp_path / "a")
+    before = found
+    write_cases(tmp_path / "cases.csv", campaign, before)
+    again = load_campaign(campaign.file, ["light.illuminance_lx=20000"], against=tmp_path)
     after = run_campaign(again, tmp_path / "b", Closed(passes_below=100.0))
     assert [one.values for one in after.drawn] == [one.values for one in before.drawn]
     assert [one.run.seed for one in after.results] == [one.run.seed for one in before.results]
-    mended = [
-        one.run.levels
-        for one in before.results
-        if one.has_failed and float(one.run.levels["fog"].removesuffix(" m")) < 100.0
-    ]
+    failed = [one.run.levels for one in before.results if one.has_failed]
+    mended = [levels for levels in failed if float(levels["fog"].removesuffix(" m")) < 100.0]
     assert [one.result.run.levels for one in changes(again.earlier, after)] == mended
     assert changes_text(again.earlier, after) == f"{len(mended)} of 40 cases changed: {len(mended)} failed → passed"
     content = files(again, after, tmp_path / "b")
@@ -137,16 +137,13 @@ def test_what_is_no_earlier_campaign(campaign: Campaign, tmp_path: Path) -> None
             load_campaign(campaign.file, against=tmp_path)
 
 
-def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, tmp_path: Path) -> None:
+def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
     """At the median speed, 85 km/h, the closed form fails below 170 m; the median fog is thicker than that."""
-    found = run_campaign(campaign, tmp_path / "a", Closed())
-    smallest = smallest_failing(campaign, found, tmp_path / "a", Closed())
-    assert smallest is not None
+    smallest = smallest_failing(campaign, found, campaign.file.parent / "out", Closed())
     assert smallest.values == campaign.reader.case.levels, "the median case fails"
     clearer = load_campaign(campaign.file, ["space.fog={loguniform: [100 m, 1000 m]}"], budget=40)
     found = run_campaign(clearer, tmp_path / "b", Closed())
     smallest = smallest_failing(clearer, found, tmp_path / "b", Closed())
-    assert smallest is not None
     fog, passing = (float(one["fog"].removesuffix(" m")) for one in (smallest.values, smallest.passes_at))
     assert (smallest.values["speed"], smallest.values["run"]) == ("85 km/h", "0")
     assert 160.0 < fog < 170.0 <= passing < 180.0

@@ -70,7 +70,7 @@ def test_a_calibration_in_the_model_widens_its_deviations(tmp_path: Path) -> Non
     assert found.common_deviation == pytest.approx(0.25)
 
 
-def sees(shape: tuple[int, ...], place: tuple[int, ...]):
+def sees(place: tuple[int, ...]):
     """Change that lets the answer be one value of the input."""
 
     def change(model) -> None:
@@ -91,7 +91,7 @@ def test_frames_are_averaged_over_areas_with_rows_columns_and_channels_in_their_
     expected = image[8:10, 14:16, 2].mean() / 255.0
     shape = NCHW if channels_first else (1, 12, 16, 3)
     place = (0, 2, 4, 7) if channels_first else (0, 4, 7, 2)
-    path = write_network(tmp_path / "n.onnx", shape=("batch", *shape[1:]), change=sees(shape, place))
+    path = write_network(tmp_path / "n.onnx", shape=("batch", *shape[1:]), change=sees(place))
     assert math.log(estimate(path, image).extinction) == pytest.approx(-3.0 + expected, abs=1e-6)
 
 
@@ -136,16 +136,27 @@ def unknown_operator(model) -> None:
     model.graph.node[3].op_type = "Subtract"
 
 
-def huge_tensor(model) -> None:
-    model.graph.initializer.append(helper.make_tensor("many", TensorProto.INT64, [1], [2**34]))
-    model.graph.node.insert(0, helper.make_node("ConstantOfShape", ["many"], ["zeros"]))
-    model.graph.node.insert(1, helper.make_node("ReduceMax", ["zeros"], ["zero"], keepdims=0))
-    model.graph.node[2].op_type = "Add"
-    model.graph.node[2].ClearField("attribute")
-    model.graph.node[2].input.append("zero")
-    model.graph.node[3].op_type = "ReduceMean"
-    del model.graph.node[3].input[1:]
-    model.graph.node[3].attribute.append(helper.make_attribute("keepdims", 0))
+def grows_with_light(scale: float):
+    """Change to a size by the pixels: more than memory in light of 2 / scale, next to nothing in half of it."""
+
+    def change(model) -> None:
+        model.graph.initializer.append(helper.make_tensor("scale", TensorProto.FLOAT, [1], [scale]))
+        model.graph.initializer.append(helper.make_tensor("power", TensorProto.FLOAT, [1], [40.0]))
+        nodes = [
+            helper.make_node("ReduceMean", ["frame"], ["light"], keepdims=0),
+            helper.make_node("Mul", ["light", "scale"], ["scaled_light"]),
+            helper.make_node("Pow", ["scaled_light", "power"], ["much"]),
+            helper.make_node("Cast", ["much"], ["size"], to=TensorProto.INT64),
+            helper.make_node("ConstantOfShape", ["size"], ["zeros"]),
+            helper.make_node("ReduceMean", ["zeros"], ["zero"], keepdims=0),
+        ]
+        for i, node in enumerate(nodes):
+            model.graph.node.insert(i, node)
+        model.graph.node[6].op_type = "Add"
+        model.graph.node[6].ClearField("attribute")
+        model.graph.node[6].input[:] = ["light", "zero"]
+
+    return change
 
 
 def three_numbers(model) -> None:
@@ -176,7 +187,7 @@ def whole_numbers(model) -> None:
         (branching, r"one graph of operators, got 'branch' within it; If, Loop, Scan and functions are refused"),
         (function, r"one graph of operators, got 'Twice' within it"),
         (unknown_operator, r"onnxruntime cannot run the model: .*Subtract"),
-        (huge_tensor, r"the model fails on a grey frame: .*ConstantOfShape"),
+        (grows_with_light(4.0), r"the model fails on a grey frame: .*ConstantOfShape"),
         (three_numbers, r"expected one output, float32 of shape \(1, 2\): ln k, .*; got float32 of shape \(1, 3\)"),
         (two_outputs, r"expected one output, .*; got 'answer', 'scaled'"),
         (two_inputs, r"expected one input, .*; got 'frame': tensor\(float\) \[1, 3, 12, 16\], 'speed': tensor\(float"),
@@ -255,27 +266,8 @@ def test_a_call_that_takes_too_long_fails(tmp_path: Path) -> None:
         network.update(Observation(grey(0)))
 
 
-def fails_on_white(model) -> None:
-    """A size that depends on the pixels: more than memory in light, nothing in grey."""
-    model.graph.initializer.append(helper.make_tensor("scale", TensorProto.FLOAT, [1], [2.0]))
-    model.graph.initializer.append(helper.make_tensor("power", TensorProto.FLOAT, [1], [40.0]))
-    nodes = [
-        helper.make_node("ReduceMean", ["frame"], ["light"], keepdims=0),
-        helper.make_node("Mul", ["light", "scale"], ["twice"]),
-        helper.make_node("Pow", ["twice", "power"], ["much"]),
-        helper.make_node("Cast", ["much"], ["size"], to=TensorProto.INT64),
-        helper.make_node("ConstantOfShape", ["size"], ["zeros"]),
-        helper.make_node("ReduceMean", ["zeros"], ["zero"], keepdims=0),
-    ]
-    for i, node in enumerate(nodes):
-        model.graph.node.insert(i, node)
-    model.graph.node[6].op_type = "Add"
-    model.graph.node[6].ClearField("attribute")
-    model.graph.node[6].input[:] = ["light", "zero"]
-
-
 def test_a_model_that_fails_on_a_frame_fails_as_a_method(tmp_path: Path) -> None:
-    path = write_network(tmp_path / "n.onnx", change=fails_on_white)
+    path = write_network(tmp_path / "n.onnx", change=grows_with_light(2.0))
     network = make(f"onnx:{path}", CAMERA)
     assert network.update(Observation(grey(127))).valid
     with pytest.raises(MethodError, match=r"estimator 'onnx:.*n.onnx': its model failed: Fail: .*ConstantOfShape"):

@@ -11,26 +11,19 @@ from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.values import Camera, Response
+from tests.helpers.camera_files import camera_yaml
 
-FILE = """
-width: 240
-height: 160
-focal_length_px: 220
-principal_point_px: [119.5, 79.5]
-mount_height_m: 1.4
-pitch_deg: 1.0
-response: srgb
-"""
+CAMERA = Camera(240, 160, 220.0, (119.5, 79.5), 1.4, pitch=0.02, response=Response.SRGB)
 
 
 def test_the_command_measures_and_writes(tmp_path: Path) -> None:
     file, out = tmp_path / "camera.yaml", tmp_path / "halos.json"
-    file.write_text(FILE, encoding="utf-8")
+    file.write_text(camera_yaml((240, 160), 220, None, 1.4, 1.0), encoding="utf-8")
     command = ["calibrate", "halos", "--camera", str(file), "--out", str(out), "--scenes", "5"]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     measured = HaloThreshold.read(out)
-    measured.checked_for(Camera(240, 160, 220.0, (119.5, 79.5), 1.4, response=Response.SRGB))
+    measured.checked_for(CAMERA)
     assert 3.0 < measured.steepness < 100.0
     assert max(measured.mean_errors, measured.largest_errors) < 0.35
     assert json.loads(out.read_text(encoding="utf-8"))["pictures"] >= 8
@@ -40,7 +33,7 @@ def test_the_command_measures_and_writes(tmp_path: Path) -> None:
 
 def test_too_few_scenes_are_refused() -> None:
     with pytest.raises(InputError, match="scenes: expected at least 4, got 2"):
-        measure_halo_threshold(Camera(240, 160, 220.0, (119.5, 79.5), 1.4), 2)
+        measure_halo_threshold(CAMERA, 2)
 
 
 def test_the_threshold_errs_as_seldom_either_way() -> None:

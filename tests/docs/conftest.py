@@ -20,6 +20,7 @@ from PIL import Image
 from fogsim.offline.camera_file import load_calibration
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.scenario import catalogue
+from tests.helpers.camera_files import camera_yaml
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((CHECKOUT / "docs" / "tutorial").glob("*.md"))
@@ -33,14 +34,7 @@ TRIPS = """<routes>
     <trip id="veh18" depart="1" departPos="20" from="B0A0" to="B0A0" departSpeed="8"/>
 </routes>
 """
-CAMERA = """width: 640
-height: 480
-focal_length_px: 576.9
-principal_point_px: [319.5, 239.5]
-mount_height_m: 1.38
-pitch_deg: 2.0
-response: srgb
-"""
+CAMERA = camera_yaml((640, 480), 576.9, None, 1.38, 2.0)
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

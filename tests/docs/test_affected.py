@@ -8,7 +8,7 @@ import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FOLDERS = {"scene", "units"}
-NAMES = ("test_loop", "cli/test_cli", "docs/test_rooms", "docs/test_plugin_page", "vision/light/test_medians")
+NAMES = ("test_loop", "cli/test_cli", "docs/test_rooms", "docs/test_library_page", "vision/light/test_medians")
 FOUND = [path for path in (CHECKOUT / "tests").glob("*/test_*.py") if path.parent.name in FOLDERS]
 TESTS = [*(f"tests/{name}.py" for name in NAMES), *(path.relative_to(CHECKOUT).as_posix() for path in FOUND)]
 """Some of the tests, and all of two folders."""
@@ -33,7 +33,7 @@ def test_a_module_touches_those_who_import_it_directly_or_not(affected: Callable
 def test_data_pages_and_fixtures_touch_those_who_name_them(affected: Callable[..., set[str]]) -> None:
     assert "tests/cli/test_cli.py" in affected("tests/data/grid/grid.net.xml")
     assert "tests/test_loop.py" in affected("fogsim/vision/data/airlight_slopes.npz")
-    assert "tests/docs/test_plugin_page.py" in affected("docs/how_to/plugin.md")
+    assert "tests/docs/test_library_page.py" in affected("docs/how_to/library.md")
     assert affected("tests/scene/conftest.py") == {name for name in TESTS if name.startswith("tests/scene/")}
     assert affected("tests/units/test_quantities.py") == {"tests/units/test_quantities.py"}
 

@@ -13,6 +13,7 @@ from PIL import Image
 import fogsim
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera
+from tests.helpers.camera_files import camera_yaml
 
 VISIBILITY = 120.0
 
@@ -28,13 +29,9 @@ class Drive:
 
     @property
     def camera_yaml(self) -> str:
-        camera = self.camera
-        return (
-            f"width: {camera.width}\nheight: {camera.height}\nfocal_length_px: {camera.focal_length!r}\n"
-            f"principal_point_px: [{camera.principal_point[0]!r}, {camera.principal_point[1]!r}]\n"
-            f"mount_height_m: {camera.mount_height!r}\npitch_deg: {math.degrees(camera.pitch)!r}\n"
-            f"response: {camera.response.value}\n"
-        )
+        one, size = self.camera, (self.camera.width, self.camera.height)
+        place, pitch = one.principal_point, math.degrees(one.pitch)
+        return camera_yaml(size, one.focal_length, place, one.mount_height, pitch, one.response.value)
 
 
 @pytest.fixture(scope="session")

@@ -19,16 +19,9 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Response, View
 from fogsim.values.camera_response import respond
 from fogsim.values.pinhole import ray_from_pixel
+from tests.helpers.camera_files import camera_yaml
 
-CAMERA_YAML = """\
-width: 64
-height: 48
-focal_length_px: 60.0
-principal_point_px: [31.5, 20.25]
-mount_height_m: 1.4
-pitch_deg: 2.0
-response: linear
-"""
+CAMERA_YAML = camera_yaml((64, 48), 60.0, (31.5, 20.25), 1.4, 2.0, "linear")
 CAMERA = Camera(64, 48, 60.0, (31.5, 20.25), 1.4, math.radians(2.0))
 
 

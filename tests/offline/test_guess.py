@@ -64,7 +64,7 @@ def test_the_metadata_of_a_photograph_state_its_focal_length(drive, tmp_path: Pa
     assert any("1 image alone" in warning for warning in guess.warnings)
 
 
-def test_a_stated_horizon_needs_no_lines(drive, tmp_path: Path) -> None:
+def test_a_stated_horizon_needs_no_lines(tmp_path: Path) -> None:
     Image.fromarray(np.full((480, 640, 3), 120, np.uint8)).save(tmp_path / "blank.png")
     source = find_source(tmp_path / "blank.png")
     with pytest.raises(InputError, match="--horizon-row"):

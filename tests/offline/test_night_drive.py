@@ -11,16 +11,9 @@ from fogsim.errors import InputError
 from fogsim.offline import NightDrive, estimate_images
 from fogsim.values import Lamp
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture
+from tests.helpers.camera_files import camera_yaml
 
-FILE = """
-width: 160
-height: 120
-focal_length_px: 144
-principal_point_px: [79.5, 59.5]
-mount_height_m: 1.38
-pitch_deg: 2.0053522829578814
-response: srgb
-"""
+FILE = camera_yaml((160, 120), 144, None, 1.38, 2.0053522829578814)
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ from fogsim.offline.camera_file import Calibration, load_calibration, load_camer
 from fogsim.render import make_renderer
 from fogsim.scene import build_scene
 from fogsim.values import Camera, CameraPose, Observation, Response, SignMap
+from tests.helpers.camera_files import camera_yaml
 from tests.helpers.command import Command
 
 CAMERA = Camera(640, 480, 577.0, (322.0, 236.0), 1.38, math.radians(2.0), response=Response.LINEAR)
@@ -125,14 +126,14 @@ def test_yaw_is_undone(draw: Draw) -> None:
             check_registered(straightener(aside), along)
 
 
-def test_lens_and_yaw_together_from_files(drive, tmp_path: Path, draw: Draw) -> None:
+def test_lens_and_yaw_together_from_files(tmp_path: Path, draw: Draw) -> None:
     """What a person does: a folder of images and a camera file with both keys."""
     wide = replace(
         CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5)
     )
     image = seen_through(BARREL, draw(wide, math.radians(5.0)), wide, CAMERA)
     Image.fromarray(image).save(tmp_path / "a.png")
-    calibration = written(tmp_path, f"distortion: {list(BARREL)}\nyaw_deg: 5\n")
+    calibration = written(tmp_path, f"distortion: {list(BARREL)}", "yaw_deg: 5")
     assert (calibration.camera, calibration.distortion) == (CAMERA, BARREL)
     assert calibration.yaw == pytest.approx(math.radians(5.0))
     (result,) = estimate_images(tmp_path / "a.png", calibration, METHODS)
@@ -183,33 +184,30 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
             Straightener(Calibration(CAMERA, lens))
 
 
-def written(folder: Path, keys: str) -> Calibration:
-    (folder / "camera.yaml").write_text(
-        f"width: 640\nheight: 480\nfocal_length_px: 577\nprincipal_point_px: [322, 236]\nmount_height_m: 1.38\n"
-        f"pitch_deg: 2\n{keys}response: linear\n",
-        encoding="utf-8",
-    )
+def written(folder: Path, *keys: str) -> Calibration:
+    plain = camera_yaml((640, 480), 577, (322, 236), 1.38, 2, "linear")
+    (folder / "camera.yaml").write_text("\n".join((plain.rstrip(), *keys)), encoding="utf-8")
     return load_calibration(folder / "camera.yaml")
 
 
 def test_mistakes_are_told_with_their_line(tmp_path: Path) -> None:
     for keys, told in [
-        ("distortion: [0.1, 0.2]\n", r"camera.yaml:7: distortion.* missing"),
-        ("distortion: [0.1, 0.2, 0, 0, 0.3]\n", r"camera.yaml:7: distortion: .*4 items.* got \[0.1"),
-        ("distortion: [.nan, 0, 0, 0]\n", r"camera.yaml:7: distortion.*finite number; got nan"),
-        ("distortion: 0.1\n", r"camera.yaml:7: distortion: must be a list; got 0.1"),
-        ("distorsion: [0, 0, 0, 0]\n", "did you mean 'distortion'"),
-        ("yaw_deg: 90\n", r"camera.yaml:7: yaw_deg: .*less than 60; got 90"),
-        ("yaw_deg: .inf\n", "yaw_deg"),
+        ("distortion: [0.1, 0.2]", r"camera.yaml:8: distortion.* missing"),
+        ("distortion: [0.1, 0.2, 0, 0, 0.3]", r"camera.yaml:8: distortion: .*4 items.* got \[0.1"),
+        ("distortion: [.nan, 0, 0, 0]", r"camera.yaml:8: distortion.*finite number; got nan"),
+        ("distortion: 0.1", r"camera.yaml:8: distortion: must be a list; got 0.1"),
+        ("distorsion: [0, 0, 0, 0]", "did you mean 'distortion'"),
+        ("yaw_deg: 90", r"camera.yaml:8: yaw_deg: .*less than 60; got 90"),
+        ("yaw_deg: .inf", "yaw_deg"),
     ]:
         with pytest.raises(InputError, match=told):
             written(tmp_path, keys)
 
 
 def test_whoever_needs_a_pinhole_is_not_given_another_camera(tmp_path: Path) -> None:
-    written(tmp_path, "distortion: [0, 0, 0, 0]\nyaw_deg: 0\n")
+    written(tmp_path, "distortion: [0, 0, 0, 0]", "yaw_deg: 0")
     assert load_camera(tmp_path / "camera.yaml") == CAMERA
-    written(tmp_path, "yaw_deg: 3\n")
+    written(tmp_path, "yaw_deg: 3")
     with pytest.raises(InputError, match=r"camera.yaml: distortion and yaw_deg are undone by `fogsim estimate`"):
         load_camera(tmp_path / "camera.yaml")
 
@@ -224,7 +222,7 @@ def test_a_guess_says_which_yaw_it_would_be(draw: Draw, tmp_path: Path) -> None:
 
 def test_the_command_straightens(draw: Draw, tmp_path: Path, command: Command) -> None:
     """A camera 20° aside: told so, the method sees the road's fog, and the overlay shows the straightened image."""
-    calibration = written(tmp_path, "yaw_deg: 20\n")
+    calibration = written(tmp_path, "yaw_deg: 20")
     Image.fromarray(draw(CAMERA, math.radians(20.0))).save(tmp_path / "a.png")
     asked = ["a.png", "--camera", "camera.yaml", "--method", "negru2013", "--json", "--overlay", "found.png"]
     done = command("estimate", *asked, cwd=tmp_path)

@@ -12,16 +12,10 @@ from fogsim.errors import InputError
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.reproduce.belaroussi2015 import PUBLISHED, Setup, reproduce
 from fogsim.values import Camera, Response
+from tests.helpers.camera_files import camera_yaml
 
 CAMERA = Camera(320, 160, 300.0, (159.5, 79.5), 1.4, pitch=0.01, response=Response.SRGB)
 FOGS = (20.0, 30.0, 45.0)
-FILE = """
-width: 320
-height: 160
-focal_length_px: 300
-principal_point_px: [159.5, 79.5]
-mount_height_m: 1.4
-"""
 
 
 def test_signs_come_out_of_thinner_fog_from_farther_away() -> None:
@@ -39,7 +33,7 @@ def test_what_cannot_be_measured_is_told() -> None:
 
 def test_the_command_refuses_before_it_works(tmp_path: Path) -> None:
     camera, out = tmp_path / "camera.yaml", tmp_path / "range.json"
-    camera.write_text(FILE, encoding="utf-8")
+    camera.write_text(camera_yaml((320, 160), 300, None, 1.4), encoding="utf-8")
     out.write_text("mine", encoding="utf-8")
     run = CliRunner().invoke
     for options, message in (

@@ -144,7 +144,7 @@ def test_fog_has_the_airlight_and_noise_differs(renderer) -> None:
     assert told[0][:100].mean() == pytest.approx(228.0, abs=1.0)
 
 
-def test_wear_changes_the_road_where_it_lies_and_is_averaged_where_a_row_holds_much(renderer) -> None:
+def test_wear_changes_the_road_where_it_lies_and_is_averaged_where_a_row_holds_much() -> None:
     shape = (CAMERA.height, CAMERA.width)
     view = View(np.ones((*shape, 3), np.float32), np.full(shape, 10.0, np.float32), np.full(shape, ROAD, np.int32))
     pose = CameraPose((40.0, 0.0, CAMERA.mount_height), heading=0.0)

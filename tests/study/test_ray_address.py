@@ -46,7 +46,7 @@ def test_an_address_without_ray_is_refused(tmp_path: Path, command: Command) -> 
     assert "--address is a Ray cluster's: give --engine ray with it" in ended.stderr
 
 
-def test_nodes_that_would_compute_something_else_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nodes_that_would_compute_something_else_are_named() -> None:
     files, here = deciding_files(SCENARIO), _running_versions()
     assert files
     assert _unfitness(SCENARIO, files, here) is None

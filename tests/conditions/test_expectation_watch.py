@@ -74,9 +74,7 @@ def test_only_steps_of_its_scope_count() -> None:
     assert find(in_scope, SLOWING).verdict is PASSED
     assert find(in_scope, SLOWING[:8]).verdict is OPEN
     assert find(in_scope, SLOWING[:8]).reason == "time > 5 s never held"
-
-
-def test_too_short_a_time_shows_nothing() -> None:
+    # Too short a time shows nothing.
     condition, during = "ego.speed < 20 m/s", "time > 5 s"
     assert find(always(condition, during=during, least=4.5), SLOWING).verdict is PASSED
     found = find(always(condition, during=during, least=6.0), SLOWING)
@@ -155,9 +153,6 @@ def test_whenever_tells_how_often_and_when_it_was_not_so() -> None:
     assert found.reason == "failed 2 of 2 times, first from 2 s"
     assert found.expected == "advice <= 70 km/h within 1.5 s whenever fog.visibility_at_camera falls below 100 m"
     assert find(whenever(2.0), reaction(2.0)).came == "2 of 2 times"
-
-
-def test_a_level_fires_each_time_it_becomes_true() -> None:
     level = Whenever("a", parse_condition("fog.visibility_at_camera < 100 m"), parse_condition("advice < 70 km/h"), 1.0)
     assert find(level, reaction(1.0)).came == "2 of 2 times"
 

@@ -99,9 +99,6 @@ def test_what_is_refused() -> None:
     ]:
         with pytest.raises(ValueError, match=told):
             parse_condition(written)
-
-
-def test_lists_in_lists_have_a_limit() -> None:
     written: object = "time > 3 s"
     for _ in range(DEEPEST + 1):
         written = [written]

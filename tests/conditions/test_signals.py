@@ -282,6 +282,13 @@ def test_signals_of_a_run() -> None:
     assert read("time", step) == 3.0
     assert read("ending", step) is None
     assert read("limit", step) == pytest.approx(130 / 3.6)
+    step = make_step()
+    assert read("light", step) is None
+    assert read("ego.sensor_fault", step) is False
+    faulty = replace(step.truth, illuminance=0.05, faults=(Fault(Outage()),))
+    dark = replace(step, truth=faulty)
+    assert read("light", dark) == 0.05
+    assert read("ego.sensor_fault", dark) is True
 
 
 def test_times_to_who_is_ahead_count_from_other_points() -> None:
@@ -294,16 +301,6 @@ def test_times_to_who_is_ahead_count_from_other_points() -> None:
         assert read(signal, ahead) is None
     with pytest.raises(ValueError, match="expected a number and a unit such as '10 m'"):
         parse_condition("headway(ego, other, far) < 2 s")
-
-
-def test_light_and_faults() -> None:
-    step = make_step()
-    assert read("light", step) is None
-    assert read("ego.sensor_fault", step) is False
-    faulty = replace(step.truth, illuminance=0.05, faults=(Fault(Outage()),))
-    dark = replace(step, truth=faulty)
-    assert read("light", dark) == 0.05
-    assert read("ego.sensor_fault", dark) is True
 
 
 def test_curvature_is_that_of_the_circle_through_the_road() -> None:

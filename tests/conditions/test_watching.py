@@ -55,9 +55,6 @@ def test_what_is_not_known() -> None:
         ("ghost.speed > 3 m/s for 1 s", None),
     ):
         assert over(condition, [1.0]) == [known], condition
-
-
-def test_a_value_that_comes_back_is_compared_with_the_last_that_was_known() -> None:
     watch = Watch(parse_condition("estimate(m).valid becomes true"))
     assert [watch.update(make_step(i)) for i in range(2)] == [None, None]
 
@@ -101,14 +98,9 @@ def test_what_a_condition_can_be() -> None:
         ("ego.speed >= 0 for 2 s", TRUE),
     ]:
         assert outcomes(parse_condition(condition)) == possible
-
-
-def test_a_condition_of_very_many_cases_is_held_to_be_open() -> None:
+    # One of very many cases is held to be open.
     many = " and ".join(f"v{n}.speed >= 0" for n in range(12))
     assert outcomes(parse_condition(many)) == BOTH
-
-
-def test_three_values_have_their_logic_alone() -> None:
     with pytest.raises(TypeError, match="expected and, or, or not"):
         combined(Flag(Reference("time")), lambda _: None)
 
@@ -122,9 +114,7 @@ def test_what_a_run_cannot_tell() -> None:
     ]:
         content = RunContent(frozenset({Need.EGO, Need.ROUTE}), (), 1, ("timeline.0", "cut_in"))
         assert list(condition_mistakes(parse_condition(condition), content)) == told
-
-
-def test_without_an_ego_nobody_is_called_so() -> None:
+    # Without an ego, none is called so.
     content = RunContent(frozenset())
     (told,) = condition_mistakes(parse_condition("distance(ego, a) < 3 m"), content)
     assert told == "distance(ego, a) needs an ego, and this run has none"

@@ -10,13 +10,7 @@ import pytest
 
 
 class SmallDisk:
-    """Refuses to write more than fits into a folder.
-
-    Attributes
-    ----------
-    room : int
-        Size of all its files together at most [bytes].
-    """
+    """Refuses to write more into a folder than fits into its `room` [bytes]."""
 
     def __init__(self, folder: Path, room: int, patch: pytest.MonkeyPatch) -> None:
         self.folder = folder

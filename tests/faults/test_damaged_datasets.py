@@ -57,6 +57,9 @@ def test_an_image_that_was_cut_off_is_made_again(directory: DatasetDirectory) ->
         assert not directory.has(0)
         directory.write(0, dict.fromkeys(LAYERS, np.zeros((4, 4), np.uint8)), {"image": ENTRY, "annotations": []})
         assert directory.has(0)
+    # A stray file among the records counts for nothing.
+    (directory.path / "records" / "notes.json").write_text("{}", encoding="utf-8")
+    assert directory.beyond(1) == 0
 
 
 def test_a_damaged_identity_is_refused_in_one_line(directory: DatasetDirectory) -> None:
@@ -64,11 +67,6 @@ def test_a_damaged_identity_is_refused_in_one_line(directory: DatasetDirectory) 
         (directory.path / IDENTITY).write_bytes(DAMAGES[kind])
         with pytest.raises(InputError, match=f"^[^\n]*{directory.path}[^\n]*$"):
             DatasetDirectory(directory.path, IDENTITY_OF_SET)
-
-
-def test_a_stray_file_among_the_records_counts_for_nothing(directory: DatasetDirectory) -> None:
-    (directory.path / "records" / "notes.json").write_text("{}", encoding="utf-8")
-    assert directory.beyond(1) == 0
 
 
 def test_a_layer_that_is_no_image_is_refused(tmp_path: Path) -> None:

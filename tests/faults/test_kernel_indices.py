@@ -33,13 +33,10 @@ VALUES: dict[str, Places] = {
 WRONG = [math.nan, math.inf, -math.inf, 1e40, -1e40]
 
 
-def test_a_place_is_within_the_table() -> None:
+def test_places_are_within_the_table_and_values_from_it() -> None:
     for wrong in WRONG:
         for name, place in PLACES.items():
             assert all(0 <= index < LEVELS for index in place(wrong)), name
-
-
-def test_a_value_is_from_the_table() -> None:
     for wrong in WRONG:
         for name, value in VALUES.items():
             assert all(math.isnan(read) or 0.0 <= read <= 1.0 for read in value(wrong)), name

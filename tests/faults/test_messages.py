@@ -12,7 +12,7 @@ from rich.console import Console
 
 from fogsim.cli import printing
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import InputError
+from fogsim.errors import InputError, printable
 from fogsim.offline.camera_file import CameraFile
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.mistakes import mistakes_in
@@ -39,6 +39,23 @@ def test_descriptions_of_progress_are_literal(text: str) -> None:
     with progress_bar(console, stays=True) as progress:
         progress.update(progress.add_task(text, total=1), completed=1)
     assert text in console.file.getvalue()  # type: ignore[attr-defined]  # a StringIO
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("fog 80 m – Ω", "fog 80 m – Ω"),
+        ("\x1b[31mred", r"\x1b[31mred"),
+        ("a\tb", r"a\tb"),
+        ("bell\a", r"bell\x07"),
+        ("\udcff", r"\udcff"),
+    ],
+)
+def test_what_terminals_would_obey_is_escaped_and_lines_end_unless_they_must_not(text: str, shown: str) -> None:
+    assert printable(text) == shown
+    assert printable(shown) == shown
+    assert printable("a\nb") == "a\nb"
+    assert printable("a\nb", in_one_line=True) == r"a\nb"
 
 
 def test_all_consoles_leave_emoji_codes_alone() -> None:

@@ -104,10 +104,6 @@ def test_a_file_that_cannot_be_written_is_refused() -> None:
             assert why in str(told.value), name
             assert "--out " in str(told.value)
             assert "\n" not in str(told.value)
-
-
-@pytest.mark.usefixtures("folder")
-def test_a_descriptor_that_is_open_for_reading_is_refused() -> None:
     with Path("mine").open("rb") as file, pytest.raises(InputError, match="not open for writing"):
         refuse_unwritable(Path(f"/dev/fd/{file.fileno()}"), "--out")
 

@@ -28,12 +28,12 @@ SMALL = {"image_size": (32, 24), "overrides": ("clocks.camera_period_s=0.5",)}
 
 @pytest.fixture(scope="module")
 def hosted() -> Iterator[HostedLoop]:
-    """A child that may be silent for 3 s: that is three of its signs of life."""
+    """A child that may be silent for 1 s, since none is waited for that works."""
     settings = ["fog.visibility_m=inf", "camera.width=32", "camera.height=24", "renderer=cpu"]
     scenario = scenario_from_config(TOWN.resolve(), "veh0", settings)
     loop = HostedLoop(scenario)
     loop.start(1)
-    loop._timeout = 3.0
+    loop._timeout = 1.0
     yield loop
     loop.close()
 
@@ -41,7 +41,7 @@ def hosted() -> Iterator[HostedLoop]:
 def test_a_child_that_is_stopped_is_told_and_ended_and_the_next_run_has_another(hosted: HostedLoop) -> None:
     child = hosted._child
     os.kill(child.pid, signal.SIGSTOP)
-    with pytest.raises(SimulationError, match="no sign of life for 3 s, and was ended: it was stopped"):
+    with pytest.raises(SimulationError, match="no sign of life for 1 s, and was ended: it was stopped"):
         hosted.advance(Command())
     assert child.returncode == -signal.SIGKILL
     with pytest.raises(SimulationError, match="has ended"):
@@ -104,11 +104,11 @@ def test_a_child_that_works_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch)
     assert pipe.said[-2:] == [("done", None), ("closed", None)]
 
 
-@pytest.mark.parametrize(("fault", "message"), [("SIGSTOP", "have not answered for 3 s"), ("SIGKILL", "has ended")])
+@pytest.mark.parametrize(("fault", "message"), [("SIGSTOP", "have not answered for 1 s"), ("SIGKILL", "has ended")])
 def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, message: str) -> None:
     envs: Any = make_vector(ID, num_envs=2, **SMALL)
     worker, other = envs.processes
-    envs._timeout = 3.0
+    envs._timeout = 1.0
     os.kill(worker.pid, getattr(signal, fault))
     if fault == "SIGKILL":
         worker.join()

@@ -86,13 +86,10 @@ def test_arguments_of_environments() -> None:
                 assert "did you mean 'overrides'? Known: " in told
 
 
-def test_arguments_of_the_corridor() -> None:
+def test_arguments_of_the_corridor_and_of_what_environments_are_given() -> None:
     for argument in ["scenario", "fog_distribution", "overrides", "reward_weights", "timeout", "split"]:
         told = refusal(FogCorridorEnv, **{argument: 5.5 if argument != "timeout" else "x"})
         assert argument in told
-
-
-def test_arguments_of_what_environments_are_given() -> None:
     for make_one, argument, value in [
         (RewardWeights, "progress", math.nan),
         (RewardWeights, "comfort", 1.0),
@@ -154,9 +151,7 @@ def test_a_reset_that_is_refused_leaves_the_episode_as_it_was(fast: gymnasium.En
         refusal(fast.step, "x")
         refusal(fast.step, [math.nan, 0])
         assert np.array_equal((fast.step([12, 0])[0], fast.reset(seed=4)[0]), expected)
-
-
-def test_seeds_of_any_whole_type(fast: gymnasium.Env[Any, Any]) -> None:
+    # Seeds may have any whole type.
     assert np.array_equal(fast.reset(seed=np.int64(5))[0], fast.reset(seed=5)[0])
 
 

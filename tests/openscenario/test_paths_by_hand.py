@@ -1,4 +1,4 @@
-"""The ego's path on six files, within 1 m of what follows from each by hand at any time."""
+"""The ego's path on five files, within 1 m of what follows from each by hand at any time."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import pytest
 from tests.openscenario.test_off_lanes import _absolute, _follows, _offset
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, after, changes_lane, event, group, lane, linear, motion, on, profile, run, speed, world, write,
+    CAR, after, changes_lane, event, group, lane, linear, motion, on, run, speed, world, write,
 )  # fmt: skip
 
 FRONT, RIGHT, LEFT = 3.7, -1.75, 1.75  # From the reference point to the front bumper, and middles of the lanes [m]
@@ -57,10 +57,6 @@ def _by_times(t: float) -> Place:
     return 70.0 + 40.0 * share + FRONT * 40.0 / length, RIGHT + share + FRONT / length
 
 
-def _profile(t: float) -> float:
-    return _ramp(10.0, 14.0, 2.0)(min(t, 2.0)) + (_ramp(14.0, 6.0, 2.0)(t - 2.0) if t > 2.0 else 0.0)
-
-
 CLOSE = group(
     on(
         '<TimeToCollisionCondition value="3" freespace="true" rule="lessThan" relativeDistanceType="longitudinal">'
@@ -94,7 +90,6 @@ CASES = {
         _across(lambda t: RIGHT + 0.4 - 0.4 * math.cos(math.pi * min(t / OFFSET, 1.0))),
     ),
     "follows a trajectory": (_follows((0, world(70, RIGHT)), (4, world(110, RIGHT + 1.0))), after(BEGIN), _by_times),
-    "drives a profile": (profile((0, 10), (2, 14), (2, 6)), after(BEGIN), _along(_profile)),
 }
 
 

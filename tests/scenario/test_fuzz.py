@@ -252,16 +252,6 @@ def test_wrong_values_are_refused_or_run(folder: Path) -> None:
                     take_two_steps(scenario)
 
 
-@pytest.mark.parametrize("depth", [1, 2, 3])
-def test_no_key_stands_twice(folder: Path, depth: int) -> None:
-    key = next(one for one in KEYS if len(one.path) == depth and not one.method)
-    data, once = copy.deepcopy(PLAIN), f'"{key.path[-1]}": 1'
-    written(key, 1, data)
-    (folder / "scenario.yaml").write_text(yaml_of(data).replace(once, f"{once}, {once}"), encoding="utf-8")
-    with pytest.raises(InputError, match=rf"{key.path[-1]}: duplicate key"):
-        load_scenario(folder / "scenario.yaml")
-
-
 @st.composite
 def sets_of_keys(draw: st.DrawFn) -> dict[str, Any]:
     """A scenario in which some keys have values that are most often allowed, and extreme."""

@@ -137,13 +137,10 @@ def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
     assert scenario.camera.width == 320
 
 
-def test_overrides_that_are_none() -> None:
+def test_overrides_that_are_none_and_those_that_change_a_copy() -> None:
     for text in ["fog.visibility_m", "=3", "fog..x=1", "a=[1"]:
         with pytest.raises(InputError, match="--set"):
             parse_override(text)
-
-
-def test_overrides_change_a_copy() -> None:
     data = {"name": "x", "list": [1, 2]}
     assert apply_overrides(data, ["list.1=7"]) == {"name": "x", "list": [1, 7]}
     assert data == {"name": "x", "list": [1, 2]}

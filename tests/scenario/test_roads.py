@@ -106,6 +106,8 @@ def test_demand_and_actors_need_a_road(tmp_path: Path) -> None:
     text = TEXT.replace("road:", "traffic: {net: a.net.xml, routes: [a.rou.xml]} #", 1)
     with pytest.raises(InputError, match="demand: goes with a road by template"):
         loaded(tmp_path, text)
+    with pytest.raises(InputError, match=r"actors: go with a road by template .* or with traffic.net"):
+        loaded(tmp_path, OWN_NET.replace("net: road.net.xml", "config: a.sumocfg"))
 
 
 BESIDE = """
@@ -191,11 +193,6 @@ def test_actors_drive_on_a_network_of_ones_own(tmp_path: Path) -> None:
     (tmp_path / "road.net.xml").write_text(foot, encoding="utf-8")
     with pytest.raises(InputError, match=r"actors.ego: edge 'same_way' has no lane for vehicles, only for pedestrians"):
         loaded(tmp_path, OWN_NET.replace("EDGES", "same_way"))
-
-
-def test_actors_need_a_road(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"actors: go with a road by template .* or with traffic.net"):
-        loaded(tmp_path, OWN_NET.replace("net: road.net.xml", "config: a.sumocfg"))
 
 
 def test_places_of_traffic_alone_count_along_the_whole_way(tmp_path: Path) -> None:

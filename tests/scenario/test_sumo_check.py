@@ -60,17 +60,14 @@ def test_a_long_list_of_names_is_cut_short() -> None:
     assert str(error.value).endswith(", … (100 in all)")
 
 
-def test_an_ego_that_another_client_adds_to_a_configuration() -> None:
-    scenario = scenario_from_config(GRID, "theirs", ["fog.visibility_m=120"], others_add_vehicles=True)
-    assert scenario.traffic.ego == "theirs"
-
-
 def test_who_has_other_clients_may_name_anybody() -> None:
     settings = ["traffic.ego=theirs", "fog.banks.0={start_m: 9000, end_m: 9900, visibility_m: 60}"]
     scenario = load_scenario("motorway_fog_bank", settings, others_add_vehicles=True)
     assert override(scenario, ["duration_s=3"], others_add_vehicles=True).traffic.ego == "theirs"
     with pytest.raises(InputError, match="no vehicle 'theirs'"):
         override(scenario, ["duration_s=3"])
+    scenario = scenario_from_config(GRID, "theirs", ["fog.visibility_m=120"], others_add_vehicles=True)
+    assert scenario.traffic.ego == "theirs"
 
 
 def test_a_bank_beside_the_route_is_told_with_the_routes_length() -> None:

@@ -65,9 +65,7 @@ def test_draws_are_of_their_distribution_and_the_same_across_the_grid() -> None:
     skewed = varied({"x": {"lognormal": [100, 0.5], "at_most": 200}, "run": "300 seeds"}).cases
     assert np.median([float(case.values["x"]) for case in skewed]) == pytest.approx(92.0, rel=0.12)
     assert max(float(case.values["x"]) for case in skewed) <= 200
-
-
-def test_draws_that_no_number_holds_are_drawn_again() -> None:
+    # What no number holds is drawn again.
     for case in varied({"x": {"lognormal": ["300 m", 1000]}, "run": "50 seeds"}).cases:
         assert "inf" not in str(case)
 
@@ -102,9 +100,7 @@ def test_cases_are_chosen_by_their_values() -> None:
     }.items():
         with pytest.raises(InputError, match=told):
             chosen(wanted)
-
-
-def test_a_seed_that_is_not_in_the_file_has_draws_of_its_own() -> None:
+    # A seed that is not in the file has draws of its own.
     drawing = {"gap": {"uniform": [0, 1]}}
     few, many = varied({**drawing, "run": "2 seeds"}), varied({**drawing, "run": "9 seeds"})
     (case,) = chosen_cases(few, "run=7", "FILE")

@@ -93,3 +93,22 @@ def test_of_the_shipped_scenarios_those_that_expect_something_are_tests() -> Non
     assert {file.parent.name for file in find_files([folder])} == expecting
     assert "rising_sun" in expecting
     assert "graded_motorway" not in expecting
+
+
+def test_words_with_and_or_not() -> None:
+    for written, fits in [
+        ("fog", True),
+        ("night", False),
+        ("FOG and not night", True),
+        ("night or (fog and safe)", True),
+        ("not (night or safe)", False),
+        ("not night and not truck", True),
+        ("a.fog.yaml", True),
+    ]:
+        assert parse_keywords(written).match("tests/a.fog.yaml motorway safe") is fits
+
+
+def test_what_is_no_condition_is_refused() -> None:
+    for written in ["", "and", "fog or", "(fog", "fog)", "fog night", "not"]:
+        with pytest.raises(InputError, match="expected"):
+            parse_keywords(written)

@@ -18,9 +18,6 @@ def test_bounds_are_clopper_and_pearsons() -> None:
         # The two-sided interval of twice the rest has the one-sided bounds as its ends.
         interval = binomtest(passed, tried).proportion_ci(0.8, method="exact")
         assert rate_bounds(passed, tried, 0.9) == pytest.approx((interval.low, interval.high))
-
-
-def test_the_least_number_of_cases_is_the_one_at_which_the_bound_is_reached() -> None:
     wanted = Verdict(pass_rate=0.95, confidence=0.9)
     assert wanted.least_cases == 45
     assert rate_bounds(45, 45, 0.9)[0] >= 0.95 > rate_bounds(44, 44, 0.9)[0]

@@ -1,6 +1,8 @@
-"""Halos where there are lamps, the veil where there are none, in pictures that no renderer drew."""
+"""Halos where there are lamps, the veil where there are none, in pictures that no renderer drew; thresholds."""
 
 import dataclasses
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo, fog_class
-from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.halos import HaloThreshold, HaloWatch, largest_sharpness
 from fogsim.values import Camera, Frame, Lamp, LeadMeasurement, Observation, Response
 from tests.vision.sources.night_pictures import in_colour, picture
 
@@ -90,7 +92,7 @@ def test_published_threshold_and_daylight() -> None:
     assert "for the night" in Gallen2014(CAMERA).update(Observation(day, lamps=LIT)).diagnostics["reason"]
 
 
-def test_files_and_thresholds_of_others_are_refused(tmp_path) -> None:
+def test_files_and_thresholds_of_others_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"halos must be a file of `fogsim calibrate halos`, got .*none.json"):
         Gallen2014(CAMERA, halos=str(tmp_path / "none.json"))
     file = tmp_path / "halos.json"
@@ -98,8 +100,55 @@ def test_files_and_thresholds_of_others_are_refused(tmp_path) -> None:
     with pytest.raises(InputError, match=r"640x240.*320x240"):
         Gallen2014(CAMERA, halos=str(file))
     file.write_text(MEASURED.as_json(), encoding="utf-8")
+    assert HaloThreshold.read(file) == MEASURED
     assert Gallen2014(CAMERA, halos=str(file)).update(seen(LAMPS, glow=30.0)).diagnostics["detected"]
 
 
 def test_classes_of_fog() -> None:
     assert [fog_class(one) for one in (50.0, 100.0, 300.0, 301.0)] == [3, 2, 2, 1]
+
+
+def test_a_second_of_pictures_outvotes_one() -> None:
+    foggy, clear = picture(LAMPS, glow=40.0), picture(LAMPS)
+    watch = HaloWatch(threshold=20.0)
+    for _ in range(24):
+        assert watch.look(foggy).is_fog
+    one = watch.look(clear)
+    assert one.value > 20.0 > one.smoothed
+    assert one.is_fog
+    watch.reset()
+    assert watch.look(clear).is_fog is False
+    assert HaloWatch(threshold=20.0, window=1).look(clear).is_fog is False
+
+
+def test_one_sharp_lamp_shows_that_there_is_no_fog() -> None:
+    wide, sharp = picture(LAMPS[:1], glow=40.0), picture(LAMPS[1:])
+    both = np.maximum(wide, sharp)
+    by_mean, by_largest = HaloWatch().look(both), HaloWatch(25.0, largest_sharpness).look(both)
+    assert len(by_largest.halos) == 2
+    assert by_largest.value > by_mean.value
+    assert by_largest.is_fog is False
+    assert HaloWatch(25.0, largest_sharpness).look(wide).is_fog
+
+
+def test_without_a_lamp_there_is_nothing_to_tell() -> None:
+    reading = HaloWatch().look(picture(()))
+    assert (reading.value, reading.smoothed, reading.is_fog, reading.halos) == (None, None, None, ())
+
+
+def test_a_threshold_of_another_camera_is_refused_and_both_are_named() -> None:
+    with pytest.raises(InputError, match=r"320x240 px.*640x240 px.*fogsim calibrate halos"):
+        MEASURED.checked_for(dataclasses.replace(CAMERA, width=640))
+    with pytest.raises(InputError, match=r"response srgb.*response gamma"):
+        MEASURED.checked_for(dataclasses.replace(CAMERA, response=Response.GAMMA))
+
+
+def test_what_is_no_threshold_is_refused(tmp_path: Path) -> None:
+    file, wrong = tmp_path / "halos.json", dict.fromkeys(("", "[]", '{"width": 3}'), "halos must be a file of")
+    for key, value in (("steepness", -1), ("width", "wide"), ("response", "log"), ("mean_errors", None)):
+        text = json.dumps({**dataclasses.asdict(MEASURED), key: value})
+        wrong[text] = rf"halos.json.*({key} must be a number|expected finite numbers)"
+    for text, message in wrong.items():
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=message):
+            HaloThreshold.read(file)

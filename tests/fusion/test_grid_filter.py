@@ -7,7 +7,7 @@ import pytest
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.fusion import FUSIONS, LocatedFusion, make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.values import Estimate
+from fogsim.values import DenserFog, Estimate, OpticalDepths
 from fogsim.values.estimate import ExtinctionBounds
 
 
@@ -243,3 +243,56 @@ def test_a_vague_method_does_not_make_surer_of_what_another_has_wrong_in_common(
     for number in range(100):
         both = fusion.update([common, measured(100.0, 0.7)], 0.1 * number)
     assert both.log_standard_deviation > 0.7 * belief.log_standard_deviation
+
+
+CURVE = OpticalDepths((10.0, 100.0), (0.02, 0.2), (0.01, 0.02))
+
+
+def told(distance):
+    denser = None if distance is None else DenserFog(distance, 10.0, 0.05)
+    return Estimate("joint_road", 0.002, 1e-4, optical_depths=CURVE, denser=denser)
+
+
+def announced(distances):
+    """Denser fog that the belief has, by distances that images report, ten a second."""
+    fusion = make("grid_filter")
+    return [fusion.update([told(distance)], 0.1 * i).denser for i, distance in enumerate(distances)]
+
+
+def test_a_bank_that_comes_nearer_is_announced_within_a_second():
+    found = announced([None] * 10 + [200.0 - 3.0 * i for i in range(20)])
+    assert found[:12] == [None] * 12
+    first = next(i for i, one in enumerate(found) if one is not None)
+    assert 14 <= first <= 20
+    assert found[-1].distance == pytest.approx(200.0 - 3.0 * 19)
+
+
+def test_single_pictures_and_distances_that_do_not_fit_together_announce_nothing():
+    assert not any(announced([None, None, 150.0, None, None, None, None, 140.0, None, None, None] * 3))
+    assert not any(announced([300.0 if i % 2 else 60.0 for i in range(30)]))
+
+
+def test_an_announcement_ends_when_pictures_no_longer_tell_of_it():
+    found = announced([200.0] * 20 + [None] * 20)
+    assert found[15] is not None
+    assert found[-1] is None
+
+
+def test_silent_methods_and_such_as_know_no_distances_do_not_count():
+    fusion = make("grid_filter")
+    for i in range(20):
+        plain = Estimate("negru2013", 0.002, 1e-4)
+        belief = fusion.update([plain, told(150.0), Estimate.invalid("joint_road", "dark")], 0.1 * i)
+    assert belief.denser is not None
+    fusion.reset()
+    assert fusion.update([told(150.0)], 0.0).denser is None
+
+
+def test_an_estimate_that_saw_little_of_the_way_says_less():
+    near = Estimate("joint_road", 0.01, 1e-4, reach=30.0)
+    far = Estimate("joint_road", 0.01, 1e-4, reach=math.inf)
+    spread = []
+    for one in (near, far):
+        low, high = make("grid_filter").update([one], 0.0).visibility_quantiles((0.25, 0.75))
+        spread.append(math.log(high / low))
+    assert spread[0] > 1.3 * spread[1]

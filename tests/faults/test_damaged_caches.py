@@ -184,7 +184,6 @@ def test_a_map_with_a_right_checksum_and_wrong_arrays_is_made_again(
     first = used.use()
     (file,) = used.folder.iterdir()
     content = read_entry(file)
-    assert content is not None
     write_entry(file, forge(content))
     assert used.use() == (first[0], 2)
     assert used.use() == (first[0], 2)

@@ -17,7 +17,6 @@ from tests.helpers.command import Command
 def options(group: typer.Typer, *before: str) -> Iterator[tuple[tuple[str, ...], str, set[Any], float | None]]:
     """Command, name, types and largest value of every option of a group's commands."""
     for command in group.registered_commands:
-        assert command.callback is not None
         for parameter in signature(command.callback).parameters.values():
             kind, info = get_args(parameter.annotation)
             if isinstance(info, OptionInfo):
@@ -26,7 +25,6 @@ def options(group: typer.Typer, *before: str) -> Iterator[tuple[tuple[str, ...],
                 name = names[0] if names else "--" + parameter.name.replace("_", "-")
                 yield (*before, str(command.name)), name, {kind, *get_args(kind)}, info.max
     for inner in group.registered_groups:
-        assert inner.typer_instance is not None
         yield from options(inner.typer_instance, *before, str(inner.name))
 
 

@@ -326,7 +326,6 @@ def test_a_simulation_that_is_loaded_under_a_session(steps: int) -> None:
         libsumo.load(arguments)
         for _ in range(steps):
             libsumo.simulationStep()
-        assert step is not None
         for call in (session.observe, functools.partial(session.advise, step)):
             with pytest.raises(SimulationError, match="was loaded again while FogSim was using it: attach to it"):
                 call()

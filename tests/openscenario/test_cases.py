@@ -77,7 +77,6 @@ def test_an_act_with_empty_triggers_begins_at_once_and_is_not_stopped() -> None:
 def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
     assert _loaded(CASES / "hitch_without_trailer.xosc").traffic.ego == "Ego"
     hitch = re.search(r"<TrailerHitch[^>]*/>", (CASES / "hitch_without_trailer.xosc").read_text(encoding="utf-8"))
-    assert hitch is not None
     for trailer, is_none in (("", True), (' entityRef=""', True), (' entityRef="Lead"', False)):
         with_trailer = f"{hitch[0]}<Trailer><TrailerRef{trailer}/></Trailer>"
         file = _changed(tmp_path, "hitch_without_trailer", (hitch[0], with_trailer))

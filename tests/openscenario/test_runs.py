@@ -38,7 +38,6 @@ def test_a_black_target_at_visual_range_has_five_percent_contrast(cut_in: list[S
     before, after = cut_in[_begun(cut_in, "thicker_fog")], cut_in[-1]
     for step, visual_range in ((before, 140.0), (after, 60.0)):
         fog = step.truth.fog
-        assert fog is not None
         density = np.prod([change.density for change in fog.changes[-1:]])
         assert math.exp(-fog.extinction * density * visual_range) == pytest.approx(0.05, rel=1e-9)
         assert step.truth.visibility == pytest.approx(visual_range, rel=1e-9)

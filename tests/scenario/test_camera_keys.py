@@ -33,16 +33,13 @@ def test_a_fixed_exposure_needs_light_or_a_luminance() -> None:
 
 def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:
     """Airlight of 10 000 lx: 0.406 · 10 000 / π · 1.02 in the brightest channel."""
-    assert build.camera_config(scenario()).sensor.saturation_luminance == pytest.approx(
-        0.406 * 1e4 / math.pi * 1.02 / 0.6
-    )
-    assert build.camera_config(scenario("camera.saturation_luminance_cdpm2=4000")).sensor.saturation_luminance == 4000.0
+    fixed = ("camera.saturation_luminance_cdpm2=4000",)
+    for overrides, white in [((), 0.406 * 1e4 / math.pi * 1.02 / 0.6), (fixed, 4000.0)]:
+        assert build.camera_config(scenario(*overrides)).sensor.saturation_luminance == pytest.approx(white)
 
 
 def exposure(*overrides: str) -> AutoExposure:
-    found = build.camera_config(scenario(*overrides)).exposure
-    assert found is not None
-    return found
+    return build.camera_config(scenario(*overrides)).exposure
 
 
 def test_what_is_metered_has_a_target_of_its_own() -> None:
@@ -53,12 +50,8 @@ def test_what_is_metered_has_a_target_of_its_own() -> None:
 
 
 def test_told_errors_are_in_the_told_calibration_alone() -> None:
-    wrong = scenario(
-        "camera.bits=12",
-        "camera.roll_deg=1",
-        "camera.told={pitch_error_deg: 1, roll_error_deg: -2, focal_length_error_percent: 10, "
-        "mount_height_error_percent: -20}",
-    )
+    errors = "pitch_error_deg: 1, roll_error_deg: -2, focal_length_error_percent: 10, mount_height_error_percent: -20"
+    wrong = scenario("camera.bits=12", "camera.roll_deg=1", f"camera.told={{{errors}}}")
     true, told = build.camera_config(wrong).on(), build.camera_config(wrong).assumed_on()
     assert math.degrees(told.pitch - true.pitch) == pytest.approx(1.0)
     assert math.degrees(told.roll) == pytest.approx(-1.0)
@@ -68,6 +61,7 @@ def test_told_errors_are_in_the_told_calibration_alone() -> None:
 
 
 def test_mistakes_are_named() -> None:
+    auto = "camera.exposure.mode=auto"
     for overrides, message in [
         (["camera.bits=9"], r"camera\.bits: .*8, 10 or 12; got 9"),
         (["camera.samples=4"], r"camera\.samples: .*less than or equal to 3; got 4"),
@@ -78,10 +72,7 @@ def test_mistakes_are_named() -> None:
         (["camera.exposure.time_constant_s=-1"], r"time_constant_s: .*greater than or equal to 0; got -1"),
         (["camera.exposure.target_percent=0"], r"target_percent: .*greater than or equal to 1; got 0"),
         (["camera.exposure.darkest_cdpm2=500"], r"camera\.exposure: .*must not decrease .*got 500, 100 and 100000"),
-        (
-            ["camera.exposure.mode=auto", "camera.saturation_luminance_cdpm2=5000"],
-            r"camera: saturation_luminance_cdpm2 is that of a fixed exposure, but exposure\.mode is auto",
-        ),
+        ([auto, "camera.saturation_luminance_cdpm2=5000"], r"camera: saturation_luminance_cdpm2 .*mode is auto"),
         (["camera.lens_shading=1.5"], r"camera\.lens_shading: .*less than or equal to 1; got 1.5"),
         (["camera.lens_glare=1.5"], r"camera\.lens_glare: .*less than or equal to 1; got 1.5"),
         (["camera.body.pitch_deg_per_mps2=-0.1"], r"pitch_deg_per_mps2: .*greater than or equal to 0; got -0.1"),

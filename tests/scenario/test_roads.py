@@ -42,7 +42,6 @@ def test_footways_lie_beside_the_lanes_that_traffic_keeps(tmp_path: Path) -> Non
     files = traffic_files(
         loaded(tmp_path, text.replace("footways: true", "footways: true, zebra_crossings: [230 m, 400 m]"))
     )
-    assert files.net is not None
     net, routes = (ET.parse(path).getroot() for path in (files.net, files.routes[0]))  # noqa: S314 - our own files
     on_foot = {lane.get("id") for lane in net.iter("lane") if lane.get("allow") == "pedestrian"}
     assert {"same_way_0", "oncoming_0", ":cut2_c0_0", ":cut1_w0_0"} <= on_foot
@@ -71,7 +70,6 @@ def test_footways_that_cannot_be_are_refused(tmp_path: Path) -> None:
 def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
     scenario = loaded(tmp_path)
     setup = build.traffic_setup(scenario)
-    assert setup.net is not None
     assert setup.net.is_relative_to(tmp_path / "cache")
     assert setup.keep_lane == ("ego", "slow")
     assert [event.trigger.name for event in setup.events] == ["actors.slow.lamps"]
@@ -140,7 +138,6 @@ def test_what_stands_beside_a_road_is_drawn_where_it_is_said_to_be(tmp_path: Pat
 
 def test_signs_repeat_the_limit_but_in_a_tunnel(tmp_path: Path) -> None:
     setup = build.traffic_setup(loaded(tmp_path, BESIDE.replace("tunnel_at", "sign_spacing: 450 m\n  tunnel_at")))
-    assert setup.net is not None
     found = {one.sign_id: one for one in sign_map(read_net(setup.net), setup.additional).signs}
     repeated = {name: one for name, one in found.items() if name[-1].isdigit()}
     # One would be 450 m along, in the tunnel from 200 to 600 m.

@@ -76,7 +76,6 @@ def test_junit_is_by_the_schema(outcomes: list[FileOutcome], tmp_path: Path) -> 
     assert (
         "1 of 2 cases passed; run=1: expected ego.ttc >= 1.5 s, came 1.2 s at 34.5 s, 812 m" in first.attrib["message"]
     )
-    assert first.text is not None
     assert "with, comma/a0.fog.yaml:7\n" in first.text
     assert "fogsim test 'with, comma/a0.fog.yaml' --case run=1" in first.text
     out = root.find("testsuite/testcase/system-out")

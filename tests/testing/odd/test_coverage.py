@@ -94,7 +94,6 @@ class Interrupted(ThisProcess):
 
 
 def covered(campaign: Campaign, out: Path, engine: ThisProcess) -> tuple[list[str], dict[str, bytes]]:
-    assert campaign.odd is not None
     found = run_campaign(campaign, out, engine)
     summary, _ = write_coverage(out, campaign.odd, [one.run for one in found.results])
     files = [out / "coverage.json", out / "coverage.html", *sorted((out / "coverage").iterdir())]
@@ -104,7 +103,6 @@ def covered(campaign: Campaign, out: Path, engine: ThisProcess) -> tuple[list[st
 def test_a_campaign_and_the_same_one_resumed(tmp_path: Path) -> None:
     (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
     campaign = load_campaign(tmp_path / "drawn.fog.yaml", budget=16, odd="fog")
-    assert campaign.odd is not None
     check = CoverageCheck(campaign.odd)
     summary, whole = covered(campaign, tmp_path / "a", ThisProcess(check.to_file))
     for _ in range(3):
@@ -139,7 +137,6 @@ def passes(_: Scenario, __: int, result: Path) -> None:
 def test_results_without_this_coverage_do_not_count(tmp_path: Path) -> None:
     (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
     plain, with_odd = (load_campaign(tmp_path / "drawn.fog.yaml", budget=16, odd=odd) for odd in (None, "fog"))
-    assert with_odd.odd is not None
     first, second = (run_campaign(one, tmp_path / "out", ThisProcess(passes)) for one in (plain, with_odd))
     assert {one.run.key for one in first.results}.isdisjoint(one.run.key for one in second.results)
     (tmp_path / "out" / "coverage.json").write_text("an earlier call's")

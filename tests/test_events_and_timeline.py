@@ -31,7 +31,6 @@ def steps(folder: Path, script: str, ego: str = "") -> list[Step]:
 def speed(step: Step) -> float:
     """Speed of the other one [km/h]."""
     row = step.traffic.row("other")
-    assert row is not None
     return 3.6 * float(step.traffic.speed[row])
 
 

@@ -223,7 +223,6 @@ def test_in_traffic_the_camera_has_the_pitch_of_the_road(tmp_path: Path) -> None
     assert grades[-1] == pytest.approx(math.atan(0.04), abs=1e-5)
     for step in steps:
         pose, bumper = step.truth.pose, step.traffic.position[step.ego]
-        assert pose is not None
         assert pose.grade == pose.road_grade == step.traffic.grade[step.ego]
         assert pose.position[2] - bumper[2] == pytest.approx(1.38 - 1.7 * math.sin(pose.grade), abs=0.002)
     belief = steps[-1].belief

@@ -189,8 +189,6 @@ def test_a_restarted_loop_lays_road_and_fog_along_the_egos_new_route(tmp_path: P
 
     def began(loop: ClosedLoop, seed: int) -> tuple[list[float], tuple[FogBank, ...]]:
         route, fog = loop.start(seed).truth.route, loop._fog
-        assert route is not None
-        assert fog is not None
         return route[0].tolist(), fog.banks
 
     with ClosedLoop(scenario) as loop:

@@ -34,7 +34,6 @@ def test_an_ego_that_is_removed_is_none_and_the_simulation_goes_on(api: Any, at:
             api.vehicle.remove(EGO)
         if at == "before the advice":
             step = session.observe()
-            assert step is not None
             api.vehicle.remove(EGO)
             session.advise(step)
         for _ in range(3):
@@ -56,7 +55,6 @@ def test_another_vehicle_that_is_removed_is_not_seen_any_more(api: Any) -> None:
         for _ in range(3):
             api.simulationStep()
             step = session.observe()
-            assert step is not None
             assert gone not in step.traffic.ids
             session.advise(step)
 
@@ -71,7 +69,6 @@ def test_an_ego_that_is_moved_by_hand_is_where_it_was_put(api: Any, place: tuple
         api.vehicle.moveTo("mine", f"{place[0]}_0", place[1])
         api.simulationStep()
         moved = session.observe()
-        assert moved is not None
     before = api.simulation.getDistanceRoad("C0B0", 0.0, place[0], 0.0, isDriving=True)
     assert moved.route_position == pytest.approx(before + api.vehicle.getLanePosition("mine"), abs=0.1)
 
@@ -83,13 +80,11 @@ def test_a_vehicle_that_bears_the_id_of_another_has_its_own_body(api: Any) -> No
     api.vehicle.add("mine", "mine")
     with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
         step: Step | None = until_the_ego_drives(api, session)
-        assert step is not None
         assert step.traffic.length[step.ego] == 5.0
         api.vehicle.remove("mine")
         api.vehicle.add("mine", "mine", typeID="long")
         api.simulationStep()
         step = session.observe()
-        assert step is not None
         assert step.traffic.length[step.ego] == 12.0
 
 

@@ -74,7 +74,6 @@ def test_files_say_it_of_actors_and_in_the_timeline(tmp_path: Path) -> None:
         SetLamps("slow", failed=Lamp.LOW_BEAM, side=Side.RIGHT),
     )
     begun = actions_of(scenario.timeline[0], 0.03, {}, Anywhere())
-    assert begun is not None
     assert begun.traffic == (
         SetLamps("slow", lit=Lamp.REAR_FOG),
         SetLamps("slow", failed=Lamp.STOP, side=Side.LEFT),

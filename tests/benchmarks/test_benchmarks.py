@@ -57,8 +57,7 @@ SLOW = {
 
 
 @pytest.mark.parametrize(
-    ("command", "keys"),
-    [*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.nightly) for one in SLOW.items())],
+    ("command", "keys"), [*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.nightly) for one in SLOW.items())]
 )
 def test_records(command: str, keys: str) -> None:
     for record in records(*command.split()):

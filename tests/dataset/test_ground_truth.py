@@ -49,8 +49,6 @@ def step() -> Step:
 def places(step: Step) -> np.ndarray:
     """Points that the pixels show (rows, cols, 3), those of the sky 10 000 km away."""
     truth = step.truth
-    assert truth.camera is not None
-    assert truth.pose is not None
     rows, cols = np.indices(step.view.distance.shape)
     rays = np.stack((cols, rows, np.ones(rows.shape)), axis=-1) @ ray_from_pixel(truth.camera, truth.pose).T
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -59,8 +57,6 @@ def places(step: Step) -> np.ndarray:
 
 def test_transmission_is_that_of_the_optical_depth_to_what_is_seen(step: Step) -> None:
     truth = step.truth
-    assert truth.fog is not None
-    assert truth.pose is not None
     expected = np.exp(-optical_depth(truth.fog, np.array(truth.pose.position), places(step)))
     assert transmission(step) == pytest.approx(expected, rel=2e-3, abs=2e-5)
     assert 0 < expected[np.isinf(step.view.distance)].max() < 1  # the sky is seen through the top of the fog

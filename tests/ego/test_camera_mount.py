@@ -11,7 +11,7 @@ from fogsim.camera import USUAL_MOUNTS
 from fogsim.scenario import build, catalogue
 from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.values import Camera, Step
+from fogsim.values import Step
 
 SMALL = ("renderer=cpu", "camera.width=96", "camera.height=72", "estimators=[joint_road]", "fog={visibility_m: 150}")
 LIGHT = (*SMALL, "traffic.routes=[ego.rou.xml]", "traffic.additional=[]", "traffic.events=[]", "traffic.keep_lane=[]")
@@ -34,8 +34,6 @@ def mounted(step: Step) -> tuple[float, float, float]:
     """Heights of the true and of the told calibration above the road, and setback of the pose [m]."""
     pose, told = step.truth.pose, step.observation.frame.camera
     bumper = step.traffic.position[step.ego]
-    assert pose is not None
-    assert isinstance(told, Camera)
     assert pose.position[2] - bumper[2] == pytest.approx(step.truth.camera.mount_height)
     return step.truth.camera.mount_height, told.mount_height, math.dist(bumper[:2], pose.position[:2])
 
@@ -69,7 +67,6 @@ def test_in_a_simulation_of_the_users_own_too(tmp_path: Path) -> None:
         with fogsim.attach(libsumo, scenario=scenario) as session:
             libsumo.simulationStep()
             step = session.observe()
-            assert step is not None
             assert mounted(step)[:2] == pytest.approx((USUAL_MOUNTS["bus"].height,) * 2)
 
 

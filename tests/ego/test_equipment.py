@@ -45,7 +45,6 @@ def test_the_fog_along_the_route_is_told_as_far_as_the_route_goes() -> None:
     bank = FogBank(origin=(400.0, 0.0), axis=(0.0, 1.0), start=100.0, end=1000.0, edge=1.0, extra_extinction=0.05)
     fog = FogField(0.002, (1.0,) * 3, banks=(bank,))
     told = fog_truth(fog, POSE, CAMERA, SignMap(), way=KnownWay(route), place=100.0).profile
-    assert told is not None
     assert (told.distance[0], told.distance[-1]) == (-100.0, 600.0)
     assert told.at(350.0) == pytest.approx((math.log(0.002), 0.0))
     assert told.at(450.0) == pytest.approx((math.log(0.052), 0.0))
@@ -56,5 +55,4 @@ def test_the_fog_along_the_route_is_told_as_far_as_the_route_goes() -> None:
 def test_clear_air_along_the_route_has_a_logarithm_too() -> None:
     way = KnownWay(np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0]]))
     told = fog_truth(FogField(0.0, (1.0,) * 3), POSE, CAMERA, SignMap(), way=way, place=0.0).profile
-    assert told is not None
     assert told.log_extinction == pytest.approx(math.log(1e-6))

@@ -29,7 +29,6 @@ def draw(state: TrafficState, pose: CameraPose) -> tuple[View, np.ndarray]:
 def test_a_point_is_smeared_over_the_way_and_keeps_its_light() -> None:
     # 25 m/s for 36 ms are 0.9 m: nine columns, with nine instants one each.
     view, radiance = exposed(draw, Shutter(0.036, 9), traffic(25.0), 0, POSE)
-    assert radiance is not None
     assert np.flatnonzero(radiance[1, :, 0]).tolist() == list(range(16, 25))
     assert radiance.sum() == pytest.approx(3 * 9.0, rel=1e-6)
     assert radiance[1, 16, 0] == pytest.approx(1.0)

@@ -20,7 +20,7 @@ from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Estimate, Leader, SignSighting, Step
-from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
+from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
 from fogsim_envs.task.fast import _WITHOUT_FRAMES, FAST_FOG, FAST_ROAD, FAST_SCENARIO
 from fogsim_envs.task.observation import (
@@ -132,9 +132,7 @@ def fast() -> Iterator[gymnasium.Env[Any, Any]]:
 @pytest.fixture(scope="module")
 def step(fast: gymnasium.Env[Any, Any]) -> Step:
     fast.reset(seed=3, options={"visibility": 60.0})
-    task = fast.unwrapped
-    assert isinstance(task, FogAdvisoryV1Env)
-    return task._current
+    return fast.unwrapped._current
 
 
 def _moved(step: Step, distance: float, seconds: float, **changes: Any) -> Step:
@@ -181,7 +179,6 @@ def test_a_version_says_when_it_is_over_and_solved_and_what_has_changed(name: st
     spec = gymnasium.spec(f"fogsim/{name}")
     assert spec.max_episode_steps is not None
     # Of 40 points, which a drive at the limit with nothing amiss is worth.
-    assert spec.reward_threshold is not None
     assert 0.0 < spec.reward_threshold < 40.0
     kind = gymnasium.envs.registration.load_env_creator(str(spec.entry_point))
     assert f"### Version history\n    * {name[-2:]}: " in (kind.__doc__ or "")
@@ -217,10 +214,8 @@ def test_an_episode_without_a_seed_gets_another_run(fast: gymnasium.Env[Any, Any
 
 
 def test_a_scenario_in_place_of_the_own_road_is_run_as_it_is(fast: gymnasium.Env[Any, Any]) -> None:
-    task = fast.unwrapped
-    assert isinstance(task, FogAdvisoryV1Env)
     with_frames = EpisodeSource(None, None, None, (), "train")
-    for source, name, overrides in [(task._source, ROAD, _WITHOUT_FRAMES), (with_frames, "clear_day", ())]:
+    for source, name, overrides in [(fast.unwrapped._source, ROAD, _WITHOUT_FRAMES), (with_frames, "clear_day", ())]:
         for visibility, more in [(None, ()), (60.0, ("fog.visibility_m=60.0",))]:
             choice = EpisodeChoice(scenario=name, visibility=visibility)
             _, drawn = source.draw(np.random.default_rng(0), choice)
@@ -237,9 +232,7 @@ def test_what_the_caller_fixes(fast: gymnasium.Env[Any, Any]) -> None:
     assert "45.0" in fog
     assert info["drawn"]["driver"] == "too_fast"
     fast.reset(seed=2, options={"overrides": ["fog={visibility_m: 70}"]})
-    task = fast.unwrapped
-    assert isinstance(task, FogAdvisoryV1Env)
-    assert task._current.truth.visibility == pytest.approx(70.0)
+    assert fast.unwrapped._current.truth.visibility == pytest.approx(70.0)
 
 
 def test_options_that_are_none(fast: gymnasium.Env[Any, Any]) -> None:
@@ -368,11 +361,6 @@ def test_the_map_rides_along_as_a_channel_or_an_entry(step: Step) -> None:
     np.testing.assert_array_equal(whole["sign_map"][:, :, 1], channel[:, :, 3])
 
 
-def _illuminance(step: Step) -> float:
-    assert step.observation.light is not None
-    return step.observation.light.illuminance
-
-
 def test_version_2_drives_by_day_and_night_with_signs() -> None:
     env: Any = gymnasium.make(
         "fogsim/FogAdvisory-v2",
@@ -427,7 +415,9 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     assert told["lanes"] in (pytest.approx(0.4), pytest.approx(0.6))
     belief = [told[f"belief_{name}"] for name in ("5_percent", "25_percent", "median", "75_percent", "95_percent")]
     assert belief == sorted(belief)
-    assert told["ambient_light"] == pytest.approx(math.log10(_illuminance(step)) / 3.0 - 2.0 / 3.0, abs=1e-6)
+    assert told["ambient_light"] == pytest.approx(
+        math.log10(step.observation.light.illuminance) / 3.0 - 2.0 / 3.0, abs=1e-6
+    )
     sensorless = dataclasses.replace(step, observation=dataclasses.replace(step.observation, light=None))
     assert task_state(sensorless, None, Command(), 100.0, 500.0)[-1] == 1.0
     known = [STATE_FEATURES.index(name) for name in AGENT_STATE]
@@ -438,6 +428,5 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
 def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, Any], step: Step) -> None:
     del step  # which the environment shows
     picture = fast.render()
-    assert isinstance(picture, np.ndarray)
     assert picture.shape == (480, 1024, 3)
     assert picture.std() > 5.0

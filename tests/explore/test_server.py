@@ -103,7 +103,6 @@ def test_it_answers_until_ctrl_c(tmp_path: Path) -> None:
         text=True,
         env={**os.environ, "COLUMNS": "200"},
     ) as process:
-        assert process.stdout is not None
         port = int(process.stdout.readline().partition("http://127.0.0.1:")[2].partition("/")[0])
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         connection.request("GET", "/answer?time=0.5&visibility=80")

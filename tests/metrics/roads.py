@@ -35,7 +35,6 @@ def watched(
         gathering.add(dataclasses.replace(step, traffic=road, truth=truth, cohort=cohort), elapsed)
         if number % 2 or number == len(roads) - 1:
             span = gathering.take()
-            assert span is not None
             metric.add(span)
     assert gathering.take() is None
     return metric.result()

@@ -14,9 +14,7 @@ from tests.recorders.synthetic import belief, estimate, make_step
 
 
 def method_errors(summary: dict[str, JsonValue], method: str) -> dict[str, JsonValue]:
-    estimators = summary["estimators"]
-    assert isinstance(estimators, dict)
-    return dict(estimators[method])
+    return summary["estimators"][method]
 
 
 def test_estimator_error_is_against_the_visibility_ahead_and_only_in_fog() -> None:

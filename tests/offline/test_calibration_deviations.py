@@ -20,7 +20,6 @@ def test_relative_deviations_add_in_quadrature_to_those_of_methods_on_the_road()
     assert widened.extinction == 0.02
     # 5 % of k, next to its own 5 %, which counts a little more on an uncertain scale.
     assert widened.standard_deviation == pytest.approx(0.001 * math.sqrt(2.0), rel=0.002)
-    assert widened.optical_depths is not None
     assert widened.optical_depths.standard_deviation == pytest.approx((math.hypot(0.1, 0.05),), rel=0.002)
 
 

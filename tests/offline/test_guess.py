@@ -17,14 +17,9 @@ from fogsim.values import Response
 HEIGHT = 1.38
 
 
-def true_field_of_view(drive) -> float:
-    return 2.0 * math.atan(0.5 * drive.camera.width / drive.camera.focal_length)
-
-
 def test_the_pitch_comes_from_the_lines_of_the_road(drive) -> None:
-    guess = guess_camera(
-        find_source(drive.folder / "images"), mount_height=HEIGHT, field_of_view=true_field_of_view(drive)
-    )
+    angle = 2.0 * math.atan(0.5 * drive.camera.width / drive.camera.focal_length)
+    guess = guess_camera(find_source(drive.folder / "images"), mount_height=HEIGHT, field_of_view=angle)
     assert guess.warnings == ()
     assert guess.camera.pitch == pytest.approx(drive.camera.pitch, abs=math.radians(0.1))
     assert guess.camera.focal_length == pytest.approx(drive.camera.focal_length, rel=1e-9)

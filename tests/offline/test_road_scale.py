@@ -27,7 +27,6 @@ def test_the_product_of_focal_length_and_height_follows_from_the_way(steps, fact
     for (frame, _), at in zip(steps, way, strict=True):
         motion.add(frame.image, float(at))
     scale = motion.scale()
-    assert scale is not None
     assert scale.factor * factor == pytest.approx(1.0, abs=2.0 * scale.deviation)
     assert scale.deviation < 0.05
 

@@ -139,7 +139,6 @@ def test_gpx_and_csv_with_headings_tell_the_same(folder: Path) -> None:
     tracks = [load_track(one) for one in (csv_track(folder / "a.csv", heading="30"), gpx_track(folder / "b.gpx"))]
     for track in tracks:
         pose = track.pose_at(2.5)
-        assert pose is not None
         assert pose.heading == pytest.approx(math.radians(60.0), abs=1e-5)
         assert math.degrees(pose.longitude) == pytest.approx(ahead(25.0, 0.0)[0], abs=1e-7)
         assert track.pose_at(-0.1) is None
@@ -153,7 +152,6 @@ def test_summary_and_remarks_of_what_came_of_it(folder: Path) -> None:
         distance = 80.0 - SPEED * index
         for one, standing in ((found, True), (missed, False)):
             sightings = one.sightings(float(index))
-            assert sightings is not None
             one.look(image(distance, standing=standing), float(index), sightings)
     (sign,) = found.summary()
     assert (sign.sign_id, sign.detections, sign.misses) == ("a", IMAGES, 0)
@@ -179,7 +177,6 @@ def test_images_outside_the_track_and_signs_of_the_other_direction_are_told(fold
 def test_a_sign_behind_the_camera_is_none_that_is_looked_for(folder: Path) -> None:
     geojson(folder / "two.geojson", feature(ahead(-3.0, -4.0)), feature(ahead(80.0, -4.0)))
     sightings = watch("two.geojson").sightings(0.0)
-    assert sightings is not None
     assert [sign.sign_id for sign in sightings] == ["1"]
 
 
@@ -195,7 +192,6 @@ def test_what_the_map_does_not_tell_is_assumed_and_said(folder: Path) -> None:
     assert "1 sign with no height_m: 2.2 m above the road are assumed" in signs.remarks[0]
     assert "unknown kinds, searched as signs of any kind: parking" in signs.remarks[3]
     sightings = watch("bare.geojson").sightings(0.0)
-    assert sightings is not None
     assert abs(sightings[0].facing) < 1e-6
 
 

@@ -57,15 +57,11 @@ def rows(file: Path) -> list[tuple[object, ...]]:
     return [tuple(row.values()) for row in table.to_pylist()]
 
 
-def warned(index: int, warning: DriverWarning | None) -> TrafficStep:
-    return step(index, command=Command(warning=warning))
-
-
 def test_warnings_begin_and_end(tmp_path: Path) -> None:
     recorder = EventRecorder(tmp_path / "events.parquet")
     given = (DriverWarning.CANNOT_SEE, DriverWarning.CANNOT_SEE, DriverWarning.FOG_AHEAD, None)
     for number, warning in enumerate(given):
-        recorder.record(warned(2 + number, warning))
+        recorder.record(step(2 + number, command=Command(warning=warning)))
     recorder.close(complete=True)
     assert [row[2:4] for row in rows(tmp_path / "events.parquet")] == [
         ("warning_begins", "cannot_see"),

@@ -11,7 +11,7 @@ from fogsim.recorders import FramePanel
 from fogsim.recorders.panel.camera_picture import draw_camera_picture, scale_image
 from fogsim.recorders.panel.strip_chart import TITLE, Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, GROUND, TRUTH
-from fogsim.values import Collision, Command, DenserFog, DriverWarning, Ending, FogProfile, Frame, Lamp, Leader, Step
+from fogsim.values import Collision, Command, DenserFog, DriverWarning, Ending, FogProfile, Lamp, Leader, Step
 from tests.recorders.synthetic import estimate, make_step
 
 
@@ -38,7 +38,6 @@ def test_images_of_more_bits_are_shown_in_eight() -> None:
     image = np.arange(120 * 160 * 3, dtype=np.uint8).reshape(120, 160, 3)
     step = make_step(image=image.astype(np.uint16) * 16 + 7)
     frame = step.observation.frame
-    assert isinstance(frame, Frame)
     deep = dataclasses.replace(frame, camera=dataclasses.replace(frame.camera, bits=12))
     shown = draw(dataclasses.replace(step, observation=dataclasses.replace(step.observation, frame=deep)))
     np.testing.assert_array_equal(shown[2:480:4, 2:640:4], image)

@@ -13,9 +13,7 @@ OTHER = Sign("xodr.9", "xodr.276", 0.0, (40.0, 6.0, 2.0), math.pi, 0.6)
 
 
 def written(path: Path) -> dict[str, Any]:
-    content = json.loads(path.read_text(encoding="utf-8"))
-    assert isinstance(content, dict)
-    return content
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def test_points_with_what_the_signs_say(tmp_path: Path) -> None:

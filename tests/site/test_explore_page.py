@@ -20,7 +20,6 @@ def url() -> Iterator[str]:
     settings = (EARLY, "duration_s=6", "renderer=cpu", "camera.width=160", "camera.height=120")
     command += [f"--set={one}" for one in settings]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         yield process.stdout.readline().split()[1]
         process.terminate()
 

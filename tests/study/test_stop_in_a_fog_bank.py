@@ -16,7 +16,5 @@ def test_a_vehicle_stops_in_the_densest_fog_while_the_cohort_comes() -> None:
         if len(standing):
             break
     assert step.traffic.ids[standing[0]] == "same_way.0.15"
-    assert step.truth.vehicle_extinctions is not None
     assert step.truth.vehicle_extinctions[standing[0]] == pytest.approx(OPTICAL_DEPTH_AT_VISIBILITY / 60.0)
-    assert step.cohort is not None
     assert len(step.cohort.vehicles & {*step.traffic.ids}) > len(step.cohort.vehicles) / 2

@@ -98,9 +98,7 @@ def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(t
     assert run(READ, tmp_path) == ["0", "1", "0", "0", "1", "0", "0", "True"]
 
 
-def test_the_other_process_ends_where_no_scenario_comes_or_nothing_is_to_compile_and_with_an_interrupted_run(
-    tmp_path: Path,
-) -> None:
+def test_the_other_process_ends_where_nothing_is_to_compile_and_with_an_interrupted_run(tmp_path: Path) -> None:
     """Where no process can be started, a run compiles alone."""
     said = run(UNTOLD + NO_METHODS + FAIL + NO_ROOM, tmp_path)
     assert said == ["1", "True", "2", "True", "3", "True", "alone"]

@@ -56,9 +56,7 @@ def test_an_image_is_restored_by_the_visibility_that_it_shows_itself(folder: Pat
     assert contrast(out[:, 320:]) > 1.3 * contrast(seen)
 
 
-def test_several_images_go_into_a_folder_and_are_replaced_only_when_it_is_asked_for(
-    folder: Path, command: Command
-) -> None:
+def test_several_images_go_into_a_folder_and_are_replaced_if_asked(folder: Path, command: Command) -> None:
     cv2.imwrite(str(folder / "other.png"), cv2.imread(str(folder / "fog.png"))[:, ::-1])
     line = ("restore", "fog.png", "other.png", *WITH_CAMERA, "--method", "tarel2009", "--out", "clear")
     assert command(*line, cwd=folder).returncode == 0

@@ -38,9 +38,7 @@ def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
         ("-m fogsim --version >/dev/full", 2, FULL),
     ],
 )
-def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
-    tmp_path: Path, command: str, code: int, told: str
-) -> None:
+def test_a_closed_or_full_stream_ends_in_no_traceback(tmp_path: Path, command: str, code: int, told: str) -> None:
     Image.new("RGB", (80, 60)).save(tmp_path / "photo.png")
     (tmp_path / "camera.yaml").write_text(camera_yaml((80, 60), 70), encoding="utf-8")
     ended, _, said = run_in_shell(command, tmp_path)

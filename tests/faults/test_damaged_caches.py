@@ -137,9 +137,7 @@ CACHES: Mapping[str, Callable[[Path, pytest.MonkeyPatch], Used]] = {
         *itertools.product([name for name in CACHES if name != "map of a network"], ("one bit", "a pipe")),
     ],
 )
-def test_what_is_damaged_is_made_again_once(
-    cache: str, damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_damaged_is_made_once(cache: str, damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     used = CACHES[cache](tmp_path / "cache", monkeypatch)
@@ -200,9 +198,7 @@ def test_a_kernel_that_cannot_be_kept_is_compiled(tmp_path: Path, monkeypatch: p
     assert used.use() == (42.0, 2)
 
 
-def test_code_of_an_earlier_source_is_never_taken_for_that_of_this_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_code_of_an_earlier_source_is_never_taken_for_this_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     used = _kernel(tmp_path, "*")
     assert used.use() == (42.0, 1)

@@ -80,7 +80,7 @@ def test_what_was_read_of_a_damaged_video_is_written(command: Command, videos: P
 
 
 @pytest.mark.parametrize("name", ["playlist.mp4", "concat.mp4", "sdp.mp4", "empty.mp4"])
-def test_a_file_that_names_other_files_or_addresses_is_no_video(
+def test_a_file_that_names_others_or_addresses_is_no_video(
     videos: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(videos)
@@ -103,7 +103,7 @@ PIPES = [
 
 
 @pytest.mark.timeout(60)
-def test_a_pipe_is_refused_and_not_waited_for(
+def test_pipes_are_refused_and_not_waited_for(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -51,7 +51,7 @@ def encoders(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 @pytest.mark.parametrize(
     ("index", "why"), [(5, "the video encoder has ended"), (STEPS - 1, "the video could not be written")]
 )
-def test_an_encoder_that_dies_ends_the_run_and_costs_only_the_video(
+def test_an_encoder_that_dies_ends_the_run_and_its_video(
     tmp_path: Path, encoders: list[int], index: int, why: str
 ) -> None:
     def kill(step: Step) -> None:
@@ -67,7 +67,7 @@ def test_an_encoder_that_dies_ends_the_run_and_costs_only_the_video(
     assert len(parquet.read_table(tmp_path / "steps.parquet")) >= index + 1
 
 
-def test_an_encoder_that_was_stopped_is_not_waited_for_for_ever(
+def test_a_stopped_encoder_is_killed_in_time(
     tmp_path: Path, encoders: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(video, "CLOSING_LIMIT", 0.1)
@@ -83,7 +83,7 @@ def test_an_encoder_that_was_stopped_is_not_waited_for_for_ever(
 
 
 @pytest.mark.parametrize("again", [False, True])
-def test_ctrl_c_while_a_whole_run_is_closed_makes_it_partial_and_tears_nothing(
+def test_ctrl_c_while_a_run_is_closed_makes_it_partial(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, again: bool
 ) -> None:
     close = ReportRecorder.close
@@ -107,9 +107,7 @@ def test_ctrl_c_while_a_whole_run_is_closed_makes_it_partial_and_tears_nothing(
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_recorder_without_a_method_is_named_before_the_run_begins(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_recorder_without_a_method_is_named_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(RECORDERS._entries, "mine", lambda _: object())
     with pytest.raises(InputError, match=r"^recorder 'mine': its factory must return .* record\(\) and close\(\)"):
         record(tmp_path / "out", recorders=("table", "mine"))

@@ -34,9 +34,7 @@ def manifest(folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("room", [800_000, 1_000_000, 1_600_000])
-def test_no_row_is_lost_and_table_and_manifest_are_closed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
-) -> None:
+def test_no_row_is_lost_and_the_files_are_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
     out = tmp_path / "out"
     SmallDisk(out, room, monkeypatch)
     taken = []
@@ -53,9 +51,7 @@ def test_no_row_is_lost_and_table_and_manifest_are_closed(
     assert sorted(path.name for path in out.iterdir()) == ["manifest.json", "metrics.json", "steps.parquet"]
 
 
-def test_a_disk_that_is_full_before_the_first_step_costs_no_earlier_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full_at_first_costs_no_earlier_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "manifest.json").write_text("earlier", encoding="utf-8")
     (tmp_path / "unfinished").mkdir()
     (tmp_path / "unfinished" / "steps.arrows").write_bytes(bytes(1000))

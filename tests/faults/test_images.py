@@ -67,9 +67,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("as_json", [True, False])
-def test_a_folder_goes_on_past_broken_images_and_lists_them_at_the_end(
-    command: Command, folder: Path, as_json: bool
-) -> None:
+def test_broken_images_in_a_folder_are_listed_at_the_end(command: Command, folder: Path, as_json: bool) -> None:
     (folder / "drive").mkdir()
     for name, data in BROKEN.items():
         (folder / "drive" / name).write_bytes(data)

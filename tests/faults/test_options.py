@@ -53,9 +53,7 @@ def refusal(command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("kind", ["nan", "-inf", "1e40", "x", "", "empty path", "empty argument"])
-def test_a_bad_value_is_refused_with_the_name_of_its_option_and_what_is_allowed(
-    refusal: Callable[..., str], kind: str
-) -> None:
+def test_a_bad_value_is_refused_with_its_option_and_what_is_allowed(refusal: Callable[..., str], kind: str) -> None:
     others = {"empty path": PATHS, "empty argument": ARGUMENTS}
     tried = others.get(kind) or [one for one in NUMBERS if one[2] == kind]
     for command, name, value in tried:

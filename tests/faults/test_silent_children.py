@@ -57,9 +57,7 @@ def test_a_child_that_is_killed_is_told(hosted: HostedLoop) -> None:
         hosted.advance(Command())
 
 
-def test_a_child_imports_nothing_from_the_working_directory_and_no_forked_process_keeps_it_alive(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_neither_the_working_directory_nor_forks_touch_a_child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "contextlib.py").write_text("raise ImportError('of the working directory')")
     monkeypatch.chdir(tmp_path)
     loop = HostedLoop(scenario_from_config(TOWN, "veh0", ["fog.visibility_m=inf", "renderer=none", "estimators=[]"]))

@@ -189,9 +189,7 @@ def test_methods_may_catch_their_own_errors_and_be_named_tuples(folder: Path) ->
         ADVISERS.find("mine:ExitsInAdvise", folder)().advise(None, 30.0, 0.0, None)
 
 
-def test_a_method_that_changes_the_working_directory_changes_it_for_nobody_else(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_method_changes_the_working_directory_for_itself_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And one that removes it fails not for that."""
     text = "import os\nos.chdir('/')\nclass Method:\n    def advise(self, *_):\n        os.chdir('/')\n"
     (folder / "wandering.py").write_text(text)

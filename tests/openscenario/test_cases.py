@@ -135,9 +135,7 @@ def test_the_sun_is_in_lux(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("intensity", "lux"), [(1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))])
-def test_an_intensity_of_at_most_1_by_day_is_a_share_of_the_sky_and_told(
-    tmp_path: Path, intensity: float, lux: float
-) -> None:
+def test_an_intensity_up_to_1_by_day_is_a_share_of_the_sky(tmp_path: Path, intensity: float, lux: float) -> None:
     file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85"', f'intensity="{intensity}"'))
     with pytest.warns(
         LeftOutWarning, match=r"46: /OpenSCENARIO/\S+/Sun: intensity: \S+ lx would be night .* read as the share"

@@ -65,9 +65,7 @@ def test_an_oncoming_vehicle_ends_the_run(tmp_path: Path, s: float, stop: str, t
 @pytest.mark.parametrize(
     ("y", "tolerance", "time"), [(-1.75, 0.2, 2.3), (-3.4, 0.2, 5.0), (-4.6, 2.0, 5.0), (-4.6, 3.0, 2.2)]
 )
-def test_a_position_is_reached_between_two_steps_but_not_beside_it(
-    tmp_path: Path, y: float, tolerance: float, time: float
-) -> None:
+def test_a_position_is_reached_between_two_steps(tmp_path: Path, y: float, tolerance: float, time: float) -> None:
     reach = _reaches(world(120, y), tolerance) + after(5.0)
     steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(40)}"}, stop=reach))
     assert steps[-1].time == pytest.approx(time, abs=0.11)

@@ -252,9 +252,7 @@ def test_what_cannot_be_followed_is_refused(tmp_path: Path) -> None:
             read_openscenario(file)
 
 
-def test_what_waits_for_a_trajectory_without_times_is_refused_and_for_what_does_not_end_never_comes(
-    tmp_path: Path,
-) -> None:
+def test_what_waits_for_an_unknown_end_is_refused_and_for_none_never_comes(tmp_path: Path) -> None:
     here = '<Position><RelativeObjectPosition entityRef="Ego" dx="{}" dy="0"/></Position>'
     line = _follows((None, here.format(0)), (None, here.format(30)), reference="<None/>")
     events = event("line", line, after(1.0)) + event("next", speed(5), over("line"))
@@ -304,9 +302,7 @@ IN_TWO_SECONDS = changes_lane(-1, "time", 2.0).replace('<AbsoluteTargetLane valu
         (TURNED, changes_lane(-1, "rate", 2.0), 1.5 * 3.5 / 2.0),
     ],
 )
-def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
-    tmp_path: Path, place: str, action: str, lasts: float
-) -> None:
+def test_who_overtakes_from_the_beginning_cuts_in(tmp_path: Path, place: str, action: str, lasts: float) -> None:
     events = event("in", action, after(4.0)) + event("slow", speed(12), over("in"))
     begin = {"Ego": f"{lane(40)}\n{speed(8)}", "Fast": f"{place}\n{speed(16)}"}
     file = write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}, stop=after(10.0))

@@ -110,9 +110,7 @@ def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("priority", "speed_after"), [("override", 16.0), ("parallel", 10.0)])
-def test_an_event_that_overrides_ends_a_change_of_speed_of_its_maneuver(
-    tmp_path: Path, priority: str, speed_after: float
-) -> None:
+def test_an_event_that_overrides_ends_a_change_of_speed(tmp_path: Path, priority: str, speed_after: float) -> None:
     brakes = event("brake", speed(2, linear(2, "rate")), after(1.0))
     leaves = event("leave", changes_lane(1, "time", 2.0), after(3.0)).replace("override", priority)
     steps = run(_two_cars(tmp_path, leaves + brakes, after(6.1)))

@@ -41,9 +41,7 @@ def test_a_name_is_drawn_as_it_is() -> None:
     assert "agent $^$" in svg_of(figure, "a")
 
 
-def test_a_failure_has_a_plot_and_a_video_around_it(
-    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failure_has_a_plot_and_a_video(scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     steps: list[Step] = []
 
     def pretend(_: Scenario, seed: int) -> Iterator[Step]:
@@ -71,19 +69,17 @@ def test_a_failure_has_a_plot_and_a_video_around_it(
     assert (tmp_path / "a" / "safe.always.svg").is_file()
 
 
-def test_what_goes_wrong_is_told_and_does_no_harm(
-    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_goes_wrong_does_no_harm(scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(_: Scenario, __: int) -> Iterator[Step]:
         raise RuntimeError("no more")
 
     monkeypatch.setattr(artefacts, "run", broken)
     work = KeepFailures({"a": (finding_from_json(finding("failed")),)})
-    assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:78)"
+    assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:74)"
     assert json.loads((tmp_path / "a.json").read_text())["status"] == "failed"
 
 
-def test_a_video_is_closed_when_its_run_fails(
+def test_a_video_is_closed_if_its_run_fails(
     scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def breaks(_: Scenario, __: int) -> Iterator[Step]:

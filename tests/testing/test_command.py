@@ -90,9 +90,7 @@ class Broken:
 """
 
 
-def test_a_run_that_goes_wrong_is_told_with_its_place(
-    file: Path, command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_fails_is_told_with_its_place(file: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
     (file.parent / "mine.py").write_text(BROKEN)
     # The case that does not stand in the file is named like those that do.
@@ -122,9 +120,7 @@ def test_it(fogsim_run):
 """
 
 
-def test_pytest_collects_files_and_has_a_fixture(
-    file: Path, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pytest_collects_files_and_runs(file: Path, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     # What is imported within is forgotten afterwards, so that SUMO must have been there before.
     check_one_case(file, ["duration_s=0.3"])
     (file.parent / "bad.fog.yaml").write_text(SCENARIO.replace("never", "nevr"))

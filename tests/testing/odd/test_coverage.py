@@ -145,9 +145,7 @@ def test_results_without_this_coverage_do_not_count(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "coverage.json").exists()
 
 
-def test_without_the_extra_only_a_campaign_with_an_odd_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_extra_a_campaign_with_an_odd_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "openodd", None)
     (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
     load_campaign(tmp_path / "drawn.fog.yaml", budget=16)

@@ -40,9 +40,7 @@ def emptied(step: TrafficStep) -> TrafficStep:
 ROAD = np.array([[25.0, 30.0, 0.0, 5.0], [75.0, 28.0, 0.05, 4.0], [175.0, 20.0, 0.04, 4.0]])
 
 
-def recorded(
-    folder: Path, steps: list[TrafficStep], complete: bool = True, road: NDArray[np.float64] = ROAD[:0]
-) -> Page:
+def recorded(folder: Path, steps: list[TrafficStep], road: NDArray[np.float64] = ROAD[:0]) -> Page:
     metrics = TrafficRunMetrics()
     with RunDirectory(folder) as directory:
         directory.begin({})
@@ -57,7 +55,7 @@ def recorded(
             for recorder in recorders:
                 recorder.record(step, metrics.derive(step))
         for recorder in recorders:
-            recorder.close(complete)
+            recorder.close(complete=True)
         directory.finish({})
     return Page((folder / "report.html").read_text(encoding="utf-8"))
 
@@ -89,12 +87,6 @@ def test_a_network_without_vehicles_has_rows_and_figures_too(tmp_path: Path) -> 
     row = parquet.read_table(tmp_path / "steps.parquet").to_pylist()[0]
     assert (row["n_vehicles"], row["mean_speed_mps"], row["least_visibility_m"]) == (0, None, None)
     assert len(page.images) == 3
-
-
-def test_an_interrupted_report_says_so_and_that_there_were_steps(tmp_path: Path) -> None:
-    page = recorded(tmp_path, some_steps(), complete=False)
-    assert "PARTIAL: interrupted at t = 1.0 s" in page.text
-    assert "Figures are of whole runs" in page.text
 
 
 def test_curves_are_percentiles_of_speed_and_the_lowest_advice() -> None:

@@ -126,6 +126,7 @@ def test_values_of_wrong_types(tmp_path: Path) -> None:
             for at in places(data):
                 if at in FREE or (at[2:3] == ("properties",) and wrong in {"null", "text"}):
                     continue
+                file.unlink(missing_ok=True)  # as in tests/scenario/test_fuzz.py
                 file.write_text(json.dumps(put(data, at, value)), encoding="utf-8")
                 refused(read, file)
 

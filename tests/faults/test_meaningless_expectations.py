@@ -47,6 +47,7 @@ NEVER_TRUE = [
 def refused(tmp_path: Path, written: str, *settings: str) -> str:
     """The one line with which a file is refused."""
     file = tmp_path / "pointless.fog.yaml"
+    file.unlink(missing_ok=True)  # as in tests/scenario/test_fuzz.py
     file.write_text(f"{PLAIN}{written}\n", encoding="utf-8")
     with pytest.raises(InputError) as error:
         load_scenario(file, settings)

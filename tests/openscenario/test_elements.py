@@ -85,6 +85,7 @@ def _written(root: Node) -> str:
 
 def _read(folder: Path, name: str, root: Node) -> object:
     """What a changed file is read as: the data of its scenario, or its cases; None if it is refused."""
+    (folder / name).unlink()  # as in tests/scenario/test_fuzz.py
     (folder / name).write_text(_written(root), encoding="utf-8")
     try:
         return read_parameter_cases(folder / name) or read_openscenario(folder / USES.get(name, name)).data

@@ -191,6 +191,7 @@ def _one_tree_of_a_kind() -> Iterator[None]:
 def loaded(folder: Path, text: str) -> Scenario | None:
     """The scenario; None if it is refused, as it must be: in lines that say where."""
     file = folder / "scenario.yaml"
+    file.unlink(missing_ok=True)  # file systems such as ext4 wait for the disk when a file is emptied
     file.write_text(text, encoding="utf-8")
     try:
         return load_scenario(file)

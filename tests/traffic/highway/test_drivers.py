@@ -98,13 +98,6 @@ def advised(road: Road, speed: float = 15.0) -> Command:
     return Command(advised_speeds=dict.fromkeys(road.ids, speed))
 
 
-@pytest.mark.parametrize("nobody", [{"rate": 0.0}, {"reached_share": 0.0}])
-def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, float]) -> None:
-    road = Road(exact(**nobody))
-    assert road.drive(4.0, advised(road)).targets() == [FAST] * len(road.others)
-    assert heard(seen(road.traffic).state) == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
-
-
 def test_advice_that_all_follow_sets_every_target_speed_after_the_delay() -> None:
     road = Road(exact(rate=1.0, strength=1.0, delay=4.0))
     command = advised(road)
@@ -116,12 +109,15 @@ def test_advice_that_all_follow_sets_every_target_speed_after_the_delay() -> Non
 
 
 def test_those_whom_it_reaches_and_who_follow_are_the_share_that_is_asked_for() -> None:
-    setup = exact(reached_share=0.5, rate=0.8)
+    setup = exact(reached_share=0.5, rate=0.5)
     road = Road(setup)
-    followers = [driver_traits(setup, name, 3).follows(setup.compliance) for name in road.ids]
-    assert 0 < sum(followers) < len(followers)
+    traits = [driver_traits(setup, name, 3) for name in road.ids]
+    followers = [driver.follows(setup.compliance) for driver in traits]
+    reached = [name for name, driver in zip(road.ids, traits, strict=True) if driver.hears(setup.compliance)]
+    assert 0 < sum(followers) < len(reached) < len(traits)
     targets = road.drive(12.0, advised(road)).targets()
     assert targets == pytest.approx([15.0 if follows else FAST for follows in followers])
+    assert heard(seen(road.traffic).state) == dict.fromkeys(reached, 15.0)
 
 
 def test_advice_to_all_on_a_stretch_is_heard_there() -> None:

@@ -188,7 +188,7 @@ def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(s
         others = [v for v in state.ids if v != "ego"]
         speeds = state.speed[[state.row(v) for v in others]]
         assert np.median(speeds) == pytest.approx(within_sight(60.0), abs=1.0)
-        for _ in range(200):
+        for _ in range(600):  # and the table of drivers grows
             crowd.advance(Command(advised_speeds=dict.fromkeys(others, 7.0)))
         after = seen(crowd).state
     rows = [row for v in others if (row := after.row(v)) is not None]

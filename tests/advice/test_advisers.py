@@ -28,11 +28,11 @@ def fog(visibility: float) -> Belief:
 
 def speeds(name: str, visibilities: list[float], period: float = 1.0, **parameters: Any) -> list[float]:
     """Advised speeds [km/h], decision by decision."""
-    adviser, advice, told = ADVISERS[name](**parameters), SpeedAdvice(), []
+    adviser, advice, speeds_shown = ADVISERS[name](**parameters), SpeedAdvice(), []
     for number, visibility in enumerate(visibilities):
         advice = adviser.advise(fog(visibility), LIMIT, number * period, advice)
-        told.append(advice.speed * 3.6)
-    return told
+        speeds_shown.append(advice.speed * 3.6)
+    return speeds_shown
 
 
 def test_published_steps() -> None:
@@ -151,8 +151,8 @@ def test_a_higher_speed_asks_for_more_visibility_where_there_is_hysteresis() -> 
 
 def test_smoothing_follows_an_exponential_in_the_logarithm_of_the_visibility() -> None:
     plain = ADVISERS["stopping_sight_distance"](rounding=0.01, hold=0.0)
-    told = speeds("stopping_sight_distance", [100.0, 25.0, 25.0], 10.0, smoothing=10.0, rounding=0.01, hold=0.0)
-    for number, speed in enumerate(told):
+    speeds_shown = speeds("stopping_sight_distance", [100.0, 25.0, 25.0], 10.0, smoothing=10.0, rounding=0.01, hold=0.0)
+    for number, speed in enumerate(speeds_shown):
         visibility = math.exp(math.log(25.0) + math.log(4.0) * math.exp(-number))
         assert plain.advise(fog(visibility), LIMIT, 0.0, SpeedAdvice()).speed * 3.6 == pytest.approx(speed, abs=0.04)
 

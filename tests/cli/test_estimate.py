@@ -63,14 +63,14 @@ def test_json_is_all_there_is_on_stdout_and_the_same_each_time(estimate, folder:
     assert [record["frame"] for record in records] == ["drive/0.png", "drive/1.png", "drive/2.png"]
     for record in records:
         assert set(record) == KEYS | ({"denser_fog_m", "reach_m", "optical_depths"} if record["valid"] else set())
-    told = [record for record in records if record["valid"] is True]
-    assert told
-    for record in told:
+    valid = [record for record in records if record["valid"] is True]
+    assert valid
+    for record in valid:
         assert record["visibility_m"] == pytest.approx(80.0, rel=0.1)
         assert record["visibility_low_m"] < record["visibility_m"] < record["visibility_high_m"]
         assert record["category"] == "dense"
     # The road's lines, which noise moves in each frame, have a say of a fraction of a pixel in where the horizon is.
-    horizon_row = np.median([record["horizon_row"] for record in told])
+    horizon_row = np.median([record["horizon_row"] for record in valid])
     assert horizon_row == pytest.approx(stated_horizon(2.0), abs=0.25)
 
 
@@ -163,7 +163,7 @@ def test_mistakes_end_with_exit_code_2(estimate, folder: Path) -> None:
     (folder / "aside.yaml").write_text(CAMERA_YAML + "yaw_deg: 55\n", encoding="utf-8")
     before = {path.name for path in folder.iterdir()}
     guess = ("drive", "--camera", "new.yaml", "--guess-camera", "--mount-height", "1.4")
-    for arguments, told in [
+    for arguments, message in [
         (("none.png", "--camera", "camera.yaml"), "none.png: there is no such file"),
         (("drive", "--camera", "none.yaml"), "none.yaml: cannot be read"),
         (("drive", "--camera", "typo.yaml"), "typo.yaml:1: widht: unknown key; did you mean 'width'"),
@@ -180,7 +180,7 @@ def test_mistakes_end_with_exit_code_2(estimate, folder: Path) -> None:
     ]:
         code, _, err = estimate(*arguments)
         assert code == 2
-        assert told in err
+        assert message in err
         assert {path.name for path in folder.iterdir()} == before
 
 
@@ -227,7 +227,7 @@ def test_signs_of_an_own_map_are_looked_for_and_what_became_of_them_is_told(esti
     code, out, err = estimate(*drive, "--json", "--signs", "map.geojson", "--track", "track.csv")
     signs = [record["signs"] for line in out.splitlines() if "signs" in (record := json.loads(line))]
     assert [one[0]["detected"] for one in signs] == [False] * 3
-    for option, told in (("--signs", "--signs needs --track"), ("--track", "--track goes with --signs")):
+    for option, message in (("--signs", "--signs needs --track"), ("--track", "--track goes with --signs")):
         code, _, err = estimate(*drive, option, "track.csv")
         assert code == 2
-        assert told in err
+        assert message in err

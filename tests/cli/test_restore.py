@@ -120,7 +120,7 @@ def test_a_video_in_which_no_fog_is_found_leaves_nothing(folder: Path, foggy: np
 
 
 def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, command: Command) -> None:
-    for arguments, told in [
+    for arguments, message in [
         (("nofog.png", *FOG), "nofog.png: there is no such file"),
         (("fog.png", *FOG, "--method", "plannar"), "did you mean 'planar'"),
         (("fog.png", *WITH_CAMERA, "--visibility", "0"), "--visibility: expected a number from"),
@@ -130,7 +130,7 @@ def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, command: Command
     ]:
         done = command("restore", *arguments, "--out", "out.png", cwd=folder)
         assert done.returncode == 2
-        assert told in done.stderr
+        assert message in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1
         assert not (folder / "out.png").exists()
 

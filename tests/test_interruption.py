@@ -13,8 +13,7 @@ from early_motorway import EARLY
 
 import fogsim
 from fogsim.core import interruption
-from fogsim.core.interruption import SIGNALS, Interruption, ProgramSignals, interruptible
-from tests.helpers.command import Command
+from fogsim.core.interruption import Interruption, ProgramSignals, interruptible
 
 
 def raise_as_numba_does() -> None:
@@ -148,12 +147,3 @@ def test_a_handler_of_the_user_is_theirs_and_called_at_the_end() -> None:
         assert called == ["written", "theirs"]
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def test_commands_in_this_process_leave_it_its_handlers(command: Command) -> None:
-    def handlers() -> list[object]:
-        return [*map(signal.getsignal, (*SIGNALS, signal.SIGALRM)), sys.unraisablehook]
-
-    before = handlers()
-    assert command("list").returncode == 0
-    assert handlers() == before

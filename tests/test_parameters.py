@@ -114,12 +114,6 @@ def test_a_checked_class_keeps_its_signature() -> None:
         Own("a" * 500)
 
 
-@pytest.mark.parametrize("method", ["negru2013", "joint_road", "lead_contrast"])
-def test_whole_numbers_of_numpy_are_whole_numbers(method: str) -> None:
-    for name in accepted_parameters(ESTIMATORS[method], {"camera"}).keys() & {"frames", "inflection_frames"}:
-        ESTIMATORS[method](CAMERA, **{name: np.int64(7)})
-
-
 def test_numbers_of_numpy_are_numbers_without_a_warning() -> None:
     for kind in [np.float16, np.float32, np.float64, np.int8, np.uint64]:
         assert mismatch(float, kind(3)) is None

@@ -18,9 +18,10 @@ from fogsim.simulation.plugin import AttachedSession
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, EgoControl, Lamp, SpeedAdvice, Step
-from tests.helpers.attached import ARGUMENTS, GRID, traci_in_town
+from tests.helpers.attached import ARGUMENTS, GRID, conduct, traci_in_town
 
 SMALL = ("camera.width=96", "camera.height=72")
+BLIND = ("renderer=none", "estimators=[]")
 EGO = "veh18"  # departs at 36 s and drives through the whole town
 
 
@@ -80,7 +81,7 @@ def test_traci_shows_the_same_as_libsumo(libsumo: Any, connection: Any) -> None:
 
 
 def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) -> None:
-    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=SMALL, drivers=False)
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=BLIND, drivers=False)
     speeds = []
     for step in observed(libsumo, session, 88):
         speeds.append(float(step.traffic.speed[step.ego]))
@@ -96,28 +97,18 @@ def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) ->
         session.observe()
 
 
-def test_clocks_of_a_scenario_give_way_to_the_simulations_step(libsumo: Any) -> None:
+def test_a_scenario_gives_its_fog_and_its_clocks_give_way_to_the_simulations_step(libsumo: Any) -> None:
     """The motorway's five frames of 0.1 s between two decisions would be 2.5 s here."""
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=30"])
-    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, drivers=False)
-    limits = [session.advise(step).advice for step in observed(libsumo, session, 76)]
+    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, net=GRID / "grid.net.xml", drivers=False)
+    limits = []
+    for step in observed(libsumo, session, 76):
+        limits.append(session.advise(step).advice)
     session.close()
+    assert step.truth.visibility == pytest.approx(30.0)
     # Advice decides about its rise at each step, if it decides at each.
     assert len(limits) > 3
     assert all(step is not other for step, other in itertools.pairwise(limits))
-
-
-def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:
-    """What FogSim may change about a vehicle."""
-    get = api.vehicle
-    return (
-        get.getMaxSpeed(vehicle),
-        get.getSpeedFactor(vehicle),
-        get.getTau(vehicle),
-        get.getSpeedMode(vehicle),
-        get.getLaneChangeMode(vehicle),
-        float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain")),
-    )
 
 
 def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,7 +123,7 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
         tell(vehicle, key, value)
 
     monkeypatch.setattr(libsumo.vehicle, "setParameter", told)
-    settings = (*SMALL, "drivers.speed_choice=within_sight", "drivers.following=careful")
+    settings = (*BLIND, "drivers.speed_choice=within_sight", "drivers.following=careful")
     session = fogsim.attach(libsumo, ego=EGO, visibility=20.0, settings=settings)
     before: dict[str, tuple[Any, ...]] = {}
     changed: set[int] = set()
@@ -156,7 +147,7 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
 
 
 def test_an_ego_driven_by_hand_is_given_back_at_the_end(libsumo: Any) -> None:
-    session = fogsim.attach(libsumo, ego=EGO, visibility=math.inf, settings=SMALL)
+    session = fogsim.attach(libsumo, ego=EGO, visibility=math.inf, settings=BLIND)
     before = None
     for _ in range(80):
         libsumo.simulationStep()
@@ -175,7 +166,7 @@ def test_an_ego_driven_by_hand_is_given_back_at_the_end(libsumo: Any) -> None:
 def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
     def positions(look: bool) -> list[Any]:
         libsumo.load(ARGUMENTS)
-        session = fogsim.attach(libsumo, ego=EGO, visibility=40.0, settings=SMALL)
+        session = fogsim.attach(libsumo, ego=EGO, visibility=40.0, settings=BLIND)
         found = []
         for _ in range(110):
             libsumo.simulationStep()
@@ -190,7 +181,7 @@ def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
 
 def test_the_users_own_subscriptions_keep_their_results(connection: Any) -> None:
     speed, vehicles = traci.constants.VAR_SPEED, traci.constants.CMD_GET_VEHICLE_VARIABLE
-    with fogsim.attach(connection, ego="veh3", visibility=math.inf, settings=SMALL, drivers=False) as session:
+    with fogsim.attach(connection, ego="veh3", visibility=math.inf, settings=BLIND, drivers=False) as session:
         while session.observe() is None:
             connection.simulationStep()
         connection.vehicle.subscribeContext("veh3", vehicles, 1.0, [speed])
@@ -199,14 +190,6 @@ def test_the_users_own_subscriptions_keep_their_results(connection: Any) -> None
             assert session.observe() is not None
             results = connection.vehicle.getContextSubscriptionResults("veh3")
             assert results == {"veh3": {speed: connection.vehicle.getSpeed("veh3")}}
-
-
-def test_a_scenario_gives_fog_and_camera(libsumo: Any) -> None:
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=50"])
-    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, net=GRID / "grid.net.xml")
-    step = next(observed(libsumo, session, 100))
-    session.close()
-    assert step.truth.visibility == pytest.approx(50.0)
 
 
 def test_what_attach_cannot_do_without(libsumo: Any) -> None:
@@ -226,7 +209,7 @@ def test_what_is_no_simulation() -> None:
 
 
 def test_a_simulation_that_is_lost(connection: Any) -> None:
-    session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=SMALL)
+    session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=BLIND)
     connection.simulationStep()
     assert session.observe() is not None
     connection.close()
@@ -248,7 +231,7 @@ def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -
 
 
 def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callable) -> None:
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, EARLY, "fog.visibility_m=80"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*BLIND, EARLY, "fog.visibility_m=80"])
     arguments = command_line(build.traffic_setup(scenario), 1)
     with sumo_process(arguments) as (port, process):
         steps = fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port))
@@ -262,7 +245,7 @@ def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callabl
 def test_lane_changing_is_given_back_to_who_was_kept_in_lane(libsumo: Any) -> None:
     """Who comes after the ego is kept in its lane until the session ends; who was there before is left alone."""
     later, get = "veh22", libsumo.vehicle
-    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=(*SMALL, f"traffic.keep_lane=[veh3, {later}]"))
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=(*BLIND, f"traffic.keep_lane=[veh3, {later}]"))
     while later not in get.getIDList():
         libsumo.simulationStep()
         present = get.getIDList()
@@ -276,7 +259,7 @@ def test_lane_changing_is_given_back_to_who_was_kept_in_lane(libsumo: Any) -> No
 
 def test_a_session_tells_at_its_end_what_was_not_played(libsumo: Any) -> None:
     late = f"traffic.events=[{{kind: brake, vehicle: {EGO}, at_time_s: 900}}]"
-    settings = (*SMALL, late, "traffic.keep_lane=[veh99]")
+    settings = (*BLIND, late, "traffic.keep_lane=[veh99]")
     libsumo.simulationStep(40.0)
 
     def attached(failing: bool = False) -> None:
@@ -293,7 +276,7 @@ def test_a_session_tells_at_its_end_what_was_not_played(libsumo: Any) -> None:
 
 def test_a_timeline_is_played_in_the_users_loop_and_all_is_given_back(libsumo: Any) -> None:
     do = f"{{{EGO}: {{speed: {{to: 18 km/h, rate: 2 m/s²}}, hazard_lights: on}}, fog: {{visibility: 60 m}}}}"
-    settings = (*SMALL, f"timeline=[{{name: slow, when: time >= 1 s, do: {do}}}, {{when: time > 99 s, do: {do}}}]")
+    settings = (*BLIND, f"timeline=[{{name: slow, when: time >= 1 s, do: {do}}}, {{when: time > 99 s, do: {do}}}]")
     libsumo.simulationStep(40.0)
     mode = libsumo.vehicle.getSpeedMode(EGO)
     begun = []

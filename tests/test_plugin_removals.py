@@ -1,5 +1,6 @@
 """Vehicles that the user's own loop takes away, in simulations to which FogSim is attached."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -8,7 +9,7 @@ import fogsim
 from fogsim.simulation.plugin import AttachedSession
 from fogsim.values import Step
 
-SMALL = ("camera.width=32", "camera.height=24")
+BLIND = ("renderer=none", "estimators=[]")
 EGO = "veh3"
 
 
@@ -25,7 +26,7 @@ def until_the_ego_drives(api: Any, session: AttachedSession) -> Step:
 
 @pytest.mark.parametrize("at", ["after the advice", "before the look", "before the advice"])
 def test_an_ego_that_is_removed_is_none_and_the_simulation_goes_on(api: Any, at: str) -> None:
-    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL) as session:
+    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=BLIND) as session:
         step = until_the_ego_drives(api, session)
         if at == "after the advice":
             api.vehicle.remove(EGO)
@@ -44,7 +45,7 @@ def test_an_ego_that_is_removed_is_none_and_the_simulation_goes_on(api: Any, at:
 
 
 def test_another_vehicle_that_is_removed_is_not_seen_any_more(api: Any) -> None:
-    with fogsim.attach(api, ego=EGO, visibility=30.0, settings=SMALL) as session:
+    with fogsim.attach(api, ego=EGO, visibility=30.0, settings=BLIND) as session:
         step = until_the_ego_drives(api, session)
         while len(step.traffic.ids) < 4:
             api.simulationStep()
@@ -59,44 +60,46 @@ def test_another_vehicle_that_is_removed_is_not_seen_any_more(api: Any) -> None:
             session.advise(step)
 
 
-@pytest.mark.parametrize("place", [("B0A0", 20.0), ("C0B0", 90.0)])
-def test_an_ego_that_is_moved_by_hand_is_where_it_was_put(api: Any, place: tuple[str, float]) -> None:
-    """SUMO counts the way driven anew from where it puts a vehicle, as if its route began there."""
+@pytest.fixture
+def own(api: Any) -> Iterator[AttachedSession]:
+    """Session of an ego "mine" that drives along a route of the user's."""
     api.route.add("mine", ["C0B0", "B0A0"])
     api.vehicle.add("mine", "mine")
-    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=BLIND) as session:
         until_the_ego_drives(api, session)
-        api.vehicle.moveTo("mine", f"{place[0]}_0", place[1])
-        api.simulationStep()
-        moved = session.observe()
+        yield session
+
+
+@pytest.mark.parametrize("place", [("B0A0", 20.0), ("C0B0", 90.0)])
+def test_an_ego_that_is_moved_by_hand_is_where_it_was_put(
+    api: Any, own: AttachedSession, place: tuple[str, float]
+) -> None:
+    """SUMO counts the way driven anew from where it puts a vehicle, as if its route began there."""
+    api.vehicle.moveTo("mine", f"{place[0]}_0", place[1])
+    api.simulationStep()
+    moved = own.observe()
     before = api.simulation.getDistanceRoad("C0B0", 0.0, place[0], 0.0, isDriving=True)
     assert moved.route_position == pytest.approx(before + api.vehicle.getLanePosition("mine"), abs=0.1)
 
 
-def test_a_vehicle_that_bears_the_id_of_another_has_its_own_body(api: Any) -> None:
+def test_a_vehicle_that_bears_the_id_of_another_has_its_own_body(api: Any, own: AttachedSession) -> None:
     api.vehicletype.copy("DEFAULT_VEHTYPE", "long")
     api.vehicletype.setLength("long", 12.0)
-    api.route.add("mine", ["C0B0", "B0A0"])
-    api.vehicle.add("mine", "mine")
-    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
-        step: Step | None = until_the_ego_drives(api, session)
-        assert step.traffic.length[step.ego] == 5.0
+    lengths = []
+    for _ in range(2):
+        api.simulationStep()
+        step = own.observe()
+        lengths.append(step.traffic.length[step.ego])
         api.vehicle.remove("mine")
         api.vehicle.add("mine", "mine", typeID="long")
+    assert lengths == [5.0, 12.0]
+
+
+def test_an_ego_that_is_put_back_begins_its_route_anew(api: Any, own: AttachedSession) -> None:
+    api.vehicle.remove("mine")
+    api.vehicle.add("mine", "mine", departPos="60")
+    after = None
+    while after is None:
         api.simulationStep()
-        step = session.observe()
-        assert step.traffic.length[step.ego] == 12.0
-
-
-def test_an_ego_that_is_put_back_begins_its_route_anew(api: Any) -> None:
-    api.route.add("mine", ["C0B0", "B0A0"])
-    api.vehicle.add("mine", "mine")
-    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
-        until_the_ego_drives(api, session)
-        api.vehicle.remove("mine")
-        api.vehicle.add("mine", "mine", departPos="60")
-        after = None
-        while after is None:
-            api.simulationStep()
-            after = session.observe()
+        after = own.observe()
     assert after.route_position == pytest.approx(60.0, abs=6.0)

@@ -17,7 +17,9 @@ CONFIG = RunConfig(TrafficSetup(None), WorldConfig(FogConfig(FogField(0.03, (100
 
 
 def test_a_scenario_and_the_values_that_it_becomes_are_the_same_run() -> None:
-    scenario = fogsim.load_scenario("motorway_fog_bank", [EARLY, "camera.width=64", "camera.height=48", "duration_s=1"])
+    scenario = fogsim.load_scenario(
+        "motorway_fog_bank", [EARLY, "camera.width=64", "camera.height=48", "duration_s=0.3"]
+    )
     config = scenario.run_config()
     assert config == scenario.run_config()
     assert config.run_config() is config

@@ -1,6 +1,7 @@
 """Traffic alone in fog: everybody is read, advice goes by meters, and what needs an ego is refused."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import FogSimError, InputError
-from fogsim.metrics import TrafficRunMetrics
+from fogsim.metrics import RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.build import check_frames
 from fogsim.scenario.loading import scenario_from_config
@@ -57,11 +58,15 @@ def test_everybody_hears_what_the_meters_let_the_adviser_say(steps: list[Traffic
     assert all(last.speed[last.ids.index(v)] < s - 5.0 for v, s in stayed.items())
 
 
-def test_metrics_are_those_of_everybody(steps: list[TrafficStep]) -> None:
+def summary_of(steps: Iterable[TrafficStep]) -> RunSummary:
     metrics = TrafficRunMetrics()
     for step in steps:
         metrics.update(step)
-    summary = metrics.summary()
+    return metrics.summary()
+
+
+def test_metrics_are_those_of_everybody(steps: list[TrafficStep]) -> None:
+    summary = summary_of(steps)
     assert summary.values.keys() == summary.meanings.keys()
     assert (summary.values["duration_s"], summary.values["steps"], summary.values["ending"]) == (4.0, 9, "time")
     count = sum(len(step.traffic.ids) for step in steps[1:])
@@ -177,10 +182,7 @@ def test_a_cohort_is_due_in_its_time_and_the_run_ends_when_it_has_left(tmp_path:
     assert cohorts[-1].vehicles == {"a", "b", "c"}
     assert max(cohort.waiting for cohort in cohorts if cohort is not None) == 2
     assert (steps[-1].ending, cohorts[-1].unfinished, "late" in steps[-1].traffic.ids) == (Ending.COHORT_LEFT, 0, True)
-    metrics = TrafficRunMetrics()
-    for step in steps:
-        metrics.update(step)
-    values = metrics.summary().values
+    values = summary_of(steps).values
     assert (values["traffic_cohort_vehicles"], values["traffic_cohort_unfinished"]) == (3, 0)
     arrival = {v: max(step.time for step in steps if v in step.traffic.ids) for v in "abc"}
     # They are due 1 s after the warm-up.
@@ -206,11 +208,8 @@ def test_a_run_is_judged_by_the_same_standard_under_every_advice(tmp_path: Path)
     config = demand(tmp_path, '<vehicle id="a" route="r" depart="0"/>')
     advice = "advice={method: stopping_sight_distance, parameters: {reaction_time: 1.5, deceleration: 4.5}}"
     scenario = scenario_from_config(config, "none", ["fog.visibility_m=50", "duration_s=3", advice])
-    usual = TrafficRunMetrics()
-    for step in fogsim.run_traffic(scenario, 1):
-        usual.update(step)
     key = "traffic_sight_margin_by_distance_m"
-    assert measure_run(scenario, 1)["metrics"][key] == usual.summary().flat()[key]
+    assert measure_run(scenario, 1)["metrics"][key] == summary_of(fogsim.run_traffic(scenario, 1)).flat()[key]
 
 
 def test_vehicles_of_a_cohort_that_have_not_left_in_time_are_unfinished(tmp_path: Path) -> None:

@@ -15,14 +15,14 @@ from fogsim.values import Ending, Reason
 
 GRID = Path(__file__).parent / "data" / "grid" / "grid.sumocfg"
 EGO = "veh18"
-SMALL = ("camera.width=160", "camera.height=120", "fog.visibility_m=120", "duration_s=1")
+BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=120", "duration_s=1")
 LATE = f"{{kind: brake, vehicle: {EGO}, at_time_s: 300}}"
 TOO_FAR = f"{{kind: change_lane, vehicle: {EGO}, lanes: 4, at_time_s: 0}}"
 
 
 def town(*settings: str) -> Scenario:
     # Without a look into the files, which would refuse some of these events at once.
-    return scenario_from_config(GRID, EGO, [*SMALL, *settings], others_add_vehicles=True)
+    return scenario_from_config(GRID, EGO, [*BLIND, *settings], others_add_vehicles=True)
 
 
 def test_a_run_that_is_cut_short_tells_what_it_did_not_reach_and_warns_of_nothing() -> None:
@@ -64,8 +64,8 @@ def test_a_recorded_run_is_whole_before_it_warns(tmp_path: Path) -> None:
 
 
 def test_the_command_tells_each_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    small = [part for setting in SMALL[:2] for part in ("--set", setting)]
-    arguments = ["run", "--sumocfg", str(GRID), "--ego", EGO, "--visibility", "120", "--out", str(tmp_path), *small]
+    blind = [part for setting in BLIND[:2] for part in ("--set", setting)]
+    arguments = ["run", "--sumocfg", str(GRID), "--ego", EGO, "--visibility", "120", "--out", str(tmp_path), *blind]
     # A road of two lanes: to one of the sides there is no lane.
     sides = [f"{{kind: change_lane, vehicle: {EGO}, lanes: {lanes}, at_time_s: 0}}" for lanes in (1, -1)]
     events = f"traffic.events=[{', '.join(sides)}, {LATE}]"

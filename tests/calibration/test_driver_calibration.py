@@ -57,7 +57,7 @@ def test_intervals_of_constants_hold() -> None:
 
 
 def test_shares_of_kinds_come_back() -> None:
-    found = fit_drivers(passages(1500, 1, KINDS)).following
+    found = fit_drivers(passages(1000, 1, KINDS)).following
     assert sum(one.value for one in found.values()) == pytest.approx(1.0)
     for kind in ("in_sight", "unaffected"):
         assert found[kind].low <= KINDS[kind] <= found[kind].high

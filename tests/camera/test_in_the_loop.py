@@ -1,6 +1,7 @@
 """The camera's options in the closed loop."""
 
 import math
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from fogsim.values import Frame, Step
 SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=0.6", "fog.visibility_m=100")
 
 
-def steps(*overrides: str) -> list[Step]:
-    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides]), seed=2))
+def steps(*overrides: str, count: int = 7) -> list[Step]:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides])
+    return list(islice(fogsim.run(scenario, seed=2), count))
 
 
 @pytest.fixture(scope="module")
@@ -27,14 +29,13 @@ def test_the_airlight_stands_at_65_percent_of_the_light_that_saturates(plain: li
         sky = np.isinf(step.view.distance)
         assert step.observation.image[sky][:, 1].mean() == pytest.approx(0.827 * 255, abs=2.0)
     # sRGB of 0.6 / 1.02 is 0.791.
-    fixed = steps("camera.exposure.mode=fixed")
-    sky = np.isinf(fixed[0].view.distance)
-    assert fixed[0].observation.image[sky][:, 1].mean() == pytest.approx(0.791 * 255, abs=2.0)
-    assert not np.array_equal(fixed[0].observation.image, plain[0].observation.image)
+    (fixed,) = steps("camera.exposure.mode=fixed", count=1)
+    sky = np.isinf(fixed.view.distance)
+    assert fixed.observation.image[sky][:, 1].mean() == pytest.approx(0.791 * 255, abs=2.0)
 
 
 def test_samples_smooth_silhouettes_and_change_no_size(plain: list[Step]) -> None:
-    smooth = steps("camera.samples=2")[0]
+    (smooth,) = steps("camera.samples=2", count=1)
     assert smooth.observation.image.shape == (120, 160, 3)
     assert smooth.view.distance.shape == smooth.view.instance.shape == (120, 160)
     # What is far from any silhouette looks as it did, but for noise and the texture of the road.
@@ -60,7 +61,7 @@ def test_deep_images_go_through_the_whole_loop(plain: list[Step]) -> None:
 
 
 def test_braking_pitches_the_camera_and_nobody_is_told() -> None:
-    pitched = steps("camera.body={pitch_deg_per_mps2: 0.5, time_constant_s: 0}")
+    pitched = steps("camera.body={pitch_deg_per_mps2: 0.5, time_constant_s: 0}", "estimators=[negru2013]")
     for step in pitched:
         pose, frame = step.truth.pose, step.observation.frame
         assert pose is not None
@@ -72,5 +73,5 @@ def test_braking_pitches_the_camera_and_nobody_is_told() -> None:
 
 def test_the_same_seed_gives_the_same_run_whatever_the_options() -> None:
     options = ("camera.samples=2", "camera.bits=12", "camera.lens_shading=0.7", "camera.body.pitch_deg_per_mps2=0.2")
-    first, again = (b"".join(s.observation.image.tobytes() for s in steps(*options)) for _ in range(2))
+    first, again = (b"".join(s.observation.image.tobytes() for s in steps(*options, count=3)) for _ in range(2))
     assert first == again

@@ -140,10 +140,7 @@ def rewrite(pair: Pair, i: int, j: int) -> Pair:
     return Pair(kept.first.copy(), np.outer(kept.second, b)[0, :] + a[:, 0].sum())
 
 
-@pytest.mark.parametrize(
-    "arrange",
-    [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2], lambda a: a[::-1, ::-1]],
-)
+@pytest.mark.parametrize("arrange", [np.ascontiguousarray, np.asfortranarray, lambda a: a[::-1, ::-1]])
 def test_elements_are_where_python_finds_them_and_memory_is_given_back(arrange: Any) -> None:
     numbers = np.random.default_rng(0).normal(size=(4, 5))
     mine, pythons = (Pair(arrange(numbers.copy()), np.arange(5.0)) for _ in range(2))

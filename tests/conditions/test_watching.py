@@ -1,7 +1,6 @@
 """Conditions over time, what is not known, and what cannot be otherwise."""
 
 import contextlib
-import math
 from collections.abc import Sequence
 
 import pytest
@@ -175,10 +174,3 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(ValueError):
         condition = parse_condition(text)
         assert parse_condition(str(condition)) == condition
-
-
-@given(st.floats(0.0, 130.0), st.floats(0.0, 130.0))
-def test_a_comparison_is_python_s(speed: float, limit: float) -> None:
-    condition = Comparison(Reference("X.speed", ("ego",)), "<=", Quantity(limit, repr(limit), "m/s"))
-    assert Watch(condition).update(make_step(speed=speed)) is (speed <= limit)
-    assert not math.isnan(speed)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.errors import InputError
 from fogsim.scenario import build
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
@@ -38,10 +37,6 @@ def vehicles(places: list[tuple[float, float, float]], ego: tuple[float, float] 
 
 def heard(made: FogReports, state: TrafficState, seconds: float = 10.0, fog: FogField = EVEN) -> list[FogReport]:
     return [one for i in range(round(seconds / 0.1)) for one in made.heard(0.1 * i, state, 0, fog)]
-
-
-def test_nobody_tells_if_nobody_is_asked_to():
-    assert heard(senders(), vehicles([(200.0, 0.0, 0.0)])) == []
 
 
 def test_sensors_stand_every_half_mile_and_tell_what_is_there():
@@ -86,11 +81,11 @@ def test_places_round_a_corner_are_counted_along_the_route():
 def test_a_share_of_the_vehicles_is_equipped_and_stays_so():
     state = vehicles([(100.0 + i, 0.0, 0.0) for i in range(400)])
     made = senders(vehicles="{equipped: 20 %, loss: 0}")
-    once, again = ({one.source for one in heard(made, state, 3.0)} for _ in range(2))
+    once, again = ({one.source for one in heard(made, state, 1.2)} for _ in range(2))
     assert len(once) == pytest.approx(80, abs=25)
     assert again <= once
     made.reset(np.random.default_rng(2))
-    assert {one.source for one in heard(made, state, 3.0)} != once
+    assert {one.source for one in heard(made, state, 1.2)} != once
 
 
 def test_noise_loss_and_wrong_measurements_are_as_frequent_as_is_said():
@@ -126,8 +121,3 @@ def test_in_a_run_the_belief_ahead_goes_by_what_is_reported():
         assert bool(last.observation.reports) == bool(more)
     assert believed[1] == pytest.approx(80.0, rel=0.2)
     assert believed[0] > 200.0
-
-
-def test_a_share_beyond_all_is_told():
-    with pytest.raises(InputError, match="equipped"):
-        senders(vehicles="{equipped: 120 %}")

@@ -12,14 +12,9 @@ def frame(time: float, seed: int) -> Frame:
     return Frame(time, np.random.default_rng(seed).integers(0, 255, (30, 40, 3)).astype(np.uint8), CAMERA)
 
 
-def test_new_pictures_with_later_times_are_news() -> None:
-    watch = FrameWatch()
-    assert [watch.stale_reason(frame(0.1 * i, i), 20.0) for i in range(4)] == [""] * 4
-
-
 def test_a_time_that_does_not_move_on_tells_that_nothing_is_new() -> None:
     watch = FrameWatch()
-    watch.stale_reason(frame(3.0, 0), 20.0)
+    assert watch.stale_reason(frame(3.0, 0), 20.0) == ""
     assert "no new frame: the last one is of 3.00 s" in watch.stale_reason(frame(3.0, 1), 20.0)
     assert watch.stale_reason(frame(3.1, 2), 20.0) == ""
     watch.reset()
@@ -43,12 +38,8 @@ def test_a_late_frame_belongs_with_what_was_measured_when_it_was_taken() -> None
     assert history.at(0.0) is None
     for number in range(6):
         history.add(0.1 * number, LeadMeasurement(float(number), 0.0) if number != 2 else None)
-    assert [history.at(time) for time in (0.1, 0.2, 0.35, 0.5)] == [
-        LeadMeasurement(1.0, 0.0),
-        None,
-        LeadMeasurement(3.0, 0.0),
-        LeadMeasurement(5.0, 0.0),
-    ]
+    found = [history.at(time) for time in (0.1, 0.2, 0.35, 0.5)]
+    assert [one and one.distance for one in found] == [1.0, None, 3.0, 5.0]
 
 
 def test_a_frame_that_is_late_or_shows_nothing_is_useless():

@@ -60,13 +60,7 @@ def test_pictures_are_those_of_the_whole_wherever_the_ego_drives(plan: ScenePlan
     near, whole = NearScene(plan, few_lanes=0), plan.scene()
     reference = make_renderer("cpu", whole, 1e4)
     # East along a street into ground that was out of sight, around a corner, and back.
-    drive = (
-        (20.0, 330.0, 0.0),
-        (500.0, 330.0, 0.1),
-        (1660.0, 330.0, 0.0),
-        (1660.0, 400.0, np.pi / 2),
-        (1600, 330, 3.1),
-    )
+    drive = (20, 330, 0.0), (500, 330, 0.1), (1660, 330, 0.0), (1660, 400, np.pi / 2), (1600, 330, 3.1)
     changes = []
     for x, y, heading in drive:
         pose = CameraPose((x, y, 9.0), heading, 0.0)

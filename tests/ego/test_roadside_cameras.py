@@ -12,10 +12,11 @@ from fogsim.scenario import build, override
 from fogsim.simulation.ego.road_meters import RoadMeters
 from fogsim.simulation.ego.roadside_cameras import RoadsideCameras, as_log_normal, over_road
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, Estimate, FogReport, Step
+from fogsim.values import Camera, Estimate, FogField, FogReport, Step
 from tests.data.early_motorway import EARLY
 
 SMALL = (EARLY, "camera.width=80", "camera.height=60", "expect={}")
+SEEN = "fog.visibility_m=200", "advice=none"
 CAMERAS = "sensors.reports.roadside={camera: {}, first_m: 300, every_m: 400, period_s: 1, delay_s: 0.5}"
 
 
@@ -29,7 +30,7 @@ def reported(steps: list[Step]) -> list[FogReport]:
 
 @pytest.fixture(scope="module")
 def steps() -> list[Step]:
-    return drive("fog.visibility_m=200", CAMERAS, "duration_s=2.3")
+    return drive(*SEEN, CAMERAS, "duration_s=2.3")
 
 
 def test_they_report_the_fog_that_their_images_show(steps: list[Step]) -> None:
@@ -66,7 +67,7 @@ def test_by_night_they_are_silent() -> None:
 
 
 def test_the_same_seed_has_the_same_reports_and_another_does_not(steps: list[Step]) -> None:
-    same, other = (reported(drive("fog.visibility_m=200", CAMERAS, seed=seed)) for seed in (1, 2))
+    same, other = (reported(drive(*SEEN, CAMERAS, seed=seed)) for seed in (1, 2))
     assert reported(steps[:5]) == same != other
 
 
@@ -81,16 +82,10 @@ def test_a_wrong_calibration_makes_wrong_reports() -> None:
 
 
 def test_they_change_nothing_that_the_ego_sees_and_none_are_made_unless_asked_for(
-    monkeypatch: pytest.MonkeyPatch,
+    steps: list[Step], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[object] = []
-    begin = RoadsideCameras.__init__
-    monkeypatch.setattr(RoadsideCameras, "__init__", lambda self, *given: made.append(self) or begin(self, *given))
-    without = drive("fog.visibility_m=100", "advice=none")
-    assert not made
-    beside = drive("fog.visibility_m=100", "advice=none", CAMERAS)
-    assert len(made) == 1
-    for one, other in zip(without, beside, strict=True):
+    monkeypatch.setattr(RoadsideCameras, "__init__", lambda *_: pytest.fail("cameras have been made"))
+    for one, other in zip(drive(*SEEN), steps[:5], strict=True):
         assert np.array_equal(one.observation.image, other.observation.image)
         assert np.array_equal(one.traffic.position, other.traffic.position)
         assert [e.extinction for e in one.estimates] == [e.extinction for e in other.estimates]
@@ -125,11 +120,10 @@ def test_a_log_normal_distribution_stands_for_the_positive_part_of_a_normal_one(
 def test_a_section_goes_by_the_last_report_of_a_sensor_wherever_that_was_seen() -> None:
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "drivers.advised=signs"])
     meters = RoadMeters(build.sections_config(scenario), np.array([[0.0, 0.0, 0.0], [2000.0, 0.0, 0.0]]), np.zeros(0))
-    fog = drive("renderer=none", "estimators=[]", "duration_s=0.1")[0].truth.fog
     report = FogReport("sensor 0", 0, 150.0, 0.0, 0.03, 0.1)
     for one in (report, dataclasses.replace(report, number=1, place=120.0, extinction=0.001)):
         meters.hear([one])
-    assert {section.reported for section in meters.measure(fog)} == {0.001}
+    assert {section.reported for section in meters.measure(FogField(0.03, (1.0,) * 3))} == {0.001}
 
 
 def test_a_scenario_with_a_roadside_camera_takes_overrides() -> None:

@@ -11,14 +11,8 @@ from fogsim.scenario import Scenario
 from fogsim.values import Step
 
 BANK = "fog={outside_visibility_m: 2000, banks: [{start_m: 1300, end_m: 3000, edge_m: 100, visibility_m: 60}]}"
-QUIET = (
-    EARLY,
-    "renderer=none",
-    "estimators=[]",
-    "duration_s=5",
-    "clocks.camera_period_s=1",
-    "clocks.decision_period_s=1",
-)
+CLOCKS = ("duration_s=5", "clocks.camera_period_s=1", "clocks.decision_period_s=1")
+QUIET = (EARLY, "renderer=none", "estimators=[]", *CLOCKS)
 SIGNS = ("drivers.advised=signs", "drivers.harmonisation=null")
 
 
@@ -67,16 +61,10 @@ def test_signs_are_read_from_afar(by_truth: Step):
 
 
 def test_what_cannot_inform_is_told():
+    sensors = "advice={method: fixed_speed, informed_by: sensors}"
     for settings, told in [
-        (("advice={method: fixed_speed, informed_by: sensors}",), "needs sensors.reports.roadside"),
-        (
-            (
-                "advice={method: fixed_speed, informed_by: sensors}",
-                "sensors.reports.roadside={}",
-                "drivers.advised=all",
-            ),
-            "signs, equipped or law",
-        ),
+        ((sensors,), "needs sensors.reports.roadside"),
+        ((sensors, "sensors.reports.roadside={}", "drivers.advised=all"), "signs, equipped or law"),
         (("advice={method: fixed_speed, informed_by: sensor}",), "sensors"),
         (("lighting={method: legal, informed_by: sensors}",), "informed_by"),
     ]:

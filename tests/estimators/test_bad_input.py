@@ -15,6 +15,7 @@ from fogsim.estimators import ESTIMATORS, make
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, SignSighting
 
 METHODS = sorted(ESTIMATORS)
+TRACKING = {"gabb2014", "huang2015", "huang2015_lead", "lead_contrast"}
 FOR_THE_NIGHT = {"gallen2014", "gallen2014_veil", "night_road"}
 FOR_SIGNS = {"belaroussi2015", "sign_contrast"}
 VARIANTS = {name: ({"as_published": True},) for name in ("huang2015", "huang2015_rough", "negru2013", "zhu2015")}
@@ -65,7 +66,7 @@ def said(found: Estimate) -> tuple[bool, float, float]:
 
 def estimates(method: str, image, camera: Camera = CAMERA, **options) -> list[Estimate]:
     estimator = make(method, camera, **options)
-    frames = [Frame(PERIOD * index, image, camera) for index in range(4)]
+    frames = [Frame(PERIOD * index, image, camera) for index in range(4 if method in TRACKING else 2)]
     return [estimator.update(observation(image, index, frame=frame)) for index, frame in enumerate(frames)]
 
 

@@ -19,8 +19,8 @@ SAG, CREST, BEND = 1.0 / 8800.0, -1.0 / 13_000.0, 1.0 / 400.0
 def errors(visibilities: tuple[float, ...], **course) -> tuple[np.ndarray, np.ndarray]:
     """Errors of V_met [%], and the 90 % intervals' half-widths."""
     error, half = [], []
-    for seed in range(4):
-        true = replace(CAMERA, pitch=CAMERA.pitch + math.radians((-0.1, 0.0, 0.06, 0.12)[seed]))
+    for seed in range(3):
+        true = replace(CAMERA, pitch=CAMERA.pitch + math.radians((-0.1, 0.0, 0.12)[seed]))
         road = Road(camera=true, **course)
         drawing = scan(road, seed, 2)
         for visibility in visibilities:

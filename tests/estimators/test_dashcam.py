@@ -47,7 +47,7 @@ def relative_errors(method: str, pictures: Iterable[tuple[np.ndarray, Camera, fl
 def test_whatever_a_dashcam_sees_is_no_gross_error():
     # The pictures take longer than both methods.
     scenes = islice(windscreen.small_scenes(5000), 24)
-    pictures = [(windscreen.draw(scene, seed), told, scene.visibility) for seed, scene, told in scenes]
+    pictures = [(windscreen.draw(scene, seed, over=1), told, scene.visibility) for seed, scene, told in scenes]
     for method, valid in (("joint_road", 0.8), ("negru2013", 0.6)):
         error, deviation = relative_errors(method, pictures)
         assert len(error) >= valid * len(pictures), method
@@ -59,7 +59,7 @@ def test_whatever_a_dashcam_sees_is_no_gross_error():
 @pytest.mark.parametrize("count", [12, pytest.param(30, marks=pytest.mark.nightly)])
 def test_country_roads_are_measured_or_refused_and_intervals_hold(count):
     scenes = [(*country.random_country(seed), seed) for seed in range(300, 300 + count)]
-    pictures = ((country.draw(scene, seed), told, scene.visibility) for scene, told, seed in scenes)
+    pictures = ((country.draw(scene, seed, over=1), told, scene.visibility) for scene, told, seed in scenes)
     error, deviation = relative_errors("joint_road", pictures)
     assert len(error) >= 0.8 * count
     assert np.median(error) < 0.07

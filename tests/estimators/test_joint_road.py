@@ -38,12 +38,12 @@ LEAD = {"camera": PAPER, "lead_distance": 25.0}
 @pytest.mark.parametrize(
     ("changes", "seeds", "tracked", "median", "worst"),
     [
-        *(({"visibility": v, "camera": PAPER}, 5, None, m, w) for v, m, w in ((30, 3, 8), (300, 3, 8), (1000, 5, 14))),
-        *(({"visibility": v, "camera": PAPER, "drift": 0.15}, 6, None, 10, 20) for v in (60, 300)),
-        ({"visibility": 50, "lead_paint": 170.0, **LEAD}, 3, None, 8, 18),
-        ({"visibility": 150, "lead_paint": 170.0, **LEAD}, 3, 25.0, 8, 18),
-        ({"visibility": 150, "lead_paint": 30.0, **LEAD}, 3, None, 8, 18),
-        ({"visibility": 400, "lead_paint": 30.0, **LEAD}, 3, 25.0, 8, 18),
+        *(({"visibility": v, "camera": PAPER}, 3, None, m, w) for v, m, w in ((30, 3, 8), (300, 3, 8), (1000, 5, 14))),
+        *(({"visibility": v, "camera": PAPER, "drift": 0.15}, 3, None, 10, 20) for v in (60, 300)),
+        ({"visibility": 50, "lead_paint": 170.0, **LEAD}, 2, None, 8, 18),
+        ({"visibility": 150, "lead_paint": 170.0, **LEAD}, 2, 25.0, 8, 18),
+        ({"visibility": 150, "lead_paint": 30.0, **LEAD}, 2, None, 8, 18),
+        ({"visibility": 400, "lead_paint": 30.0, **LEAD}, 2, 25.0, 8, 18),
         *(({"visibility": v, "camera": SMALL}, 3, None, 5, np.inf) for v in (50, 150)),
         *(({"visibility": v, "camera": LONG}, 3, None, 5, np.inf) for v in (100, 500)),
         (DIM, 2, None, 6, 6),
@@ -80,7 +80,7 @@ def test_the_densest_fog_is_not_taken_for_a_ramp(render, road, visibility, respo
 def test_intervals_cover_the_truth(render, road):
     inside = []
     for visibility in (40.0, 80.0, 150.0, 300.0, 600.0):
-        error, found = errors(render, road.but(visibility=visibility, camera=SMALL), range(8))
+        error, found = errors(render, road.but(visibility=visibility, camera=SMALL), range(5))
         deviation = np.array([f.standard_deviation for f in found]) * visibility / 3.0
         inside += list(np.abs(error) < 1.645 * deviation)
     assert np.mean(inside) > 0.8
@@ -96,14 +96,14 @@ def test_clear_air_is_never_fog(render, road, sky):
 
 def test_several_frames_average_patches_and_forget_on_reset(render, road):
     scene = road.but(visibility=200.0, camera=SMALL, patch_contrast=0.08)
-    estimator = make("joint_road", SMALL, frames=8)
-    for seed in range(8):
+    estimator = make("joint_road", SMALL, frames=5)
+    for seed in range(5):
         last = estimator.update(Observation(render(scene, seed)))
-    single = [estimate(render(scene, seed), SMALL).extinction for seed in range(8)]
+    single = [estimate(render(scene, seed), SMALL).extinction for seed in range(5)]
     assert abs(last.extinction * 200 / 3 - 1) < np.sqrt(np.mean((np.array(single) * 200 / 3 - 1) ** 2)) + 0.01
     estimator.reset()
-    again = estimator.update(Observation(render(scene, 7)))
-    assert again.extinction == single[7]
+    again = estimator.update(Observation(render(scene, 4)))
+    assert again.extinction == single[4]
 
 
 def test_diagnostics_say_what_was_found(render, road):
@@ -139,7 +139,7 @@ def drive(render, road, densities, period=0.1):
 
 
 def test_hypotheses_that_a_drive_has_ruled_out_change_no_answer(render, road):
-    for along, alone in drive(render, road.but(visibility=120.0, camera=SMALL), [1.0] * 12):
+    for along, alone in drive(render, road.but(visibility=120.0, camera=SMALL), [1.0] * 8):
         assert along.extinction == pytest.approx(alone.extinction, abs=0.5 * alone.standard_deviation)
         assert along.standard_deviation == pytest.approx(alone.standard_deviation, rel=0.3)
 

@@ -121,7 +121,7 @@ def off(estimate, visibility):
 
 
 def test_a_vehicle_that_draws_away_tells_the_visibility_and_how_sure_that_is():
-    looks, inside = ({}, {"body": 0.6}, {"body": 0.05}, {"width": 2.5, "height": 3.5}, {"grain": 0.25}), []
+    looks, inside = ({"body": 0.6}, {"body": 0.05}, {"width": 2.5, "height": 3.5}), []
     for visibility, median, worst in ((50, 3, 7), (300, 2, 5), (500, 4, 10)):
         found = [every(drive(visibility, away(look=i, **look), i))[-1] for i, look in enumerate(looks)]
         errors = np.abs([off(one, visibility) for one in found])

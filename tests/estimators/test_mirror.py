@@ -29,9 +29,9 @@ def pictures() -> Iterator[tuple[str, np.ndarray, Camera]]:
     for seed in (300, 305, 308, 311, 315):
         scene, told = random_country(seed)
         yield f"country {seed}", draw_country(scene, seed, over=1), told
-    for seed, scene, told in islice(small_scenes(5000), 12):
+    for seed, scene, told in islice(small_scenes(5000), 8):
         yield f"windscreen {seed}", draw(scene, seed, over=1), told
-    for seed in (1, 2, 5, 6, 7, 9, 13):
+    for seed in (1, 2, 6, 9):
         rng = np.random.default_rng(seed)
         point = (239.5 + (rng.uniform(-20.0, 20.0) if seed % 2 else 0.0), 179.5)
         roll = float(np.radians(rng.uniform(-4.0, 4.0))) if seed % 3 == 0 else 0.0

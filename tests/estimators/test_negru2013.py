@@ -24,11 +24,9 @@ def visibilities(render, road, seeds, **options):
     [
         (20, 0.10, None, Response.LINEAR, 120.0),
         (50, 0.10, None, Response.GAMMA, 200.0),
-        (100, 0.10, None, Response.SRGB, 120.0),
-        (200, 0.10, None, Response.LINEAR, 120.0),
         (200, 0.10, None, Response.SRGB, 120.0),
         (400, 0.25, None, Response.GAMMA, 200.0),
-        *((visibility, 0.10, SMALL, Response.LINEAR, 200.0) for visibility in (50, 100, 200)),
+        *((visibility, 0.10, SMALL, Response.LINEAR, 200.0) for visibility in (50, 200)),
         *((visibility, 0.10, WIDE, Response.GAMMA, 200.0) for visibility in (100, 400)),
     ],
 )
@@ -44,7 +42,7 @@ def test_recovers_visibility_on_a_foreign_renderers_frames(render, road, visibil
 def test_interval_covers_the_truth(render, road):
     inside = []
     for visibility in (40.0, 80.0, 150.0, 250.0):
-        for seed in range(4):
+        for seed in range(2):
             low, high = estimate(render(road.but(visibility=visibility), seed), road.camera).visibility_interval
             inside.append(low < visibility < high)
     assert np.mean(inside) > 0.8
@@ -60,15 +58,15 @@ def test_interval_covers_a_horizon_that_is_off(render, road):
 
 
 def test_as_published_is_coarser_but_near(render, road):
-    found = visibilities(render, road, range(6), as_published=True)
+    found = visibilities(render, road, range(4), as_published=True)
     assert np.nanmedian(np.abs(found / 100.0 - 1)) < 0.2
-    refined = visibilities(render, road, range(6))
+    refined = visibilities(render, road, range(4))
     assert np.median(np.abs(refined / 100.0 - 1)) < np.nanmedian(np.abs(found / 100.0 - 1))
 
 
 @pytest.mark.parametrize(("sky", "patch_contrast"), [(90.0, 0.08), (150.0, 0.0), (150.0, 0.08), (245.0, 0.03)])
 def test_clear_air_is_never_fog(render, road, sky, patch_contrast):
-    for seed in range(3):
+    for seed in range(2):
         scene = road.but(visibility=1e6, sky=sky, airlight=sky, patch_contrast=patch_contrast)
         found = estimate(render(scene, seed), road.camera)
         assert not found.valid or found.category is FogCategory.NONE
@@ -144,7 +142,7 @@ def test_the_vanishing_point_mends_a_horizon_that_is_off(render, road):
 def test_thin_fog_is_measured_and_the_interval_holds(render, road, visibility, bound):
     camera = replace(road.camera, width=688, height=515, focal_length=700.0, principal_point=(343.5, 257.0))
     inside = []
-    for seed in range(6):
+    for seed in range(4):
         pitch = np.random.default_rng(seed).normal(0.0, np.radians(0.1))
         image = render(road.but(visibility=visibility, camera=replace(camera, pitch=camera.pitch + pitch)), seed)
         found = estimate(image, camera)

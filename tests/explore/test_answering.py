@@ -29,10 +29,9 @@ def test_a_question_has_one_answer_whatever_was_asked_before() -> None:
     answers = [explorer.answer(asked) for asked in questions]
     assert [explorer.answer(asked) for asked in questions] == answers
     explorer.close()
-    for asked, answer in zip(questions, answers, strict=True):
-        other = begun(SMALL)
-        assert other.answer(asked) == answer
-        other.close()
+    other = begun(SMALL)
+    assert [other.answer(asked) for asked in questions[::-1]] == answers[::-1]
+    other.close()
 
 
 def test_what_the_script_does_is_seen_until_it_is_chosen_otherwise() -> None:

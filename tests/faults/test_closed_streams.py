@@ -6,12 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from PIL import Image
-
-from tests.helpers.camera_files import camera_yaml
 
 FULL = "error: the operating system refused: [Errno 28] No space left on device"
-ESTIMATE = "-m fogsim estimate photo.png --camera camera.yaml --method negru2013 --json"
 
 
 def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
@@ -31,20 +27,15 @@ def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
 @pytest.mark.parametrize(
     ("command", "code", "told"),
     [
-        ("-m fogsim --version >&-", 0, ""),
-        (f"{ESTIMATE} <&- >&- 2>&-", 0, ""),
-        ("-m fogsim validate nowhere.yaml 2>/dev/full", 2, ""),
+        ("-m fogsim --version <&- >&- 2>&-", 0, ""),
+        ("-m fogsim schema scenery 2>/dev/full", 2, ""),
         ("-m fogsim --help | head -c 0", 1, ""),
         ("-m fogsim --version >/dev/full", 2, FULL),
     ],
 )
 def test_a_closed_or_full_stream_ends_in_no_traceback(tmp_path: Path, command: str, code: int, told: str) -> None:
-    Image.new("RGB", (80, 60)).save(tmp_path / "photo.png")
-    (tmp_path / "camera.yaml").write_text(camera_yaml((80, 60), 70), encoding="utf-8")
     ended, _, said = run_in_shell(command, tmp_path)
-    # A kernel that is not in the cache yet is announced.
-    assert [line for line in said.splitlines() if not line.startswith("fogsim: comp")] == told.splitlines()
-    assert ended == code
+    assert (ended, said.strip()) == (code, told)
 
 
 def test_text_that_the_encoding_lacks_is_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from fogsim.simulation.recording import RecordedRun, record_run
 from fogsim.values import Step
 from tests.faults.steps import drawn_run
 
-STEPS = 30
+STEPS = 12
 
 
 @pytest.fixture(autouse=True)

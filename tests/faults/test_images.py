@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from fogsim.errors import InputError
+from fogsim.estimators import ESTIMATORS
 from fogsim.offline.image_files import DepthMap, read_distance, read_image
 from fogsim.values import Camera
 from tests.helpers.camera_files import camera_yaml
@@ -196,7 +197,7 @@ def test_an_image_of_any_kind_is_read_or_named_in_one_line(command: Command, fol
 
 
 SMALL_COMMANDS: dict[str, tuple[str, ...]] = {
-    "estimate": ("--method", "all"),
+    "estimate": ("--method", "all", "--json"),
     "estimate by night": ("--night",),
     **{f"restore {name}": ("--method", name, "--out", "made.png") for name in ("dark_channel", "tarel2009")},
     "restore planar": ("--visibility", "60", "--most-gain", "1000", "--tone-map", "--out", "made.png"),
@@ -211,8 +212,10 @@ def test_a_tiny_image_is_worked_on(command: Command, folder: Path, rows: int, co
     (folder / "tiny.yaml").write_text(camera_yaml((cols, rows), 70, (cols / 2, rows / 2), response=""))
     for kind, options in SMALL_COMMANDS.items():
         (folder / "made.png").unlink(missing_ok=True)
-        code, _, err = command(kind.split(maxsplit=1)[0], "tiny.png", "--camera", "tiny.yaml", *options)
+        code, out, err = command(kind.split(maxsplit=1)[0], "tiny.png", "--camera", "tiny.yaml", *options)
         assert code == 0, (kind, err)
+        if kind == "estimate":
+            assert [json.loads(line)["method"] for line in out.splitlines()] == list(ESTIMATORS)
 
 
 @pytest.mark.parametrize("subject", [pytest.param("signs", marks=pytest.mark.nightly), "halos"])

@@ -135,7 +135,17 @@ def place_of(name: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("name", MISBEHAVING)
-def test_a_run_of_a_method_that_misbehaves_has_failed(folder: Path, command: Command, name: str) -> None:
+def test_a_method_that_misbehaves_is_told_with_its_place(folder: Path, name: str) -> None:
+    (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", f"'mine:{name}'"))
+    config = load_scenario(folder / "short.fog.yaml").run_config()
+    with pytest.raises(MethodError, match=re.escape(f"{MISBEHAVING[name]} {place_of(name, folder)}")):  # noqa: PT012 - in any of these
+        (estimator,) = chosen_methods.estimators(config.estimators, config.camera.assumed_on())
+        estimator.reset()
+        estimator.update(Observation(Frame(0.0, np.zeros((48, 64, 3), np.uint8), config.camera.assumed_on())))
+
+
+def test_a_run_of_a_method_that_misbehaves_has_failed(folder: Path, command: Command) -> None:
+    name = "ExitsInUpdate"
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", f"'mine:{name}'"))
     told = f"{MISBEHAVING[name]} {place_of(name, folder)}"
     done = command("run", "short.fog.yaml", "--out", "out", "--no-video", "--no-report", cwd=folder)

@@ -128,7 +128,7 @@ def fast() -> Iterator[gymnasium.Env[Any, Any]]:
 
 def test_a_reset_that_is_refused_leaves_the_episode_as_it_was(fast: gymnasium.Env[Any, Any]) -> None:
     fast.reset(seed=3)
-    expected = fast.step([12, 0])[0], fast.reset(seed=4)[0]
+    expected = fast.step([12, 0])[0]
     for arguments in [
         {"options": 5},
         {"options": {"overides": []}},
@@ -150,7 +150,7 @@ def test_a_reset_that_is_refused_leaves_the_episode_as_it_was(fast: gymnasium.En
         refusal(fast.reset, **arguments)
         refusal(fast.step, "x")
         refusal(fast.step, [math.nan, 0])
-        assert np.array_equal((fast.step([12, 0])[0], fast.reset(seed=4)[0]), expected)
+        assert np.array_equal(fast.step([12, 0])[0], expected)
     # Seeds may have any whole type.
     assert np.array_equal(fast.reset(seed=np.int64(5))[0], fast.reset(seed=5)[0])
 

@@ -49,10 +49,10 @@ def test_reading_ends_at_the_allowance_or_when_the_reader_is_done(tmp_path: Path
 def test_encodings_that_expat_does_not_know_are_read_alike(tmp_path: Path) -> None:
     for encoding in ["utf-8", "utf8", "utf-16", "iso-8859-15", "windows-1252", "shift_jis", "gb18030"]:
         file, name = tmp_path / "file.xml", "東" if encoding in {"shift_jis", "gb18030"} else "Straße"
-        text = f'<?xml version="1.0" encoding="{encoding}"?>\n<a name="{name}">{"<b/>" * 50_000}{name}</a>'
+        text = f'<?xml version="1.0" encoding="{encoding}"?>\n<a name="{name}">{"<b/>" * 20_000}{name}</a>'
         file.write_bytes(text.encode(encoding))
         root = read_tree(file, "a")
-        assert (root.get("name"), len(root), root[-1].tail) == (name, 50_000, name)
+        assert (root.get("name"), len(root), root[-1].tail) == (name, 20_000, name)
 
 
 def test_prefixes_of_tags_do_not_matter(tmp_path: Path) -> None:

@@ -19,15 +19,11 @@ from fogsim.simulation.loop import ClosedLoop
 from fogsim.values import Command, Estimate, Lamp, Step
 
 SMALL = ("camera.width=160", "camera.height=120", "duration_s=2", "clocks.camera_period_s=0.5")
-DENSE = "fog.visibility_m=60"
+BLIND = (EARLY, "renderer=none", "estimators=[]")
 
 
 def small(*overrides: str) -> Scenario:
     return fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides])
-
-
-def _told(estimates: tuple[Estimate, ...]) -> list[tuple[float, float, bool]]:
-    return [(one.extinction, one.standard_deviation, one.valid) for one in estimates]
 
 
 def seen_and_believed(steps: list[Step]) -> list[object]:
@@ -44,7 +40,7 @@ def seen_and_believed(steps: list[Step]) -> list[object]:
                     one.belief.probability.tobytes(),
                     one.advice,
                     one.lamps,
-                    _told(one.estimates),
+                    repr(one.estimates),
                 )
                 for one in step.equipped
             ],
@@ -53,23 +49,30 @@ def seen_and_believed(steps: list[Step]) -> list[object]:
     ]
 
 
-@pytest.mark.timeout(300)
-def test_the_number_of_processes_changes_nothing():
+def equipped(seconds: float, processes: int) -> list[Step]:
+    """A run in dense fog in which cameras of others and of the roadside report what they see."""
     others = "sensors.reports.cameras={range_m: 1000}", "sensors.reports.roadside={camera: {}, period_s: 1, delay_s: 0}"
-    scenario = small(DENSE, "traffic.equipped=20 %", "fusion=field_filter", *others)
-    found = [list(fogsim.run(scenario, 1, camera_processes=number)) for number in (0, 1, 2)]
-    assert max(len(step.equipped) for step in found[0]) >= 3
-    assert seen_and_believed(found[1]) == seen_and_believed(found[0])
-    assert seen_and_believed(found[2]) == seen_and_believed(found[0])
-    heard = {one.source for step in found[0] for one in step.observation.reports}
+    settings = "fog.visibility_m=60", "traffic.equipped=20 %", "fusion=field_filter", "lighting=legal"
+    return list(fogsim.run(small(*settings, *others, f"duration_s={seconds}"), 1, camera_processes=processes))
+
+
+@pytest.fixture(scope="module")
+def steps() -> list[Step]:
+    return equipped(3.0, 0)
+
+
+def test_the_number_of_processes_changes_nothing(steps: list[Step]):
+    assert max(len(step.equipped) for step in steps) >= 3
+    elsewhere = equipped(1.0, 2)
+    assert seen_and_believed(elsewhere) == seen_and_believed(steps[: len(elsewhere)])
+    heard = {one.source for step in steps for one in step.observation.reports}
     roadside = {one for one in heard if one.startswith("sensor ")}
-    assert heard - roadside <= {f"camera of {one.vehicle_id}" for step in found[0] for one in step.equipped}
+    assert heard - roadside <= {f"camera of {one.vehicle_id}" for step in steps for one in step.equipped}
     assert heard - roadside
     assert len(roadside) >= 4
 
 
-def test_each_sees_by_its_own_camera_and_is_advised_and_lit_by_its_own_belief():
-    steps = list(fogsim.run(small(DENSE, "traffic.equipped=20 %", "lighting=legal", "duration_s=6"), 1))
+def test_each_sees_by_its_own_camera_and_is_advised_and_lit_by_its_own_belief(steps: list[Step]):
     last = steps[-1]
     assert len({one.belief.visibility_quantile(0.5) for one in last.equipped}) == len(last.equipped)
     for one in last.equipped:
@@ -84,19 +87,22 @@ def test_each_sees_by_its_own_camera_and_is_advised_and_lit_by_its_own_belief():
     assert not last.command.is_for_others
 
 
-def test_nobody_is_equipped_unless_asked_and_named_ones_are():
-    steps = list(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1))
-    assert all(not step.equipped for step in steps)
-    same_way = [one for one in steps[0].traffic.ids if one.startswith("east")][:2]
-    named = small(EARLY, "renderer=none", "estimators=[]", f"traffic.ego=[ego,{','.join(same_way)}]")
-    first = next(iter(fogsim.run(named, 1)))
-    assert {one.vehicle_id for one in first.equipped} <= {*same_way}
-    assert first.equipped
+@pytest.fixture(scope="module")
+def first_step() -> Step:
+    return next(fogsim.run(small(*BLIND), 1))
+
+
+def test_nobody_is_equipped_unless_asked_and_named_ones_are(first_step: Step):
+    assert not first_step.equipped
+    same_way = [one for one in first_step.traffic.ids if one.startswith("east")][:2]
+    named = next(fogsim.run(small(*BLIND, f"traffic.ego=[ego,{','.join(same_way)}]"), 1))
+    assert {one.vehicle_id for one in named.equipped} <= {*same_way}
+    assert named.equipped
 
 
 def test_the_leader_of_an_equipped_vehicle_is_the_one_that_sumo_has():
     compared = 0
-    with ClosedLoop(small("renderer=none", "estimators=[]", "duration_s=10")) as loop:
+    with ClosedLoop(small(*BLIND[1:], "duration_s=6")) as loop:
         step = loop.start(3)
         places = RoutePlaces(step.truth.route)
         while step.ending is None:
@@ -112,15 +118,14 @@ def test_the_leader_of_an_equipped_vehicle_is_the_one_that_sumo_has():
 
 def test_what_a_script_asks_of_fog_holds_for_those_who_come_later():
     script = "timeline=[{when: time >= 1 s, do: {fog: {visibility: 100 m}}}]"
-    steps = list(
-        fogsim.run(small("fog.visibility_m=300", "traffic.equipped=20 %", script, "renderer=none", "estimators=[]"), 1)
-    )
+    settings = "fog.visibility_m=300", "traffic.equipped=20 %", script, "duration_s=1.5"
+    steps = list(fogsim.run(small(*BLIND[1:], *settings), 1))
     before, after = steps[1].equipped[0], steps[-1].equipped[0]
     assert after.extinction == pytest.approx(3.0 * before.extinction, rel=0.05)
 
 
 def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
-    scenario = small(EARLY, "traffic.equipped=20 %", "renderer=none", "estimators=[]")
+    scenario = small(*BLIND, "traffic.equipped=20 %")
     with ClosedLoop(scenario, camera_processes=1) as loop:
         loop.start(1)
         process = loop._fleet._pools[0]._process
@@ -135,19 +140,18 @@ def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
         EquippedFleet(scenario.run_config(), 1)._pools[0].answer()
 
 
-def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed():
+def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed(first_step: Step):
     estimates = (
         Estimate("a", 0.03, 0.003, reach=100.0),
         Estimate("b", 0.04, 0.001, reach=80.0),
         Estimate.invalid("c", "no"),
     )
-    step = next(iter(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1)))
-    ((vehicle, report),) = camera_messages(dataclasses.replace(step, estimates=estimates))
+    ((vehicle, report),) = camera_messages(dataclasses.replace(first_step, estimates=estimates))
     assert vehicle == "ego"
     assert (report.extinction, report.relative_deviation) == (0.04, pytest.approx(0.025))
     # Of the visibility of 75 m, not of what lies beyond.
-    assert report.place == pytest.approx(step.route_position + 37.4, abs=0.1)
-    assert camera_messages(dataclasses.replace(step, estimates=(Estimate("a", 0.03, 0.02),))) == ()
+    assert report.place == pytest.approx(first_step.route_position + 37.4, abs=0.1)
+    assert camera_messages(dataclasses.replace(first_step, estimates=(Estimate("a", 0.03, 0.02),))) == ()
 
 
 def test_who_cannot_be_equipped_is_told():
@@ -161,15 +165,14 @@ def test_who_cannot_be_equipped_is_told():
             small(written)
 
 
-def test_places_along_a_route_with_a_bend():
+def test_places_along_a_route_with_a_bend(first_step: Step):
     route = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 100.0, 0.0]])
-    step = next(iter(fogsim.run(small(EARLY, "renderer=none", "estimators=[]"), 1)))
     some = {
         "ids": ("a", "b", "c", "d"),
         "position": np.array([[50.0, 2.0, 0.0], [98.0, 40.0, 0.0], [50.0, 3.0, 0.0], [50.0, 40.0, 0.0]]),
         "heading": np.array([0.0, 0.5 * np.pi, np.pi, 0.0]),
     }
-    at = RoutePlaces(route).of(dataclasses.replace(step.traffic, **some))
+    at = RoutePlaces(route).of(dataclasses.replace(first_step.traffic, **some))
     assert at.along[:2] == pytest.approx([50.0, 140.0])
     assert at.aside[:2] == pytest.approx([2.0, 2.0])
     assert at.on_way.tolist() == [True, True, False, False]

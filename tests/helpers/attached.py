@@ -20,6 +20,14 @@ def libsumo_in_town() -> Iterator[Any]:
         yield library
 
 
+def conduct(api: Any, vehicle: str) -> tuple[float, ...]:
+    """What FogSim may change about a vehicle."""
+    get = api.vehicle
+    gain = float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain"))
+    speeds, modes = (get.getMaxSpeed, get.getSpeedFactor), (get.getSpeedMode, get.getLaneChangeMode)
+    return (*(one(vehicle) for one in (*speeds, get.getTau, *modes)), gain)
+
+
 @contextlib.contextmanager
 def traci_in_town(sumo_process: Callable) -> Iterator[Any]:
     with sumo_process(ARGUMENTS) as (port, _):

@@ -69,7 +69,7 @@ def test_a_stated_horizon_needs_no_lines(tmp_path: Path) -> None:
 
 
 def test_a_camera_that_looks_aside_is_told(drive, tmp_path: Path) -> None:
-    for index, frame in enumerate(drive.frames):
+    for index, frame in enumerate(drive.frames[:3]):
         Image.fromarray(frame[:, 120:]).save(tmp_path / f"{index}.png")
     guess = guess_camera(find_source(tmp_path), mount_height=HEIGHT, field_of_view=0.85)
     assert any("turned to the right" in warning for warning in guess.warnings)

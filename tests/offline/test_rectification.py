@@ -24,6 +24,7 @@ from tests.helpers.camera_files import camera_yaml
 from tests.helpers.command import Command
 
 CAMERA = Camera(640, 480, 577.0, (322.0, 236.0), 1.38, math.radians(2.0), response=Response.LINEAR)
+WIDE = replace(CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5))
 BARREL = (-0.32, 0.09, 0.0011, -0.0007)
 """About what a dash camera of 60° has."""
 
@@ -45,11 +46,11 @@ def draw() -> Draw:
     return image
 
 
-def seen_through(lens: tuple[float, ...], image: NDArray[np.uint8], wide: Camera, camera: Camera) -> NDArray[np.uint8]:
-    """What a lens makes of the picture of a pinhole that sees more: Brown's formula solved by iteration, by hand."""
-    k1, k2, p1, p2 = lens
-    rows, columns = np.indices((camera.height, camera.width), dtype=float)
-    bent = np.array([columns - camera.principal_point[0], rows - camera.principal_point[1]]) / camera.focal_length
+def through_lens(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """What the lens of `BARREL` makes of the picture of `WIDE`: Brown's formula solved by iteration, by hand."""
+    k1, k2, p1, p2 = BARREL
+    rows, columns = np.indices((CAMERA.height, CAMERA.width), dtype=float)
+    bent = np.array([columns - CAMERA.principal_point[0], rows - CAMERA.principal_point[1]]) / CAMERA.focal_length
     x, y = bent
     for _ in range(60):
         r2 = x * x + y * y
@@ -58,28 +59,14 @@ def seen_through(lens: tuple[float, ...], image: NDArray[np.uint8], wide: Camera
             (bent[0] - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
             (bent[1] - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
         )
-    return sampled(
-        image, y * wide.focal_length + wide.principal_point[1], x * wide.focal_length + wide.principal_point[0]
-    )
-
-
-def sampled(image: NDArray[np.uint8], rows: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Bilinear interpolation."""
-    top, left = np.floor(rows).astype(int), np.floor(columns).astype(int)
-    down, right = (rows - top)[..., None], (columns - left)[..., None]
-    grey = image.astype(float)
-    above = grey[top, left] * (1 - right) + grey[top, left + 1] * right
-    below = grey[top + 1, left] * (1 - right) + grey[top + 1, left + 1] * right
-    return np.rint(above * (1 - down) + below * down).astype(np.uint8)
+    u, v = (axis * WIDE.focal_length + middle for axis, middle in zip((x, y), WIDE.principal_point, strict=True))
+    return cv2.remap(image, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR).astype(np.uint8)
 
 
 @pytest.fixture(scope="module")
 def through_barrel(draw: Draw) -> NDArray[np.uint8]:
     """The road through the lens of `BARREL`."""
-    wide = replace(
-        CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5)
-    )
-    return seen_through(BARREL, draw(wide), wide, CAMERA)
+    return through_lens(draw(WIDE))
 
 
 def difference(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
@@ -128,10 +115,7 @@ def test_yaw_is_undone(draw: Draw) -> None:
 
 def test_lens_and_yaw_together_from_files(tmp_path: Path, draw: Draw) -> None:
     """What a person does: a folder of images and a camera file with both keys."""
-    wide = replace(
-        CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5)
-    )
-    image = seen_through(BARREL, draw(wide, math.radians(5.0)), wide, CAMERA)
+    image = through_lens(draw(WIDE, math.radians(5.0)))
     Image.fromarray(image).save(tmp_path / "a.png")
     calibration = written(tmp_path, f"distortion: {list(BARREL)}", "yaw_deg: 5")
     assert (calibration.camera, calibration.distortion) == (CAMERA, BARREL)

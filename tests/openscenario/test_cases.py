@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fogsim
-from fogsim.cli.app import app
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.scenario import Scenario
@@ -61,11 +59,6 @@ def test_a_dollar_in_a_declaration_is_remarked() -> None:
     ):
         scenario = fogsim.load_scenario(CASES / "dollar_in_declaration.xosc", QUIET)
     assert next(entry for entry in scenario.timeline if entry.name == "brake").do.keys() == {"Lead"}
-
-
-def test_a_line_in_a_message_is_no_emoji(tmp_path: Path) -> None:
-    file = _changed(tmp_path, "dollar_in_declaration", ('entityRef="$who"', 'entityRef="$whom"'))
-    assert f"{file}:100: " in CliRunner().invoke(app, ["validate", str(file)]).stderr
 
 
 def test_an_act_with_empty_triggers_begins_at_once_and_is_not_stopped() -> None:

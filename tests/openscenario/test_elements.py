@@ -1,5 +1,6 @@
 """Every element and attribute of the format is honoured, harmless or refused, and files are held to it."""
 
+import functools
 import re
 import shutil
 from pathlib import Path
@@ -8,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.openscenario import read_openscenario, read_parameter_cases
+from fogsim.openscenario import read_openscenario, read_parameter_cases, reading
 from fogsim.openscenario.xml_tree import HARMLESS, REFUSED, Node, read_xml
 
 DATA = Path(__file__).parents[1] / "data"
@@ -99,6 +100,12 @@ def _others(text: str) -> list[str]:
         return [f"{float(text) + more:g}" for more in (3.0, -3.0)]
     except ValueError:
         return ["true" if text == "false" else "false" if text == "true" else "another"]
+
+
+@pytest.fixture(autouse=True)
+def _each_road_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("map_net", "read_opendrive_lanes"):
+        monkeypatch.setattr(reading, name, functools.cache(getattr(reading, name)))
 
 
 @pytest.fixture

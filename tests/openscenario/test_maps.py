@@ -24,10 +24,13 @@ def maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("written", ["Town01", "Town01.xodr", "other/folder/Town01.xodr", "C:\\maps\\Town01.xodr"])
-def test_a_map_is_found_by_its_name(tmp_path: Path, maps: Path, written: str) -> None:
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(5)}"}, road=Path(written))
-    assert motion(first_step(file), "Ego")[:2] == pytest.approx((33.7, -1.75), abs=0.1)
+def test_a_map_is_found_by_its_name(tmp_path: Path, maps: Path) -> None:
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}"}
+    roads = [Path(road) for road in ("Town01", "Town01.xodr", "other/folder/Town01.xodr", "C:\\maps\\Town01.xodr")]
+    found = [read_openscenario(write(tmp_path, {"Ego": CAR}, begin, road=road)).data for road in roads]
+    assert found == [found[0]] * 4
+    first = first_step(write(tmp_path, {"Ego": CAR}, begin, road=roads[0]))
+    assert motion(first, "Ego")[:2] == pytest.approx((33.7, -1.75), abs=0.1)
 
 
 def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Path) -> None:

@@ -9,7 +9,8 @@ from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, PERSON, TIMED, after, begun, event, follows, lane, linear, motion_at, over, polyline, run, speed, world, write,
+    CAR, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, over, polyline, run, speed,
+    state, world, write,
 )  # fmt: skip
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
@@ -46,7 +47,8 @@ def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, ga
     events = event("near", distance(f'displacement="trailingReferencedEntity" {wanted}'), after(1.0))
     story = {"Next": events, "Ego": event("faster", speed(14), over("near"))}
     begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
-    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=after(40.0)))
+    stop = group(state("event", "near", "completeState", 5.5)) + after(40.0)
+    steps = run(write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, story, stop=stop))
     then = begun(steps)["faster"]
     assert between(steps, then) == pytest.approx(gap, abs=0.5)
     assert motion_at(steps, then + 5.0, "Next")[2] == pytest.approx(10.0, abs=0.15)

@@ -1,6 +1,5 @@
 """What the packages import is what an installation of them brings along."""
 
-import ast
 import re
 import sys
 import tomllib
@@ -28,10 +27,9 @@ OPTIONAL = {
 
 
 def imported(path: Path) -> set[str]:
-    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-    whole = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    parts = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module and not node.level}
-    return {name.split(".")[0] for name in whole | parts}
+    return set(
+        re.findall(r"^ *(?:import|from(?=[\w. ]* import\b)) (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    )
 
 
 def names_of(requirements: list[str]) -> set[str]:

@@ -10,7 +10,7 @@ import fogsim
 from fogsim.recorders.panel.camera_picture import draw_camera_picture, draw_restored_picture
 from fogsim.values import LightMeasurement, Step
 
-SMALL = (EARLY, "camera.width=320", "camera.height=240", "traffic.events=[]", "duration_s=2")
+SMALL = (EARLY, "camera.width=320", "camera.height=240", "traffic.events=[]", "duration_s=1")
 
 
 def last_step(visibility: float) -> Step:

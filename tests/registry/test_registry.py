@@ -1,7 +1,7 @@
 import pytest
 
 from fogsim.core.registry import Registry
-from fogsim.errors import InputError, UnknownNameError
+from fogsim.errors import UnknownNameError
 
 
 def test_an_unknown_name_answers_with_the_known_ones_and_the_nearest() -> None:
@@ -16,8 +16,3 @@ def test_a_duplicate_is_refused() -> None:
         registry.register("negru2013", 2)
     registry.register("other", 3)
     assert list(registry) == ["negru2013", "other"]
-
-
-def test_unknown_names_are_input_errors() -> None:
-    assert issubclass(UnknownNameError, InputError)
-    assert "missing" not in Registry("estimator", {"negru2013": 1})

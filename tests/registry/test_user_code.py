@@ -57,16 +57,13 @@ def test_an_installed_package_announces_its_methods(tmp_path, monkeypatch):
     ("name", "text", "told"),
     [
         ("own:Cautius", "class Cautious: advise = None", "there is no Cautius in .*own.py; did you mean 'Cautious'"),
-        ("owm:Cautious", "", "there is no owm.py in .*entry points"),
         (
             "own:Cautious",
             "import nothing_of_that_name",
             r"import fails: ModuleNotFoundError: No module named .*own\.py:1",
         ),
         ("own:Cautious", "x = 1\ndef f(:", r"SyntaxError.*own\.py:2"),
-        ("own:Cautious", "1 / 0", r"ZeroDivisionError: division by zero, at .*own\.py:1"),
         ("own:Cautious", "class Cautious: pass", r"must have a method advise\(\) or advise_vehicle\(\)"),
-        ("own:Cautious", "Cautious = 3", "expected a class, got 3"),
     ],
 )
 def test_what_is_wrong_with_a_users_module_is_told(tmp_path, name, text, told):

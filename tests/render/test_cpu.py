@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.render import RENDERERS, Renderer, RenderError, best_renderer, make_renderer
+from fogsim.render import Renderer, RenderError, make_renderer
 from fogsim.render.cpu.rasteriser import CPURasteriser
 from fogsim.render.drawing import NEAR, MeshTable
 from fogsim.render.renderer import shapes_of
@@ -115,7 +115,7 @@ def test_pixels_see_the_triangles_that_their_rays_hit() -> None:
         assert (triangle_ids != exact).mean() < 1e-3  # edges and depths that rounding decides
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_triangles_that_share_edges_leave_no_gap(seed: int) -> None:
     rng = np.random.default_rng(seed)
     camera = Camera(200, 150, 100.0, (100.0, 75.0), 1.0)
@@ -292,9 +292,3 @@ def test_coarser_levels_of_detail_replace_shapes_one_by_one() -> None:
     # What is plain gives way sooner, and is sooner left out.
     assert shapes.detail[4] > shapes.detail[1]  # both for a level of 20 triangles
     assert shapes.smallest[4] > shapes.smallest[0]
-
-
-def test_auto_is_one_of_the_renderers_and_says_why() -> None:
-    name, reason = best_renderer()
-    assert name in RENDERERS
-    assert "OpenGL" in reason

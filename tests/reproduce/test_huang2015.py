@@ -7,7 +7,6 @@ import pytest
 
 from fogsim.calibration.staged_road import road_renderer
 from fogsim.errors import UnknownNameError
-from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import Reproduction
 from fogsim.reproduce.huang2015 import CAMERA, SAMPLES, VEHICLE, reproduce
 from fogsim.reproduce.huang2015_chase import Chase
@@ -57,11 +56,6 @@ def test_the_picture_shows_patches_and_curves(done) -> None:
     assert (cols, channels) == (1280, 3)
     assert rows > 400
     assert np.ptp(done.picture[: rows // 3]) > 150
-
-
-def test_confidence_is_of_the_estimate() -> None:
-    k = math.log(20.0) / 150.0
-    assert image_confidence(k, np.array([0.0, 150.0])) == pytest.approx([1.0, 1.0 / 400.0])
 
 
 def test_the_chase_shows_each_range_once_in_every_fog_wanted() -> None:

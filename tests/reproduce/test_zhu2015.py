@@ -1,6 +1,5 @@
 """zhu2015's evaluation on our frames: a few of its drives, and the drives themselves."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,10 @@ from fogsim.calibration.staged_road import road_renderer
 from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.estimators.zhu2015_road import Zhu2015Repair
-from fogsim.reproduce import REPRODUCTIONS, Reproduction
+from fogsim.reproduce import Reproduction
 from fogsim.reproduce.road_sweeps import GROWTHS, ROAD, SETBACK, SETTINGS, drive, observed, worn
 from fogsim.reproduce.road_sweeps import VISIBILITIES as VISIBILITIES_OF_SWEEPS
-from fogsim.reproduce.zhu2015 import CAMERA, EDGE, TITLES, WEATHERS, Size, reproduce, right_share
+from fogsim.reproduce.zhu2015 import CAMERA, EDGE, WEATHERS, Size, reproduce, right_share
 from fogsim.values import CameraPose, View
 
 DRIVES, VISIBILITIES, FRAMES = 2, 2, 4
@@ -157,13 +156,3 @@ def test_wear_changes_the_road_where_it_lies_and_is_averaged_where_a_row_holds_m
     assert told[220] == pytest.approx(1.05, abs=0.02)
     elsewhere = worn(replace(view, instance=np.ones(shape, np.int32)), CAMERA, pose, knots)
     assert np.array_equal(elsewhere.radiance, view.radiance)
-
-
-def test_the_command_prints_table_and_records(monkeypatch, command, done) -> None:
-    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"zhu2015": lambda **_: done})
-    (code, out, _), (of_json, records, _) = (command("reproduce", "zhu2015", *more) for more in ((), ("--json",)))
-    assert code == of_json == 0
-    assert "thick fog" in out
-    assert all(title in out for title in TITLES.values())
-    lines = [json.loads(line) for line in records.splitlines()]
-    assert lines[len(done.cells) :] == [dict(r) for r in (*done.records, *done.sweeps)]

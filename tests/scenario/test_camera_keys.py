@@ -64,18 +64,10 @@ def test_mistakes_are_named() -> None:
     auto = "camera.exposure.mode=auto"
     for overrides, message in [
         (["camera.bits=9"], r"camera\.bits: .*8, 10 or 12; got 9"),
-        (["camera.samples=4"], r"camera\.samples: .*less than or equal to 3; got 4"),
-        (["camera.samples=0"], r"camera\.samples: .*greater than or equal to 1; got 0"),
         (["camera.samples=3", "camera.width=8000"], r"camera: .*at most 16384, got 8000 × 480 px with 3 samples"),
         (["camera.exposure.mode=manual"], r"camera\.exposure\.mode: .*'auto' or 'fixed'; got 'manual'"),
-        (["camera.exposure.metering=spot"], r"camera\.exposure\.metering: .*'highlights' or 'log_average'; got 'spot'"),
-        (["camera.exposure.time_constant_s=-1"], r"time_constant_s: .*greater than or equal to 0; got -1"),
-        (["camera.exposure.target_percent=0"], r"target_percent: .*greater than or equal to 1; got 0"),
         (["camera.exposure.darkest_cdpm2=500"], r"camera\.exposure: .*must not decrease .*got 500, 100 and 100000"),
         ([auto, "camera.saturation_luminance_cdpm2=5000"], r"camera: saturation_luminance_cdpm2 .*mode is auto"),
-        (["camera.lens_shading=1.5"], r"camera\.lens_shading: .*less than or equal to 1; got 1.5"),
-        (["camera.lens_glare=1.5"], r"camera\.lens_glare: .*less than or equal to 1; got 1.5"),
-        (["camera.body.pitch_deg_per_mps2=-0.1"], r"pitch_deg_per_mps2: .*greater than or equal to 0; got -0.1"),
     ]:
         with pytest.raises(InputError, match=message):
             scenario(*overrides)

@@ -63,23 +63,15 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
 
 def test_mistakes_are_told() -> None:
     for setting, told in [
-        ("visibility_m=0", "fog.visibility_m: input should be greater than or equal to 1; got 0"),
         ("visibility_m=.nan", "fog.visibility_m: input should be greater than or equal to 1; got nan"),
-        ("patches={correlation_length_m: 0}", "fog.patches.correlation_length_m: input should be greater than or eq"),
-        ("patches={correlation_length_m: 50, strength: 3}", "fog.patches.strength: input should be less than or eq"),
         ("patches={correlation_lenght_m: 50}", "did you mean 'correlation_length_m'"),
         ("changes=[{at_s: 5}, {at_s: 5}]", "fog: at_s of changes must increase, got 5 and then 5"),
-        ("changes=[{at_s: 5, density: -1}]", "fog.changes.0.density: input should be greater than or equal to 0"),
         ("changes=[{at_s: 5, top_m: 9}, {at_s: 6}]", "top_m must be given in all changes or in none, got it in 1 of 2"),
         ("changes=[{at_s: 5, top_m: .nan}]", "fog.changes.0.top_m"),
         ("base_m=300", "top_m must lie above base_m, soft edges included, got 250 and 300"),
-        ("scale_height_m=0", "fog.scale_height_m: input should be greater than or equal to 0.1"),
         ("wind={speed_kmh: 5}", "fog.wind.from_deg: this key is missing"),
         ("banks=[{start_m: 500, end_m: 300, visibility_m: 40}]", "start_m must be less than end_m, got 500 and 300"),
-        ("airlight=photon", "fog.airlight: input should be 'koschmieder' or 'photons'"),
-        ("ground_albedo=1.2", "fog.ground_albedo: input should be less than or equal to 1"),
         ("airlight=photons", "even fog in a layer on the ground (visibility_m, top_m), not with outside_visibility_m"),
-        ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),
     ]:
         with pytest.raises(InputError) as error:
             fog(setting)
@@ -113,7 +105,6 @@ def test_the_land_sets_the_level_of_either_airlight() -> None:
 
 def test_layers_that_photons_do_not_know_are_told() -> None:
     for settings, told in [
-        (("ground_albedo=1.5",), "fog.ground_albedo: input should be less than or equal to 1; got 1.5"),
         (("top_m=17.5",), "fog.top_m must be above the highest point of the road and the camera"),
         (("top_m=1000", "visibility_m=20"), "optical thickness up to 100, got 149.8"),
         (("changes=[{at_s: 0}, {at_s: 60, density: 40}]",), "optical thickness up to 100, got 299.6"),

@@ -10,7 +10,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_origin
@@ -238,14 +238,11 @@ def test_what_is_tried_runs_as_it_is(folder: Path) -> None:
 
 
 def test_wrong_values_are_refused_or_run(folder: Path) -> None:
-    """In a short search each key gets one of the values and one of its ends, the next key the next ones."""
-
-    def turn(number: int, values: Sequence[Any]) -> Sequence[Any]:
-        return values if FUZZ or not values else [values[number % len(values)]]
-
+    """In a short search each key gets one of the values and its ends, the next key the next one."""
     for block in sorted({str(key.path[0]) for key in KEYS}):
         for number, key in enumerate(one for one in KEYS if one.path[0] == block):
-            for value in (*turn(number, WRONG), *turn(number, key.ends)):
+            values = [*WRONG, *key.ends]
+            for value in values if FUZZ else [values[number % len(values)]]:
                 data = copy.deepcopy(PLAIN)
                 written(key, value, data)
                 scenario = loaded(folder, yaml_of(data))

@@ -58,25 +58,20 @@ def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
 def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path) -> None:
     whole = (folder / "scenario.yaml").read_text(encoding="utf-8")
     for old, new, message in [
-        ("width: 640", "width: many", r"camera\.width: input should be a valid integer.*got 'many'"),
         ("width: 640", "width: 0", r"camera\.width: input should be greater than or equal to 16; got 0"),
-        ("duration_s: 200", "duration_s: -1", r"duration_s: input should be greater than or equal to 0\.001; got -1"),
         ("duration_s: 200", "duration_s: yes", r"duration_s: input should be a valid number; got True"),
         ("duration_s: 200", "duration_s: '200'", r"duration_s: input should be a valid number; got '200'"),
         ("duration_s: 200", "duration_s: 1e308", r"duration_s: .*less than or equal to 1000000; got 1e\+308"),
         ("width: 640", "width: yes", r"camera\.width: input should be a valid integer; got True"),
         ("width: 640", "width: 640.0", r"camera\.width: input should be a valid integer; got 640\.0"),
-        ("pitch_deg: 2", "pitch_deg: no", r"camera\.pitch_deg: input should be a valid number; got False"),
         ("outside_visibility_m: 2000", "outside_visibility_m: 2e6", r"at most 1e\+06 m, or inf; got 2000000"),
         ("outside_visibility_m: 2000", "outside_visibility_m: 80m", r"got '80m'; write the number alone, in m"),
         ("duration_s: 200", "duration_s: 200\nstreet_lamps: 1", r"street_lamps: .*valid boolean; got 1"),
-        ("traffic_step_s: 0.1", "traffic_step_s: 0.0004", r"greater than or equal to 0\.001; got 0\.0004"),
         ("ego: ego", "ego: ''", r"traffic\.ego: .* at least 1 character; got ''"),
         ("duration_s: 200", "duration_s: .nan", r"duration_s: .*got nan"),
         ("response: srgb", "response: log", r"camera\.response: .*'linear', 'gamma' or 'srgb'; got 'log'"),
         ("end_m: 2500", "end_m: 1000", r"fog\.banks\.0: start_m must be less than end_m, got 1300 and 1000"),
         ("edge_m: 300", "edge_m: 3000", r"fog\.banks\.0: edge_m must not be longer than the bank"),
-        ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: .* greater than or equal to 1; got 0"),
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
         ("[joint_road,", "[joint_rode,", r"estimators\.0: unknown estimator 'joint_rode'; did you mean 'joint_road'\?"),
         ("fusion: field_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: field_filter"),
@@ -85,10 +80,8 @@ def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path) -> N
         ("camera_period_s: 0.1", "camera_period_s: 0.25", r"clocks: camera_period_s must be a .* multiple .*0\.25 s"),
         ("- kind: brake", "- vehicule: x", r"traffic\.events\.0\.kind: this key is missing"),
         ("deceleration_mps2: 6", "decelerate: 6", r"events\.0\.decelerate: unknown key; did you mean 'deceleration_"),
-        ("at_position_m: 1900", "at_position_m: -5", r"traffic\.events\.0\.at_position_m: .*; got -5"),
         ("      at_position_m: 1900\n", "", r"traffic\.events\.0: say when it begins: at_position_m, at_time_s or"),
         ("kind: brake", "kind: jump", r"traffic\.events\.0\.kind: unknown kind 'jump'; known: brake, break_down"),
-        ("illuminance_lx: 10000", "illuminance_lx: -5", r"light\.illuminance_lx: .* than or equal to 0; got -5"),
         ("net: motorway.net.xml", "other: 3", r"traffic\.net: this key is missing"),
     ]:
         with pytest.raises(InputError, match=message):
@@ -146,7 +139,7 @@ def test_overrides_that_are_none_and_those_that_change_a_copy() -> None:
     assert data == {"name": "x", "list": [1, 2]}
 
 
-def test_a_resolved_scenario_loads_again(folder: Path) -> None:
+def test_a_resolved_scenario_loads_again() -> None:
     scenario = load_scenario("motorway_fog_bank", ["fog.visibility_m=inf"])
     assert override(scenario, []) == scenario
     assert resolved(scenario)["fog"]["visibility_m"] == "inf"

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from fogsim.values import Lane, LaneMarking, Mesh, RoadNetwork, Surface
+from fogsim.scene import build_scene
+from fogsim.values import Lane, LaneMarking, Mesh, RoadNetwork, Scene, Sign, SignMap, Surface
+
+LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
 
 
 def carriageway(edge: str, start: tuple[float, float], heading: float, length: float, speed: float) -> list[Lane]:
@@ -24,6 +27,10 @@ def street(line: ArrayLike, name: str = "a", speed: float = 13.9, width: float =
     """A lane of its own between solid lines, beside which a road ends."""
     line, solid = np.asarray(line, np.float64), LaneMarking.SOLID
     return Lane(name, name, line, width, speed, solid, solid, outermost=True)
+
+
+def build(network: RoadNetwork, *signs: Sign, street_lamps: bool = False) -> Scene:
+    return build_scene(network, SignMap(signs), np.random.default_rng(5), street_lamps=street_lamps)
 
 
 @pytest.fixture(scope="session")

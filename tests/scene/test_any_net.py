@@ -20,11 +20,7 @@ from fogsim.values import (
     StructureKind,
     Surface,
 )
-from tests.scene.conftest import road_under, street
-
-
-def build(network: RoadNetwork) -> Scene:
-    return build_scene(network, SignMap(), np.random.default_rng(5))
+from tests.scene.conftest import build, road_under, street
 
 
 def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
@@ -127,7 +123,7 @@ def test_street_lamps_stand_on_the_left_where_vehicles_keep_to_it() -> None:
     there = street([[0.0, 0, 0], [200, 0, 0]])
     back = street(there.centreline[::-1] - np.array([0.0, 3.2, 0.0]), "b")
     network = RoadNetwork((there, back), there.centreline)
-    scene = build_scene(network, SignMap(), np.random.default_rng(5), street_lamps=True)
+    scene = build(network, street_lamps=True)
     heads = street_lamp_heads(scene)
     feet = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape == "street_lamp"]).astype(float)
     index = LaneIndex([there, back])
@@ -141,6 +137,6 @@ def test_footways_are_drawn_where_there_is_no_road() -> None:
     way = Lane("w", "w", line, 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
     corner = PavedArea("a", np.array([[40.0, -2, 0], [44, -2, 0], [44, 2, 0], [40, 2, 0]]), LaneKind.FOOTWAY)
     sign = Sign("s", "speed_limit", 10.0, (0.0, -3.0, 2.6), 0.0, 0.9)
-    scene = build_scene(RoadNetwork((way,), line, (corner,)), SignMap((sign,)), np.random.default_rng(5))
+    scene = build(RoadNetwork((way,), line, (corner,)), sign)
     for x in (0.0, 42.0):
         assert max(road_under(scene.ground, x, 0.0, (Surface.MATT,))) == pytest.approx(KERB)

@@ -4,16 +4,9 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.scene import build_scene
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.values import RoadNetwork, Scene, Sign, SignMap, Surface
-from tests.scene.conftest import street
-
-LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
-
-
-def build(network: RoadNetwork, *signs: Sign, seed: int = 5) -> Scene:
-    return build_scene(network, SignMap(signs), np.random.default_rng(seed))
+from fogsim.values import RoadNetwork, Scene, Surface
+from tests.scene.conftest import LIMIT, build, street
 
 
 @pytest.fixture(scope="module")

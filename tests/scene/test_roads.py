@@ -5,21 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.scene import build_scene, street_lamp_heads
+from fogsim.scene import street_lamp_heads
 from fogsim.scene.edges import Edge, edge_meshes
 from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Chainage
 from fogsim.scene.road import KERB, lane_mesh, transverse_markings
 from fogsim.scene.terrain import Terrain
-from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
-from tests.scene.conftest import road_under, street
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Surface
+from tests.scene.conftest import build, road_under, street
 
 L_SHAPE = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [4, 4, 0], [4, 10, 0], [0, 10, 0]])
-
-
-def build(network: RoadNetwork, *, street_lamps: bool = False) -> Scene:
-    return build_scene(network, SignMap(), np.random.default_rng(5), street_lamps=street_lamps)
 
 
 @pytest.fixture(scope="module")

@@ -5,19 +5,14 @@ import numpy as np
 import pytest
 
 from fogsim.render import make_renderer
-from fogsim.scene import build_scene
 from fogsim.scene.signs import SIGN_KINDS, gantries, sign_shapes
 from fogsim.scene.signs.kinds import face_of, shape_name
 from fogsim.scene.signs.symbols import BLACK, lettering
-from fogsim.values import Batch, Camera, CameraPose, Mesh, RoadNetwork, Scene, Sign, SignMap, Surface
+from fogsim.values import Batch, Camera, CameraPose, Mesh, RoadNetwork, Scene, Sign, Surface
 from fogsim.values.scene import Instance
+from tests.scene.conftest import LIMIT, build
 
-LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
 ENDINGS = ["", ":far", ":tiny"]
-
-
-def build(network: RoadNetwork, *signs: Sign) -> Scene:
-    return build_scene(network, SignMap(signs), np.random.default_rng(5))
 
 
 def drawn(scene: Scene, batch: Batch, ending: str = "") -> tuple[np.ndarray, np.ndarray]:

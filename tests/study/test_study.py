@@ -45,6 +45,7 @@ def study_file(folder: Path, text: str = STUDY) -> Path:
 def test_a_study_is_run_continued_and_reported(tmp_path: Path) -> None:
     # An ego that never appears breaks the runs of one policy.
     text = STUDY.replace("seeds: 2", "    late: [traffic.warm_up_limit_s=1]\nseeds: 2")
+    text = text.replace("duration_s=1", "duration_s=1, lighting=low_beam")
     study, out = load_study(study_file(tmp_path, text)), tmp_path / "out"
     done: list[int] = []
     rows = run_study(study, out, processes=1, watch=lambda number, _: done.append(number))

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -14,6 +13,7 @@ from fogsim.testing.annotations import annotations
 from fogsim.testing.artefacts import Artefacts
 from fogsim.testing.junit import write_junit
 from fogsim.testing.page import PageContent, write_page
+from tests.recorders.test_report import Page
 
 ALLOWED = {
     "testsuites": ({"testsuite"}, {"name", "time", "tests", "failures", "errors"}, set()),
@@ -93,19 +93,6 @@ def test_annotations_name_file_and_line_and_are_escaped(outcomes: list[FileOutco
     assert "SUMO has ended" in lines[2]
 
 
-class _Balance(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: object) -> None:  # noqa: ARG002 - as of `HTMLParser`
-        if tag not in ("meta", "img"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
 def test_the_page_has_what_failed_with_plot_and_video(outcomes: list[FileOutcome], tmp_path: Path) -> None:
     plot, video = tmp_path / "plot.svg", tmp_path / "video.mp4"
     plot.write_text("<svg/>")
@@ -113,9 +100,7 @@ def test_the_page_has_what_failed_with_plot_and_video(outcomes: list[FileOutcome
     artefacts = {("a1", "e0", "always"): Artefacts(plot, video), ("b0", "e0", "always"): Artefacts(tmp_path / "none")}
     write_page(tmp_path / "page.html", PageContent(outcomes, artefacts, 4.0))
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    balance = _Balance()
-    balance.feed(text)
-    assert balance.open == []
+    assert len(Page(text).images) == 2
     assert text.count("data:image/svg+xml") == text.count("data:video/mp4") == 1
     assert "&lt;never&gt; fired" in text
     assert "SUMO has ended &lt;here&gt;" in text

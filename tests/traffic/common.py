@@ -11,7 +11,7 @@ from early_motorway import ROUTES
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import FogAccess, Traffic, TrafficSetup, libsumo_traffic
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField, TrafficSnapshot, TrafficState
+from fogsim.values import Collision, Command, FogField, TrafficSnapshot, TrafficState
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 MOTORWAY = DATA.parents[1] / "scenarios" / "motorway_fog_bank"
@@ -90,6 +90,10 @@ def driven(traffic: Traffic, steps: int, command: Command | None = None) -> list
         traffic.advance(command or Command())
         snapshots.append(seen(traffic))
     return snapshots
+
+
+def hits_of(snapshots: Sequence[TrafficSnapshot]) -> list[Collision]:
+    return [hit for snapshot in snapshots for hit in snapshot.collisions]
 
 
 def speeds_of(snapshots: Sequence[TrafficSnapshot]) -> dict[str, list[float]]:

@@ -1,4 +1,4 @@
-"""SUMO in process: reading, obeying, scripting, replaying, refusing."""
+"""SUMO in process: reading, obeying, scripting, refusing."""
 
 import math
 from collections.abc import Iterator
@@ -10,8 +10,8 @@ import pytest
 
 from fogsim.errors import SimulationError, SimulationRunningError
 from fogsim.traffic import BrakeEvent, LampFailureEvent, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
-from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
-from tests.traffic.common import SETUP, running, seen
+from fogsim.values import Command, Lamp, SpeedAdvice
+from tests.traffic.common import SETUP, driven, running, seen
 
 
 @pytest.fixture
@@ -20,15 +20,9 @@ def traffic() -> Iterator[Traffic]:
         yield simulation
 
 
-def drive(traffic: Traffic, command: Command, steps: int) -> TrafficSnapshot:
-    for _ in range(steps):
-        traffic.advance(command)
-    return seen(traffic)
-
-
 def test_state_in_metres_and_radians_with_the_egos_leader_and_lamps(traffic: Traffic) -> None:
     before = seen(traffic)
-    after = drive(traffic, Command(), 10)
+    after = driven(traffic, 10)[-1]
     state, ego = after.state, after.ego
     moved = state.position[ego] - before.state.position[before.ego]
     assert state.ids[ego] == "ego"
@@ -43,7 +37,7 @@ def test_state_in_metres_and_radians_with_the_egos_leader_and_lamps(traffic: Tra
     row = state.ids.index(leader.vehicle_id)
     bumpers = np.linalg.norm(state.position[row] - state.position[ego]) - state.length[row]
     assert leader.gap == pytest.approx(bumpers, abs=0.05)
-    lit = drive(traffic, Command(lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG), 1)
+    lit = driven(traffic, 1, Command(lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG))[-1]
     assert Lamp(int(lit.state.lamps[lit.ego])) & ~Lamp.STOP == Lamp.LOW_BEAM | Lamp.REAR_FOG
 
 
@@ -51,24 +45,20 @@ def test_the_ego_comes_down_to_an_advised_speed_and_is_freed_again(traffic: Traf
     start = seen(traffic).state
     target = 12.0
     advised = Command(SpeedAdvice(target))
-    after_two_seconds = drive(traffic, advised, 20)
+    after_two_seconds = driven(traffic, 20, advised)[-1]
     speed = after_two_seconds.state.speed[after_two_seconds.ego]
     assert speed == pytest.approx(start.speed[start.row("ego")] - 2.0 * SETUP.advice_deceleration, abs=0.3)
-    settled = drive(traffic, advised, 100)
+    settled = driven(traffic, 100, advised)[-1]
     assert settled.state.speed[settled.ego] == pytest.approx(target, abs=0.05)
-    freed = drive(traffic, Command(), 100)
+    freed = driven(traffic, 100)[-1]
     assert freed.state.speed[freed.ego] > target + 5
 
 
 def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
     event = BrakeEvent("lead", Trigger(at_position=300.0), to_speed=0.0, deceleration=5.0, hold=15.0)
     with running(replace(SETUP, events=(event,))) as traffic:
-        speeds = []
-        for _ in range(350):
-            traffic.advance(Command(SpeedAdvice(20.0)))
-            state = seen(traffic).state
-            row = state.row("lead")
-            speeds.append(math.nan if row is None else float(state.speed[row]))
+        states = [one.state for one in driven(traffic, 350, Command(SpeedAdvice(20.0)))]
+    speeds = [math.nan if (row := state.row("lead")) is None else float(state.speed[row]) for state in states]
     assert min(speeds) == pytest.approx(0.0, abs=0.01)
     assert speeds[-1] > 5.0
     assert np.nanmin(np.diff(speeds)) >= -0.5 - 0.01
@@ -80,8 +70,8 @@ def test_a_scripted_vehicle_cuts_in_and_its_lamps_fail_when_they_are_told_to() -
         LampFailureEvent("lead", Trigger(at_gap_to_ego=1000.0)),
     )
     with running(replace(SETUP, events=events, keep_lane=("ego",))) as traffic:
-        before = drive(traffic, Command(), 5).state
-        after = drive(traffic, Command(), 60).state
+        before = driven(traffic, 5)[-1].state
+        after = driven(traffic, 60)[-1].state
         assert not traffic.unplayed()
     one, other = before.row("lead"), after.row("lead")
     assert one is not None
@@ -89,18 +79,6 @@ def test_a_scripted_vehicle_cuts_in_and_its_lamps_fail_when_they_are_told_to() -
     assert (before.lane[one], after.lane[other]) == ("approach_1", "approach_2")
     assert after.lamps[other] == 0
     assert np.count_nonzero(after.lamps) >= len(after.ids) - 2  # all others but the ego, whose lamps the command sets
-
-
-def test_the_same_seed_replays_exactly(traffic: Traffic) -> None:
-    def positions() -> list[bytes]:
-        return [drive(traffic, Command(SpeedAdvice(20.0)), 10).state.position.tobytes() for _ in range(10)]
-
-    traffic.start(3)
-    first = positions()
-    traffic.start(3)
-    assert positions() == first
-    traffic.start(4)
-    assert positions() != first
 
 
 def test_a_process_has_one_simulation_until_it_is_closed(traffic: Traffic) -> None:

@@ -107,41 +107,7 @@ def test_a_taxi_waits_takes_a_passenger_and_waits_again() -> None:
     assert {step.route_position for step in arrived} == {carrying[-1].route_position}
 
 
-def moved(api: Any) -> list[Step]:
-    """Steps of an ego that an outer simulator drives, from 5 s to 10 s beside the road."""
-    steps = []
-    with fogsim.attach(api, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
-        for number in range(150):
-            if "ego" in api.vehicle.getIDList():
-                y = VERGE if 50 <= number < 100 else LANE
-                api.vehicle.moveToXY("ego", "", -1, 20.0 + 1.2 * number, y, 90.0, 2)
-            api.simulationStep()
-            step = session.observe()
-            if step is not None:
-                session.advise(step, Command(advice=SpeedAdvice(9.0), advised_speeds={"lorry": 5.0}))
-                steps.append(step)
-    return steps
-
-
-def check_moved(steps: list[Step]) -> None:
-    (_, before), (is_off, there), (_, after) = spells(steps)
-    assert is_off
-    assert len(there) == 50
-    assert {step.route_position for step in there} == {before[-1].route_position}
-    assert {(step.speed_limit, step.leader) for step in there} == {(math.inf, None)}
-    own = [(step.traffic.position[step.ego, :2].tolist(), float(step.traffic.grade[step.ego])) for step in there]
-    assert own == [([pytest.approx(20.0 + 1.2 * number), VERGE], 0.0) for number in range(50, 100)]
-    assert all(step.traffic.ids == ("ego", "lorry") for step in there)
-    assert after[0].route_position == pytest.approx(20.0 + 1.2 * 100)
-
-
 ARGUMENTS = ("-c", str(CASES / "two.sumocfg"), "--step-length", "0.1", "--no-step-log", "--end", "100")
-
-
-def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
-    with contextlib.closing(load_libsumo()) as library:
-        library.start(["sumo", *ARGUMENTS])
-        check_moved(moved(library))
 
 
 @pytest.fixture
@@ -152,8 +118,38 @@ def connection(sumo_process: Callable[..., Any]) -> Iterator[Any]:
         connected.close()
 
 
-def test_it_is_read_over_a_connection_too(connection: Any) -> None:
-    check_moved(moved(connection))
+@pytest.fixture
+def in_process() -> Iterator[Any]:
+    with contextlib.closing(load_libsumo()) as library:
+        library.start(["sumo", *ARGUMENTS])
+        yield library
+
+
+@pytest.mark.parametrize("simulation", ["in_process", "connection"])
+def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put(
+    simulation: str, request: pytest.FixtureRequest
+) -> None:
+    """An outer simulator drives it, from 5 s to 10 s beside the road."""
+    api, steps = request.getfixturevalue(simulation), list[Step]()
+    with fogsim.attach(api, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
+        for number in range(150):
+            if "ego" in api.vehicle.getIDList():
+                y = VERGE if 50 <= number < 100 else LANE
+                api.vehicle.moveToXY("ego", "", -1, 20.0 + 1.2 * number, y, 90.0, 2)
+            api.simulationStep()
+            step = session.observe()
+            if step is not None:
+                session.advise(step, Command(advice=SpeedAdvice(9.0), advised_speeds={"lorry": 5.0}))
+                steps.append(step)
+    (_, before), (is_off, there), (_, after) = spells(steps)
+    assert is_off
+    assert len(there) == 50
+    assert {step.route_position for step in there} == {before[-1].route_position}
+    assert {(step.speed_limit, step.leader) for step in there} == {(math.inf, None)}
+    own = [(step.traffic.position[step.ego, :2].tolist(), float(step.traffic.grade[step.ego])) for step in there]
+    assert own == [([pytest.approx(20.0 + 1.2 * number), VERGE], 0.0) for number in range(50, 100)]
+    assert all(step.traffic.ids == ("ego", "lorry") for step in there)
+    assert after[0].route_position == pytest.approx(20.0 + 1.2 * 100)
 
 
 def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(connection: Any) -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from fogsim.traffic import Traffic, TrafficSetup, libsumo_traffic
 from fogsim.values import Command, SpeedAdvice
-from tests.traffic.common import MOTORWAY, setup_of
+from tests.traffic.common import MOTORWAY, driven, setup_of
 
-WARM_UP, RESETS = 10, 40
+WARM_UP, RESETS = 10, 25
 KIB = 1024
 
 
@@ -21,9 +21,7 @@ def setup(folder: Path) -> TrafficSetup:
 
 def reset(traffic: Traffic, seed: int) -> None:
     traffic.start(seed)
-    for _ in range(5):
-        traffic.advance(Command(SpeedAdvice(20.0)))
-        assert traffic.observe() is not None
+    driven(traffic, 5, Command(SpeedAdvice(20.0)))
 
 
 def resident() -> int:

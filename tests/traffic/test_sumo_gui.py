@@ -72,11 +72,8 @@ def gui(display: str, free_port: Callable[[], int]) -> Iterator[tuple[int, "subp
                 process.kill()
 
 
-def drive(traffic: Traffic, steps: int = 30) -> list[TrafficSnapshot]:
-    seen: list[TrafficSnapshot] = []
-    for step in range(steps):
-        seen += driven(traffic, 1, Command(SpeedAdvice(18.0 if step > 10 else 25.0)))
-    return seen
+def drive(traffic: Traffic) -> list[TrafficSnapshot]:
+    return [one for speed in (25.0, 18.0) for one in driven(traffic, 15, Command(SpeedAdvice(speed)))]
 
 
 def alike(one: list[TrafficSnapshot], other: list[TrafficSnapshot]) -> bool:

@@ -49,7 +49,7 @@ def test_a_soft_layer_weighs_as_much_as_a_sharp_one() -> None:
 def test_optical_depth_against_brute_force() -> None:
     for name in UNEVEN:
         rng = np.random.default_rng(5)
-        starts, ends = (rng.uniform((-100, -100, 0), (300, 200, 30), (20, 3)) for _ in range(2))
+        starts, ends = (rng.uniform((-100, -100, 0), (300, 200, 30), (8, 3)) for _ in range(2))
         slow = np.array([brute_force(UNEVEN[name], a, b, 50_000) for a, b in zip(starts, ends, strict=True)])
         assert np.allclose(optical_depth(UNEVEN[name], starts, ends), slow, rtol=2e-3, atol=1e-4)
 
@@ -104,18 +104,6 @@ def test_banks_alone_have_the_depth_of_banks_and_a_far_tunnel_digit_for_digit() 
     assert np.array_equal(optical_depth(under_top, starts, ends), beside_tunnel)
     under_low_top = dataclasses.replace(under_top, top=40.0)
     assert not np.array_equal(optical_depth(under_low_top, starts, ends), beside_tunnel)
-
-
-def test_the_product_of_sideways_and_upward_profiles_would_be_wrong() -> None:
-    # Near the eye the line is low and outside the bank, farther off it is high and inside: K(x) h(z) cannot know.
-    field, start, end = UNEVEN["bank of ground fog"], np.array([0.0, 0.0, 1.0]), np.array([240.0, 70.0, 40.0])
-    flat = dataclasses.replace(field, scale_height=math.inf)
-    upright = dataclasses.replace(field, banks=())
-    product = float(optical_depth(flat, start, end) * optical_depth(upright, start, end))
-    product /= 0.002 * float(np.linalg.norm(end - start))
-    true = float(optical_depth(field, start, end))
-    assert true == pytest.approx(float(brute_force(field, start, end, 50_000)), rel=1e-4)
-    assert product > 1.5 * true
 
 
 def test_patches_keep_the_mean_and_have_their_strength_and_correlation() -> None:

@@ -51,17 +51,17 @@ def slow_transmission(field: FogField, view: View, camera: Camera, pose: CameraP
 def test_whole_frames_against_brute_force() -> None:
     for name in UNEVEN:
         view = black_road(CAMERA, POSE)
-        seen = transmittance(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[6::12, 6::12]
-        slow = slow_transmission(UNEVEN[name], view, CAMERA, POSE, 12)
+        seen = transmittance(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[12::24, 12::24]
+        slow = slow_transmission(UNEVEN[name], view, CAMERA, POSE, 24)
         assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
 
 
-@pytest.mark.parametrize("name", ["bank of ground fog", "all at once"])
-def test_small_frames_with_a_rolled_camera_against_brute_force(name: str) -> None:
+def test_small_frames_with_a_rolled_camera_against_brute_force() -> None:
     camera, pose = dataclasses.replace(SMALL, roll=0.15), CameraPose((30.0, 20.0, 1.38), 0.9, grade=0.04)
     view = black_road(camera, pose)
-    seen = transmittance(Air(UNEVEN[name]).radiance(view, camera, pose))[2::4, 2::4]
-    slow = slow_transmission(UNEVEN[name], view, camera, pose, 4)
+    field = UNEVEN["all at once"]
+    seen = transmittance(Air(field).radiance(view, camera, pose))[2::4, 2::4]
+    slow = slow_transmission(field, view, camera, pose, 4)
     assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
 
 

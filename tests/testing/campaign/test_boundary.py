@@ -60,7 +60,7 @@ def searched(seed: int, budget: int = 200) -> Findings:
 
 def errors(boundary: Boundary) -> NDArray[np.float64]:
     """Errors along lines of the visibility, as shares of its logarithmic range."""
-    space, steps = declared(), np.linspace(0.0, 1.0, 1001)
+    space, steps = declared(), np.linspace(0.0, 1.0, 201)
     axis = space.axes[FOG]
     found = []
     for place in np.random.default_rng(7).random((300, 4)):

@@ -66,7 +66,7 @@ def files(campaign: Campaign, found: Findings, folder: Path) -> dict[str, bytes]
 def test_resumed_and_in_any_order_the_files_are_the_same(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
     whole = files(campaign, found, tmp_path)
     assert b"<p>Cases: 16 to fill the space" in whole["report.html"]
-    for most in (5, 12, 21):
+    for most in (5, 33):
         with pytest.raises(KeyboardInterrupt):
             run_campaign(campaign, tmp_path / "b", Closed(most))
     told: list[tuple[int, int]] = []
@@ -97,9 +97,9 @@ def test_a_failed_run_is_repeated_when_resumed(campaign: Campaign, found: Findin
 
 
 def test_the_command_of_a_failure_runs_the_same_case(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
-    junit = files(campaign, found, tmp_path)["junit.xml"].decode()
+    write_campaign_junit(tmp_path / "junit.xml", campaign, found, [])
     failed = next(one for one in found.results if one.has_failed)
-    label = re.search(r"--case '([^']+)'", junit)
+    label = re.search(r"--case '([^']+)'", (tmp_path / "junit.xml").read_text())
     ((case, scenario),) = load_cases(campaign.file, wanted=label[1], is_test=True).cases
     assert (case.seed, scenario) == (failed.run.seed, failed.run.scenario)
 
@@ -151,12 +151,12 @@ def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, found
     assert resumed == smallest, "known results are not run again"
 
 
-def test_latin_hypercube_and_seed_draw_others(campaign: Campaign, tmp_path: Path) -> None:
-    drawn = []
-    for options in ({}, {"seed": 1}, {"sequencing": "latin_hypercube"}):
+def test_latin_hypercube_and_seed_draw_others(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
+    drawn = [[one.values for one in found.drawn[:16]]]
+    for options in ({"seed": 1}, {"sequencing": "latin_hypercube"}):
         other = load_campaign(campaign.file, budget=16, **options)
-        found = run_campaign(other, tmp_path / str(len(drawn)), Closed())
-        drawn.append([one.values for one in found.drawn])
+        others = run_campaign(other, tmp_path / str(len(drawn)), Closed())
+        drawn.append([one.values for one in others.drawn])
     assert drawn[0] != drawn[1] != drawn[2] != drawn[0]
 
 

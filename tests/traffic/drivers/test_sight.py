@@ -86,7 +86,7 @@ def test_the_limit_is_where_shares_of_the_threshold_add_up_to_one() -> None:
 def test_dusk_is_continuous() -> None:
     """Between illuminances 6 % apart the distance of first sight changes by at most 5 %, and nowhere by a jump."""
     for what in [UNLIT, LIT, (0.5, 200.0, 0.0)]:
-        for visibility in [30.0, 60.0, 120.0, 400.0]:
+        for visibility in [30.0, 400.0]:
             distances = np.array([reach(DriverSight(lux), visibility, what) for lux in ILLUMINANCES])
             assert np.abs(np.diff(np.log(distances))).max() < 0.05
             steepest = int(np.abs(np.diff(np.log(distances))).argmax())

@@ -94,7 +94,7 @@ def test_measured_compliances_give_what_was_measured() -> None:
 
     def mean(kind: str, own: float, advised: float, visibility: float) -> float:
         setup = DriverSetup(unaffected, compliance=COMPLIANCES[kind])
-        drivers = [driver_traits(setup, f"vehicle {i}", 1) for i in range(4000)]
+        drivers = [driver_traits(setup, f"vehicle {i}", 1) for i in range(2000)]
         return float(np.mean([desired_speed(setup, d, own, visibility, told(advised)) for d in drivers]))
 
     mph = 0.44704

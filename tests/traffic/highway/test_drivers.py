@@ -72,15 +72,15 @@ def test_uninformed_drivers_are_faster_than_their_sight_allows() -> None:
 
 
 def test_the_unaffected_drive_as_in_clear_air() -> None:
-    clear, foggy = ([v.position for v in Road(exact(), v).drive(6.0).others] for v in (math.inf, 100.0))
+    clear, foggy = ([v.position for v in Road(exact(), v).drive(2.0).others] for v in (math.inf, 100.0))
     assert np.array_equal(foggy, clear)
 
 
 def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
-    road = Road(exact(within_sight), 10_000.0).drive(15.0)
+    road = Road(exact(within_sight), 10_000.0).drive(6.0)
     road.traffic.enter_fog(even(60.0))
     hardest = 0.0
-    for _ in range(300):
+    for _ in range(180):
         road.drive(road.traffic.step_length)
         hardest = min(hardest, *(v.action["acceleration"] for v in road.others))
     assert max(road.speeds()) == pytest.approx(safe_speed(60.0, 2.5, 3.4), abs=0.3)
@@ -136,13 +136,13 @@ def test_advice_to_all_on_a_stretch_is_heard_there() -> None:
 def test_a_sign_is_read_in_passing_and_its_advice_ends_with_the_stretch() -> None:
     road = Road(exact(delay=0.0))
     front = max(v.position[0] for v in road.others)
-    sign = StretchAdvice(25.0, Stretch(front + 50.0, front + 400.0), Display.MESSAGE_SIGN)
+    sign = StretchAdvice(25.0, Stretch(front + 50.0, front + 150.0), Display.MESSAGE_SIGN)
     first = max(road.others, key=lambda v: v.position[0])
     road.drive(1.0, Command(stretches=(sign,)))
     assert first.target_speed == FAST
     road.drive(3.0, Command(stretches=(sign,)))
     assert 24.0 < first.target_speed < FAST
-    road.drive(16.0)
+    road.drive(6.0)
     assert first.target_speed == FAST
 
 
@@ -183,19 +183,6 @@ def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
     road.traffic.enter_fog(even(math.inf))
     assert [v.TIME_WANTED for v in road.drive(1.5).others] == pytest.approx([1.5] * len(road.others))
     assert road.environment.vehicle.TIME_WANTED == 1.5
-
-
-def test_the_same_seed_gives_the_same_run_and_another_other_drivers() -> None:
-    setup = DriverSetup(too_fast, 0.2, Compliance(rate=0.5))
-
-    def run(seed: int) -> Any:
-        road = Road(setup, 60.0, seed)
-        return np.array([(*v.position, v.speed) for v in road.drive(4.0, advised(road, 12.0)).others])
-
-    first, again, other = (run(seed) for seed in (5, 5, 6))
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-    assert driver_traits(setup, "lead", 5) != driver_traits(setup, "lead", 6)
 
 
 @pytest.mark.parametrize(("kind", "stays"), [("in_sight", True), ("out_of_sight", False)])

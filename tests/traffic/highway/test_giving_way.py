@@ -14,8 +14,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.traffic import DriverSight
 from fogsim.traffic.highway import Fleet, HighwayTraffic, limit_sight
-from fogsim.values import Collision, Command
-from tests.traffic.common import even
+from tests.traffic.common import driven, even, hits_of
 
 DAY = 10_000.0
 
@@ -83,10 +82,4 @@ def test_who_crosses_unseen_is_hit(visibility: float, collides: bool) -> None:
     other.plan_route_to("o3")
     road.vehicles[:] = [ego, other]
     traffic.enter_fog(even(visibility))
-    hits: list[Collision] = []
-    for _ in range(8 * 15):
-        traffic.advance(Command())
-        snapshot = traffic.observe()
-        assert snapshot is not None
-        hits += snapshot.collisions
-    assert bool(hits) == collides
+    assert bool(hits_of(driven(traffic, 8 * 15))) == collides

@@ -1,5 +1,6 @@
 """The ego's way in highway-env's environments: where it leads, and that a place on it never jumps."""
 
+import itertools
 import math
 from typing import Any
 
@@ -11,6 +12,7 @@ from highway_env.road.lane import CircularLane, StraightLane
 from fogsim.traffic.highway import HighwayTraffic, RouteProgress
 from fogsim.traffic.highway.network import FASTEST_GAIN
 from fogsim.values import Command, SpeedAdvice
+from tests.traffic.common import driven, seen
 from tests.traffic.highway.test_traffic import network_of
 
 # Each with a seed, and a configuration that makes it quick.
@@ -88,18 +90,13 @@ def test_the_egos_place_moves_as_it_drives() -> None:
         made = gymnasium.make(f"highway_env:{name}", config={**config, "neighbour_vehicles_connected_lanes": True})
         traffic = HighwayTraffic(made.unwrapped, None)
         traffic.start(seed)
-        before = traffic.observe()
-        command = Command(SpeedAdvice(80.0 / 3.6))
-        for _ in range(round(10.0 / traffic.step_length)):
-            assert before is not None
-            traffic.advance(command)
-            after = traffic.observe()
-            assert after is not None
+        begun = seen(traffic)
+        snapshots = driven(traffic, round(10.0 / traffic.step_length), Command(SpeedAdvice(80.0 / 3.6)))
+        for before, after in itertools.pairwise((begun, *snapshots)):
             fastest = max(float(s.state.speed[s.ego]) for s in (before, after))
             moved = after.route_position - before.route_position
             assert -1e-9 <= moved <= FASTEST_GAIN * fastest * traffic.step_length + 0.05
             assert after.state.speed[after.ego] >= -1e-9
-            before = after
         route = traffic.network()[0].route
         steps = np.diff(route, axis=0)
         turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))

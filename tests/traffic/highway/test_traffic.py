@@ -21,7 +21,7 @@ from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
 from fogsim.traffic.highway.network import speed_limit, upright
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, Lamp, LaneMarking, SpeedAdvice
-from tests.traffic.common import even, seen
+from tests.traffic.common import driven, even, hits_of, seen
 
 DAY = 10_000.0
 EMPTY = {"vehicles_count": 0, "initial_lane_id": 2}
@@ -116,28 +116,20 @@ def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
     driver = IDMVehicle(road, beside(ego, 0.0, 4.0), speed=25.0, target_speed=25.0, enable_lane_change=False)
     road.vehicles += [driver, stopped]
     traffic.enter_fog(even(visibility))
-    hits: list[Collision] = []
-    for _ in range(15 * 15):
-        traffic.advance(Command())
-        hits += seen(traffic).collisions
-    state = seen(traffic).state
+    snapshots = driven(traffic, 15 * 15)
+    state = snapshots[-1].state
     contrast, lamps = inherent_contrast(tuple(state.paint[2])), rear_intensity(int(state.lamps[2]))
     assert driver.speed < 1.0
-    return hits, DriverSight(DAY).seen_distance(extinction_from_visibility(visibility), contrast, lamps)
+    return hits_of(snapshots), DriverSight(DAY).seen_distance(extinction_from_visibility(visibility), contrast, lamps)
 
 
-def test_in_thin_fog_drivers_stop() -> None:
+def test_in_thin_fog_drivers_stop_and_in_dense_fog_they_hit_what_they_see_too_late() -> None:
     assert collisions_of_a_driver(300.0)[0] == []
-
-
-@pytest.mark.parametrize("visibility", [30.0, 60.0])
-def test_in_fog_they_hit_what_they_see_too_late(visibility: float) -> None:
-    (hit,), shows = collisions_of_a_driver(visibility)
+    (hit,), shows = collisions_of_a_driver(60.0)
     assert hit.collider.startswith("IDMVehicle")
     assert hit.victim.startswith("Vehicle")
     # After the reaction time of 1 s, IDM brakes at its limit, 6 m/s².
-    braking = max(0.0, shows - 25.0 * 1.0)
-    assert hit.impact_speed == pytest.approx(math.sqrt(25.0**2 - 2 * 6.0 * braking), abs=1.0)
+    assert hit.impact_speed == pytest.approx(math.sqrt(25.0**2 - 2 * 6.0 * (shows - 25.0 * 1.0)), abs=1.0)
 
 
 def test_collisions_are_those_that_the_library_knows() -> None:
@@ -147,10 +139,7 @@ def test_collisions_are_those_that_the_library_knows() -> None:
     vehicles = environment.road.vehicles
     for first in vehicles[-2:]:
         first.target_speed = 0.01
-    hits: list[Collision] = []
-    for _ in range(200):
-        traffic.advance(Command())
-        hits += seen(traffic).collisions
+    hits = hits_of(driven(traffic, 130))
     names = seen(traffic).state.ids
     crashed = {name for name, vehicle in zip(names, vehicles, strict=True) if vehicle.crashed}
     assert len(crashed) > 2
@@ -163,11 +152,7 @@ def test_the_egos_driver_is_as_blind_as_the_others() -> None:
     traffic.enter_fog(even(40.0))
     traffic.start(1)
     environment.road.vehicles.append(Vehicle(environment.road, beside(environment.vehicle, 200.0, 0.0)))
-    hits: list[Collision] = []
-    for _ in range(12 * 15):
-        traffic.advance(Command())
-        hits += seen(traffic).collisions
-    assert any("ego" in (hit.collider, hit.victim) for hit in hits)
+    assert any("ego" in (hit.collider, hit.victim) for hit in hits_of(driven(traffic, 12 * 15)))
 
 
 @pytest.mark.parametrize(("visibility", "pulls_out"), [(2000.0, False), (15.0, True)])
@@ -182,8 +167,7 @@ def test_who_comes_from_behind_unseen_holds_no_overtaker_back(visibility: float,
     road.vehicles += [slow, driver, fast]
     traffic.enter_fog(even(visibility))
     lane = driver.lane_index
-    for _ in range(20):
-        traffic.advance(Command())
+    driven(traffic, 20)
     assert (driver.target_lane_index != lane) == pulls_out
 
 
@@ -236,9 +220,7 @@ def test_advice_to_drive_faster_changes_nothing() -> None:
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)
     environment.vehicle.target_speed = 20.0
-    for _ in range(150):
-        traffic.advance(Command(SpeedAdvice(30.0)))
-    assert seen(traffic).state.speed[0] == pytest.approx(20.0, abs=0.2)
+    assert driven(traffic, 150, Command(SpeedAdvice(30.0)))[-1].state.speed[0] == pytest.approx(20.0, abs=0.2)
 
 
 def test_misuse_and_an_ego_that_is_gone() -> None:

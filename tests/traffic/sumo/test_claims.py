@@ -10,29 +10,16 @@ from fogsim.traffic.sumo.claims import TIME_HEADWAY, TOP_SPEED, Claims, SessionV
 OWN = 30.0
 
 
-class Vehicles:
-    """What claims use of SUMO's domain of vehicles."""
-
-    def __init__(self) -> None:
-        self.top_speed = OWN
-        self.parameters: dict[str, str] = {}
-
-    def getMaxSpeed(self, _: str) -> float:  # noqa: N802 - as SUMO calls it
-        return self.top_speed
-
-    def setMaxSpeed(self, _: str, speed: float) -> None:  # noqa: N802 - as SUMO calls it
-        self.top_speed = speed
-
-    def getParameter(self, _: str, key: str) -> str:  # noqa: N802 - as SUMO calls it
-        return self.parameters.get(key, "")
-
-    def setParameter(self, _: str, key: str, value: str) -> None:  # noqa: N802 - as SUMO calls it
-        self.parameters[key] = value
-
-
 @pytest.fixture
 def api() -> Any:
-    return SimpleNamespace(vehicle=Vehicles(), simulation=Vehicles())
+    """What claims use of SUMO; the top speed of its vehicles is an attribute."""
+    parameters: dict[str, str] = {}
+    domain = SimpleNamespace(top_speed=OWN, parameters=parameters)
+    domain.getMaxSpeed = lambda _: domain.top_speed
+    domain.setMaxSpeed = lambda _, speed: setattr(domain, "top_speed", speed)
+    domain.getParameter = lambda _, key: parameters.get(key, "")
+    domain.setParameter = lambda _, key, value: parameters.update({key: value})
+    return SimpleNamespace(vehicle=domain, simulation=domain)
 
 
 def test_the_lowest_claim_holds_and_the_own_value_comes_back(api: Any) -> None:

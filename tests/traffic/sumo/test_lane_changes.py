@@ -29,7 +29,7 @@ def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> Non
     traffic = AttachedTraffic(BUSY, api)
     traffic.start(1)
     truth, states = VehicleReader(api, "ego", BUSY.reading_radius), []
-    for _ in range(500):
+    for _ in range(350):
         traffic.obey(Command(SpeedAdvice(28.0)))
         api.simulationStep()
         traffic.look()

@@ -68,7 +68,7 @@ def test_reading_those_near_gives_what_reading_everything_gives(link: LibsumoLin
         for radius, reader in readers.items():
             state = reader.state(Lamp.LOW_BEAM)
             met[radius].update(state.ids)
-            if step % 3 == 0:
+            if step % 6 == 0:
                 assert_same(state, read_everything(api, Lamp.LOW_BEAM, radius))
     assert len(met[60.0]) > len(readers[60.0].state(Lamp.LOW_BEAM).ids)
     assert len(met[6000.0]) > max(64, len(state.ids))
@@ -87,14 +87,8 @@ def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_p
     api = link.begin([*files, "--no-step-log", "true"])
     link.step()
     reader = VehicleReader(api, "ego", 100.0)
-    asked: list[str] = []
-    original = reader._slope
-
-    def watched(vehicle: str) -> float:
-        asked.append(vehicle)
-        return float(original(vehicle))
-
-    reader._slope = watched
+    asked, slope = list[str](), reader._slope
+    reader._slope = lambda vehicle: asked.append(vehicle) or slope(vehicle)
     subscribed = SubscribedReader(api, "ego", 100.0)
     seen = []
     for _ in range(150):
@@ -113,14 +107,8 @@ def test_a_vehicle_far_away_is_not_asked_again_at_once(link: LibsumoLink) -> Non
     api = begun(link)
     nearness = NearbyVehicles(api, "ego", 100.0)
     nearness.find()
-    asked: list[str] = []
-    original = nearness._position
-
-    def watched(vehicle: str) -> Any:
-        asked.append(vehicle)
-        return original(vehicle)
-
-    nearness._position = watched
+    asked, position = list[str](), nearness._position
+    nearness._position = lambda vehicle: asked.append(vehicle) or position(vehicle)
     link.step()
     ids, _ = nearness.find()
     assert set(ids) <= set(asked)

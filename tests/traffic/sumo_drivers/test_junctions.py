@@ -56,15 +56,7 @@ def cars(tmp_path: Path) -> Cars:
 
 
 class Drive:
-    """A run, and what happened in it.
-
-    Attributes
-    ----------
-    entered : dict
-        When each vehicle entered the junction, and at which speed [s, m/s].
-    hits : list of Collision
-        Collisions.
-    """
+    """A run: collisions, and when and at which speed each vehicle entered the junction [s, m/s]."""
 
     def __init__(self, traffic: Traffic, visibility: float, steps: int = 250, *, each: Callable | None = None) -> None:
         self.entered: dict[str, tuple[float, float]] = {}
@@ -173,34 +165,32 @@ def test_vehicles_on_rails_obey_signals_that_their_drivers_do_not_see(cars: Cars
     assert drive(setup, 8.0, each=show_red).entered == {}
 
 
-def trajectories(api: Api, steps: int, before: Callable[[], None], step: Callable[[], None]) -> list[tuple]:
+def trajectories(api: Api, steps: int, step: Callable[[], None]) -> list[tuple]:
     seen = []
     for _ in range(steps):
-        before()
         step()
         get = api.vehicle
         seen.append(sorted((v, get.getPosition(v), get.getSpeed(v), get.getLaneID(v)) for v in get.getIDList()))
     return seen
 
 
-def busy(cars: Cars, net: str) -> TrafficSetup:
+def busy(cars: Cars) -> TrafficSetup:
     ways = ("WC CE", "SC CN", "EC CS", "NC CW", "SC CW", "WC CS", "EC CW", "NC CS")
     crowd = [vehicle(f"v{n}", ways[n % 8], 40.0 + 90.0 * (n // 8) + 11.0 * (n % 4), 10.0) for n in range(24)]
-    return cars(net, vehicle("ego", "WC CE", 5.0), *crowd)
+    return cars("lights.net.xml", vehicle("ego", "WC CE", 5.0), *crowd)
 
 
-@pytest.mark.parametrize("net", ["priority.net.xml", "lights.net.xml"])
-def test_in_clear_air_every_step_is_that_of_sumo_alone(cars: Cars, net: str) -> None:
-    setup = busy(cars, net)
+def test_in_clear_air_every_step_is_that_of_sumo_alone(cars: Cars) -> None:
+    setup = busy(cars)
     api = load_libsumo()
     traffic = libsumo_traffic(setup)
     traffic.enter_fog(even(CLEAR))
     traffic.start(1)
-    ours = trajectories(api, 200, lambda: None, lambda: traffic.advance(Command()))
+    ours = trajectories(api, 200, lambda: traffic.advance(Command()))
     traffic.close()
     api.start(["sumo", *command_line(setup, 1)])
     api.simulationStep()
-    alone = trajectories(api, 200, lambda: None, api.simulationStep)
+    alone = trajectories(api, 200, api.simulationStep)
     api.close()
     assert ours == alone
 
@@ -208,7 +198,7 @@ def test_in_clear_air_every_step_is_that_of_sumo_alone(cars: Cars, net: str) -> 
 @pytest.fixture
 def started(cars: Cars) -> Iterator[tuple[Api, TrafficSetup]]:
     """A simulation that somebody else has started."""
-    setup = busy(cars, "lights.net.xml")
+    setup = busy(cars)
     api = load_libsumo()
     api.start(["sumo", *command_line(setup, 1)])
     api.simulationStep()
@@ -252,11 +242,11 @@ def test_two_sessions_end_and_every_driver_yields_and_stops_as_before(started: t
 
 
 def test_over_a_connection_drivers_see_what_they_see_in_process(cars: Cars, sumo_process: Callable) -> None:
-    setup = busy(cars, "lights.net.xml")
-    here = drive(setup, 15.0, steps=150)
+    setup = busy(cars)
+    here = drive(setup, 15.0, steps=100)
     with sumo_process(command_line(setup, 1)) as (port, _):
         link = TraciLink("127.0.0.1", port)
-        there = Drive(traci_traffic(setup, link), 15.0, steps=150)
+        there = Drive(traci_traffic(setup, link), 15.0, steps=100)
         link.end()
     assert here.entered
     assert (there.entered, there.hits) == (here.entered, here.hits)

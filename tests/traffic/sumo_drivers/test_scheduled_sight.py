@@ -81,14 +81,8 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
         link.step()
     roster = Roster(api)
     perception = Perception(DriversView(api, FieldAccess(EVEN), DriverSight(10_000.0), roster))
-    asked: list[str] = []
-    original = perception.leader
-
-    def watched(vehicle: str, reach: float) -> Any:
-        asked.append(vehicle)
-        return original(vehicle, reach)
-
-    perception.leader = watched
+    asked, leader = list[str](), perception.leader
+    perception.leader = lambda vehicle, reach: asked.append(vehicle) or leader(vehicle, reach)
     present = 0
     for _ in range(100):
         link.step()

@@ -24,7 +24,7 @@ from fogsim.values import Command, Lamp, SignalColour, TrafficState
 from fogsim.values.command import EgoControl
 from fogsim.values.scene import Instance
 from fogsim.values.traffic import with_pieces
-from tests.traffic.common import DATA, QUIET, configured, driven, even, running
+from tests.traffic.common import DATA, QUIET, configured, driven, even, hits_of, running
 
 CASES = DATA / "sumo_cases"
 RAILS = CASES / "rails.sumocfg"
@@ -182,7 +182,7 @@ def test_who_drives_into_a_train_has_a_collision(tmp_path: Path) -> None:
     scenario = scenario_from_config(alone(tmp_path), "ego", ("renderer=none", "estimators=[]", "fog.visibility_m=500"))
     with running(traffic_setup(scenario)) as traffic:
         snapshots = driven(traffic, 230, Command(control=EgoControl(acceleration=0.0)))
-    hits = [hit for snapshot in snapshots for hit in snapshot.collisions]
+    hits = hits_of(snapshots)
     assert [(hit.collider, hit.victim) for hit in hits] == [("ego", "train")]
     # Its front bumper reaches the side of the train at 10 m/s from 150 m on; their ways are at a right angle.
     assert hits[0].time - 1.0 == pytest.approx((351.6 - 1.42 - 150.0) / 10.0, abs=0.3)
@@ -191,16 +191,8 @@ def test_who_drives_into_a_train_has_a_collision(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("visibility", [500, 15])
 def test_a_car_stops_before_a_closed_crossing_and_sees_the_train_on_it(tmp_path: Path, visibility: int) -> None:
-    settings = (
-        f"fog.visibility_m={visibility}",
-        "duration_s=45",
-        "advice=none",
-        "estimators=[lead_contrast]",
-        "clocks.camera_period_s=0.5",
-        "renderer=cpu",
-        "camera.width=64",
-        "camera.height=48",
-    )
+    drawn = ("renderer=cpu", "camera.width=64", "camera.height=48", "clocks.camera_period_s=0.5")
+    settings = (*drawn, f"fog.visibility_m={visibility}", "duration_s=45", "advice=none", "estimators=[lead_contrast]")
     closed = passed = seen = 0
     for step in fogsim.run(scenario_from_config(alone(tmp_path), "ego", settings), seed=1):
         x, traffic = float(step.traffic.position[step.ego, 0]), step.traffic

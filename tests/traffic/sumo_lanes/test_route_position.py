@@ -3,37 +3,33 @@
 import math
 from dataclasses import replace
 
-import libsumo
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from tests.traffic.common import DATA, SETUP, driven, running
+from tests.traffic.common import DATA, QUIET, SETUP, driven, running
 
 GRID = DATA / "grid" / "grid.sumocfg"
 
 
-def test_gaps_are_those_that_sumo_keeps_to_its_leaders_on_roads_and_junctions() -> None:
-    libsumo.start(["sumo", "-c", str(GRID), "--no-step-log", "true", "--no-warnings", "true"])
-    try:
-        compared = 0
-        for _ in range(120):
-            libsumo.simulationStep()
-            there = libsumo.vehicle.getIDList()
-            for ego in there:
-                leader = libsumo.vehicle.getLeader(ego, 100.0)
-                # Of a vehicle that comes from a side road the gap is known once it is on the ego's.
-                if leader is None or not set(libsumo.vehicle.getRoute(leader[0])) & {libsumo.vehicle.getRoadID(ego)}:
-                    continue
-                gap = max(leader[1] + libsumo.vehicle.getMinGap(ego), 0.0)
-                assert GapToEgo(libsumo, ego).measure(leader[0]) == pytest.approx(gap, abs=0.05)
-                assert GapToEgo(libsumo, leader[0]).measure(ego) == pytest.approx(-gap, abs=0.05)
-                compared += 1
-        assert compared > 50
-    finally:
-        libsumo.close()
+def test_gaps_are_those_that_sumo_keeps_to_its_leaders_on_roads_and_junctions(link: LibsumoLink) -> None:
+    api, compared = link.begin(["-c", str(GRID), *QUIET]), 0
+    get = api.vehicle
+    for _ in range(120):
+        link.step()
+        for ego in get.getIDList():
+            leader = get.getLeader(ego, 100.0)
+            # Of a vehicle that comes from a side road the gap is known once it is on the ego's.
+            if leader is None or get.getRoadID(ego) not in get.getRoute(leader[0]):
+                continue
+            gap = max(leader[1] + get.getMinGap(ego), 0.0)
+            assert GapToEgo(api, ego).measure(leader[0]) == pytest.approx(gap, abs=0.05)
+            assert GapToEgo(api, leader[0]).measure(ego) == pytest.approx(-gap, abs=0.05)
+            compared += 1
+    assert compared > 50
 
 
 def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, read_net, signal_heads
-from fogsim.values import Command, SignalColour, TrafficSnapshot
-from tests.traffic.common import DATA, running, setup_of
+from fogsim.values import SignalColour, TrafficSnapshot
+from tests.traffic.common import DATA, driven, running, setup_of
 
 NET = DATA / "crossing" / "lights.net.xml"
 DEMAND = """<routes>
@@ -27,15 +27,8 @@ DEMAND = """<routes>
 
 def snapshots(folder: Path, steps: int, demand: str = DEMAND) -> list[TrafficSnapshot]:
     setup = replace(setup_of(folder, demand, step=0.5), net=NET)
-    seen = []
     with running(setup, seed=0) as traffic:
-        for _ in range(steps):
-            traffic.advance(Command())
-            snapshot = traffic.observe()
-            if snapshot is None:
-                break
-            seen.append(snapshot)
-    return seen
+        return driven(traffic, steps)
 
 
 def test_persons_in_a_car_that_waits_to_enter_are_left_out(tmp_path: Path) -> None:

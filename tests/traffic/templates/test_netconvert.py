@@ -15,7 +15,7 @@ from fogsim.traffic.templates.net_writer import junctions
 Link = tuple[str, str, str, str]
 TURNS = {"r": 0, "R": 0, "s": 1, "L": 2, "l": 2}
 PLANS = {
-    **{name: ROAD_TEMPLATES[name]().layout((150.0,)).net for name in ("motorway", "curve", "grade", "rural", "ramp")},
+    **{name: ROAD_TEMPLATES[name]().layout((150.0,)).net for name in ("curve", "grade", "rural", "ramp")},
     "crossing": ROAD_TEMPLATES["crossing"]().layout().net,
     "lights": ROAD_TEMPLATES["crossing"](lights=True).layout().net,  # type: ignore[call-arg]
     "roundabout": ROAD_TEMPLATES["roundabout"]().layout().net,

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.vision.strips.joint_fit import agree, fit_jointly, fit_own, strip_bins
+from fogsim.vision.strips.joint_fit import agree, fit_jointly, fit_own
 from fogsim.vision.strips.joint_kernels import mean_transmittance
-from fogsim.vision.strips.joint_start_kernels import fit_constant_albedo
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves, fit_lanes
 
 
@@ -114,12 +113,3 @@ def test_transmittance_has_its_limits():
     assert mean_transmittance(10.0, 0.5, 800.0, 0.0)[0] == 1.0
     assert mean_transmittance(10.0, 0.5, 800.0, 10.0)[0] == pytest.approx(0.0, abs=1e-9)
     assert mean_transmittance(-5.0, 0.5, 800.0, 0.03) == (0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("visibility", [20.0, 100.0, 400.0])
-def test_the_search_starts_near_the_truth(visibility):
-    k = 3.0 / visibility
-    grid = k * np.geomspace(0.25, 4.0, 29)
-    found, airlight = fit_constant_albedo(strip_bins(curves(k, 6), GEOMETRY, PRIOR), grid, PRIOR)
-    assert abs(np.log(found / k)) < 0.3
-    assert airlight == pytest.approx(AIRLIGHT, rel=0.02)

@@ -86,7 +86,7 @@ def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():
     across, height = (COLS - 159.5) / 288.0, (CAMERA.horizon_row - ROWS) / 288.0
     truth, found = np.array([170.0, 12.0, 30.0, -70.0, 60.0]), []
     sky = truth[0] + truth[1] * across + (truth[2] + truth[3] * height) * height - truth[4] * AWAY
-    for seed in range(20):
+    for seed in range(12):
         image = photographed(sky, noise=1.5, seed=seed)
         fit, covariance, seen, _ = sky_shading(image, rows, axis, sky[rows].mean(axis=1), 1.5)
         assert seen > 0.95

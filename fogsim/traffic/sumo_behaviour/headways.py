@@ -27,11 +27,10 @@ class KeepingUp:
         self._sight = sight
         self._keeps_up = np.array([kind.keeps_up for kind in table.kinds])
 
-    def keepers(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Which of some drivers keep up with a leader in the fog where they are (`rows` (n,) int)."""
+    def keepers(self, values: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Which of some drivers keep up with a leader in the fog where they are (`values`: their rows)."""
         if self._sight is None or not self._keeps_up.any():
             return np.empty(0, dtype=np.intp)
-        values = self._table.values[rows]
         in_fog = values[:, Column.VISIBILITY] < UNAFFECTED_ABOVE
         return np.flatnonzero(in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)])
 

@@ -102,10 +102,11 @@ class LeaderSight:
         return facing
 
     def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        """What is known of vehicles (n, 7), where they are and how fast first."""
+        """What is known of vehicles (n, 7): where they are, which does not matter in even fog, how fast, and so on."""
         read = np.empty((len(vehicles), EYE_HEIGHT + 1))
-        flat = itertools.chain.from_iterable(map(self._position, vehicles))
-        read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+        if not self._closing.is_even:
+            flat = itertools.chain.from_iterable(map(self._position, vehicles))
+            read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
         read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
         read[:, MINIMUM_GAP:] = self._vehicles.traits(vehicles)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
         return read
@@ -164,11 +165,11 @@ REACH = 250.0
 _LARGEST_MINIMUM_GAP = 5.0
 """No driver's minimum gap is larger than this [m]."""
 
-_FASTEST_APPROACH = 70.0
-"""Faster than this no gap changes [m/s]: 250 km/h towards a standing vehicle."""
-
 MAX_PAUSE = 0.5
 """Every driver's sight is computed at least this often [s], for leaders change."""
+
+_LONG_WAY = 70.0 * MAX_PAUSE
+"""By more than this no gap changes until then [m]: at 250 km/h towards a standing vehicle."""
 
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
@@ -237,8 +238,6 @@ class Perception:
         )
         # And none farther than this is seen, wherever the fog is thinnest.
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
-        margin = _FASTEST_APPROACH * MAX_PAUSE
-        self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
     def expect_unseen(self, follower: str, leader: str) -> None:
         """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step."""
@@ -264,45 +263,43 @@ class Perception:
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
-        ignored, seen, hidden = self._ignored, self._certainly_seen, self._certainly_hidden
-        ahead = zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=True)
-        pairs = [(follower, *found) for follower, found in ahead if found and found[0]]
-        behind = self._obstructed(pairs)
-        doubtful = [p for p in pairs if p[2] <= hidden and (p[2] > seen or p[0] in ignored) and p[0] not in behind]
-        out_of_sight = [pair for pair in pairs if pair[2] > hidden or pair[0] in behind]
-        near_edge = [
-            (follower, leader, 0.0 if follower in behind else abs(gap - (hidden if gap > hidden else seen)))
-            for follower, leader, gap in pairs
-            if follower in behind
-            or hidden < gap <= self._hidden_for_long
-            or (self._seen_for_long < gap <= seen and follower not in ignored)
-        ]
+        ignored, speed, seen, hidden = self._ignored, self.speed, self._certainly_seen, self._certainly_hidden
+        ahead = list(map(self.leader, due, itertools.repeat(REACH)))
+        behind = self._obstructed(due, ahead)
         # Most vehicles are far from any doubt, and pause for the longest time.
-        waiting = {pair[0] for pair in (*near_edge, *doubtful)}
-        self._due.schedule([follower for follower in due if follower not in waiting], MAX_PAUSE)
-        self._pause_near_edge(near_edge)
-        with_leaders = {pair[0] for pair in pairs}
-        for follower in [v for v in due if v in ignored and v not in with_leaders]:
-            self._reveal(follower)
-        for follower, leader, _ in out_of_sight:
-            self._hide(follower, leader)
+        calm: list[str] = []
+        doubtful: list[_Pair] = []
+        pauses: dict[str, float] = {}
+        for follower, found in zip(due, ahead, strict=True):
+            if not found or not found[0]:
+                calm.append(follower)
+                if follower in ignored:
+                    self._reveal(follower)
+                continue
+            leader, gap = found
+            if gap > hidden or follower in behind:
+                self._hide(follower, leader)
+                near_edge = 0.0 if follower in behind else gap - hidden
+            elif gap > seen or follower in ignored:
+                doubtful.append((follower, leader, gap))
+                continue
+            else:
+                near_edge = seen - gap
+            if near_edge >= _LONG_WAY:
+                calm.append(follower)
+            else:
+                # Until the gap could have changed by so much.
+                pauses[follower] = near_edge / closing_speed_bound(speed(follower), speed(leader), MAX_PAUSE)
+        self._due.schedule(calm, MAX_PAUSE)
+        self._due.schedule_each(tuple(pauses), [min(pause, MAX_PAUSE) for pause in pauses.values()])
         return doubtful
 
-    def _obstructed(self, pairs: Sequence[_Pair]) -> Collection[str]:
+    def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""
         if self._hidden_vehicles is None:
             return ()
-        hidden = self._hidden_vehicles.are_hidden([pair[:2] for pair in pairs])
-        return {pair[0] for pair, is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
-
-    def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
-        """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
-        if waiting:
-            followers, leaders, distances = zip(*waiting, strict=True)
-            flat = map(self.speed, followers + leaders)
-            speed = np.fromiter(flat, np.float64, 2 * len(waiting)).reshape(2, -1)
-            pauses = np.minimum(distances / closing_speed_bound(speed[0], speed[1], MAX_PAUSE), MAX_PAUSE)
-            self._due.schedule_each(followers, pauses.tolist())
+        pairs = [(v, found[0]) for v, found in zip(followers, ahead, strict=True) if found and found[0]]
+        return {v for (v, _), hidden in zip(pairs, self._hidden_vehicles.are_hidden(pairs), strict=True) if hidden}
 
     def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
@@ -314,8 +311,9 @@ class Perception:
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
         followers = [pair[0] for pair in pairs]
-        waits = [0.0 if follower in emerging else pause for follower, pause in zip(followers, pauses, strict=True)]
-        self._due.schedule_each(followers, waits)
+        if emerging:
+            pauses = [0.0 if v in emerging else pause for v, pause in zip(followers, pauses, strict=True)]
+        self._due.schedule_each(followers, pauses)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

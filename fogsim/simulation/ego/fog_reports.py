@@ -111,6 +111,8 @@ class FogReports:
         """Let sensors next to the road measure; return all reports that have arrived by now."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
+        if not self._under_way:
+            return ()
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)
         self._under_way = [(due, report) for due, report in self._under_way if due > time + 1e-9]
         return arrived

@@ -32,7 +32,8 @@ class KeepingUp:
         if self._sight is None or not self._keeps_up.any():
             return np.empty(0, dtype=np.intp)
         in_fog = values[:, Column.VISIBILITY] < UNAFFECTED_ABOVE
-        return np.flatnonzero(in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)])
+        keeps_up: NDArray[np.bool_] = in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)]
+        return keeps_up.nonzero()[0]
 
     def kept_speeds(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen (`rows` (n,) int)."""
@@ -73,7 +74,7 @@ class HeadwayControl:
         due = (in_fog & ~(unchanged & self._is_near(values, kinds))) | (
             ~in_fog & (values[:, Column.HEADWAY_SET] != values[:, Column.HEADWAY])
         )
-        for i in np.flatnonzero(due).tolist():
+        for i in due.nonzero()[0].tolist():
             own = float(values[i, Column.HEADWAY])
             wanted = self._wanted(vehicles[i], values[i]) if in_fog[i] else own
             if abs(wanted - values[i, Column.HEADWAY_SET]) > _UNNOTICED_RATIO * own or wanted == own:

@@ -45,7 +45,7 @@ class _FogChoices:
     def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:
         """Choose where the fog is another than at the last choice (`rows` (n,) int, `extinction` (n,) [1/m])."""
         table = self._table
-        changed = np.flatnonzero(extinction != table.values[rows, Column.EXTINCTION])
+        changed = (extinction != table.values[rows, Column.EXTINCTION]).nonzero()[0]
         if not len(changed):
             return
         of, here = rows[changed], extinction[changed].tolist()
@@ -321,7 +321,7 @@ class SumoDesiredSpeeds:
         speeds: Mapping[str, float],
     ) -> list[int]:
         """Which of some vehicles an advice reaches, which is remembered: who is there, and gets what is said there."""
-        gets = np.flatnonzero(values[:, Column.REACHED_FROM] < compliance.reached_share).tolist()
+        gets = (values[:, Column.REACHED_FROM] < compliance.reached_share).nonzero()[0].tolist()
         reached = [i for i in gets if ids[i] in speeds]
         for vehicle in (ids[i] for i in reached):
             self._heard[vehicle] = min(speeds[vehicle], self._heard.get(vehicle, math.inf))

@@ -12,7 +12,6 @@ is new (one of the two has changed lane, or somebody came within `REACH`) is not
 looked for in each step.
 """
 
-import functools
 import itertools
 from collections.abc import Collection, Sequence
 from types import MappingProxyType
@@ -59,6 +58,13 @@ _FASTEST_DRIFT = 30.0
 _STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
 
+_SIGNALS = 127
+"""Bits of SUMO's vehicle signals that stand for lamps."""
+
+_LIT = [int(OTHERS_LAMPS) | lamps_from_signals(signals) for signals in range(_SIGNALS + 1)]
+_REAR_LIGHTS = np.array([[rear_intensity(lit | soon) for lit in _LIT] for soon in (0, int(Lamp.STOP))])
+"""Luminous intensity of the brightest rear lamp that signals light, and that may soon be lit (2, n) [cd]."""
+
 _Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
 
@@ -86,7 +92,7 @@ class LeaderSight:
         if own_lamps and self._most_glare > 0.0:
             self._doubt_own_beams(judged, pauses, pairs, own_lamps)
         seen: list[bool] = (judged == SEEN).tolist()
-        for i in np.flatnonzero(judged == DAZZLED).tolist() if self._most_glare > 0.0 else ():
+        for i in (judged == DAZZLED).nonzero()[0].tolist() if self._most_glare > 0.0 else ():
             seen[i] = self._is_seen(pairs[i], facing[:, i], own_lamps)
         return seen, pauses.tolist()
 
@@ -98,18 +104,20 @@ class LeaderSight:
         known = self._extinction
         facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
         facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
-        facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
+        facing[INTENSITY : BRIGHTEST + 1] = _REAR_LIGHTS[:, [lit & _SIGNALS for lit in map(self._signals, leaders)]]
         return facing
 
     def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         """What is known of vehicles (n, 7): where they are, which does not matter in even fog, how fast, and so on."""
-        read = np.empty((len(vehicles), EYE_HEIGHT + 1))
+        # Mostly who leads one follows another.
+        rows = {vehicle: row for row, vehicle in enumerate(dict.fromkeys(vehicles))}
+        read = np.empty((len(rows), EYE_HEIGHT + 1))
         if not self._closing.is_even:
-            flat = itertools.chain.from_iterable(map(self._position, vehicles))
-            read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
-        read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        read[:, MINIMUM_GAP:] = self._vehicles.traits(vehicles)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
-        return read
+            flat = itertools.chain.from_iterable(map(self._position, rows))
+            read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(rows)).reshape(-1, 3)
+        read[:, SPEED] = np.fromiter(map(self._speed, rows), np.float64, len(rows))
+        read[:, MINIMUM_GAP:] = self._vehicles.traits(rows)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
+        return read[[rows[vehicle] for vehicle in vehicles]]
 
     @staticmethod
     def _doubt_own_beams(
@@ -150,13 +158,6 @@ class LeaderSight:
             return self._extinction
         x, y, z = self._position(vehicle)
         return float(self._fog.extinction((x, y, z + self._vehicles.body(vehicle).eye_height)))
-
-
-@functools.lru_cache(maxsize=1024)
-def _rear_light(signals: int) -> tuple[float, float]:
-    """Luminous intensity of the brightest rear lamp that SUMO's signals light, and that may soon be lit [cd]."""
-    lit = int(OTHERS_LAMPS) | lamps_from_signals(signals)
-    return rear_intensity(lit), rear_intensity(lit | int(Lamp.STOP))
 
 
 REACH = 250.0

@@ -221,7 +221,7 @@ class VehicleSight:
         lines = self.lines_of_sight(pairs)
         distance = lines[:, LINE]
         seen = distance <= self._seen_through_fog
-        doubtful = np.flatnonzero(~seen & (distance <= _FARTHEST))
+        doubtful = (~seen & (distance <= _FARTHEST)).nonzero()[0]
         if len(doubtful):
             seen[doubtful] = self._are_seen([pairs[i] for i in doubtful.tolist()], lines[doubtful], own_lamps)
         if self._hidden_vehicles is not None:
@@ -274,7 +274,7 @@ class VehicleSight:
         dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)}
         if dazzling:
             seen &= [observer not in dazzling for observer, _ in pairs]
-        doubtful = np.flatnonzero(~seen)
+        doubtful = (~seen).nonzero()[0]
         if len(doubtful):
             looks, vehicles, rows = np.take(looks, doubtful, axis=1), self._vehicles, doubtful.tolist()
             for n, (row, line) in enumerate(zip(rows, lines[doubtful].tolist(), strict=True)):

@@ -147,6 +147,7 @@ class DayVerdict:
     response_deviation: float
     is_road: bool = True  # Whether a road is likelier than none
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
+    farthest: float = math.inf  # Depth of the farthest rows that were read [m]
 
     @property
     def is_clear(self) -> bool:
@@ -166,7 +167,8 @@ class DayVerdict:
     @property
     def reach(self) -> float:
         """Distance up to which it speaks of the fog [m]."""
-        return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
+        middle = math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
+        return min(middle, self.farthest)
 
 
 def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdict:
@@ -203,6 +205,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
         is_road=is_road,
         free=fit.free,
+        farthest=fit.farthest,
     )
 
 

@@ -127,6 +127,12 @@ def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):
     assert found.visibility_interval[1] == math.inf
 
 
+def test_clear_air_is_reported_only_as_far_as_road_was_read(said):
+    found, _ = said(Estimate.invalid("joint_road", "too dark"), replace(CLEAR, farthest=110.0))
+    assert found.valid
+    assert found.reach == 110.0
+
+
 def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch):
     looks = []
     monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from fogsim.openscenario.environment import environment_of
-from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
+from fogsim.openscenario.lateral import SHAPES, STEEPEST, Effect, LateralActions
 from fogsim.openscenario.positions import from_there_on
 from fogsim.openscenario.shapes import Place, positions_of, sampled, shape_of
 from fogsim.openscenario.triggers import NEAR
@@ -158,7 +158,8 @@ class Actions(LateralActions):
             raise NodeError(dynamics, "dynamicsDimension: speeds change by time or rate")
         if by == "time":
             effect.lasts = max(effect.lasts, value)
-        pace = {"over_s" if by == "time" else "rate_mps2": value} if by else {}
+        # A rate is the greatest, and FogSim's the mean one.
+        pace = {"time": {"over_s": value}, "rate": {"rate_mps2": value / STEEPEST.get(shape, 1.0)}}.get(by, {})
         return {"shape": SHAPES[shape], **pace}
 
     def light_state_action(self, action: Node, actor: str, effect: Effect) -> None:
@@ -263,8 +264,9 @@ class Actions(LateralActions):
         if timing:
             scale, offset = timing.number("scale"), timing.number("offset")
             base = timing.word("domainAbsoluteRelative", ("absolute", "relative"))
-            if base == "absolute" and not effect.is_at_start:
-                raise ValueError("domainAbsoluteRelative: in a story, times count from the beginning of the action")
+            if base == "absolute" and not (effect.is_at_start or id(action) in self.positions.at_once):
+                message = "in a story, times count from the beginning of the action; write relative"
+                raise ValueError(f"domainAbsoluteRelative: {message}")
             path["at_s"] = [scale * time + offset for time in times]
             effect.lasts = max(effect.lasts, path["at_s"][-1])
         else:

@@ -147,6 +147,7 @@ def _size(node: Node) -> tuple[float, float, float, float]:
 
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+_OKTAS = tuple(f"{one}Oktas" for one in _CLOUDS)
 _OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}  # In 1.0
 _USUAL_LATITUDE = math.radians(50.0)  # If a map gives none [rad]
 _BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear_sky_illuminance`
@@ -220,12 +221,10 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> flo
 
 
 def _oktas(weather: Node) -> float:
-    word, old = weather.get("fractionalCloudCover"), weather.get("cloudState")
-    if word.removesuffix("Oktas") in _CLOUDS:
-        return min(float(_CLOUDS.index(word.removesuffix("Oktas"))), 8.0)
-    if old not in _OLD_CLOUDS and (word or old):
-        weather.refuse(f"unknown cloud cover {word or old!r}")
-    return _OLD_CLOUDS.get(old, 0.0)
+    old = weather.word("cloudState", tuple(_OLD_CLOUDS), "free")
+    if not weather.get("fractionalCloudCover"):
+        return _OLD_CLOUDS[old]
+    return min(float(_OKTAS.index(weather.word("fractionalCloudCover", _OKTAS))), 8.0)
 
 
 def _elevation(time: Node, lanes: OpenDriveLanes) -> float | None:

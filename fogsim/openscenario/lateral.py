@@ -11,7 +11,7 @@ from fogsim.traffic.road.opendrive_lanes import Spot
 
 # Shapes of dynamics, and the nearest one in FogSim
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
-_STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
+STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 MOTION = {"speed", "follow", "arrive"}  # Keys of blocks that order a speed
 _TINY = 1e-9  # Lateral acceleration that is none [m/s²]
@@ -97,7 +97,7 @@ class LateralActions:
         begins = self._begin(actor)
         lanes = self._lanes(to, actor, begins)
         if by == "rate":
-            value = _STEEPEST[shape] * self._across(to, lanes, begins) / (value or 1.0)
+            value = STEEPEST[shape] * self._across(to, lanes, begins) / (value or 1.0)
         pace = {"distance_m": value} if by == "distance" else {"duration_s": _allowed(value)}
         effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
         effect.ends_itself = by == "distance"
@@ -141,7 +141,7 @@ class LateralActions:
             shape, by, value = self.dynamics(dynamics) or ("step", "time", 0.0)
             if by == "distance":
                 raise ValueError(f"dynamicsDimension: {actor} drives against its lane; give a time or rate")
-            lasts = value if by == "time" else _STEEPEST[shape] * abs(across) / (value or 1.0)
+            lasts = value if by == "time" else STEEPEST[shape] * abs(across) / (value or 1.0)
         else:
             lasts = self._offset_time(dynamics, abs(across - self.offsets.get(actor, 0.0)))
             effect.is_endless |= action.flag("continuous")

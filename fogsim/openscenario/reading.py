@@ -32,6 +32,7 @@ _USUAL_DURATION = 120.0  # Longest simulated time of a file without a stop trigg
 _LONGEST = 3600.0  # The same of one whose stop trigger is more than a time [s]
 _NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
+_CONTROLLERS = ("ObjectController", "AssignControllerAction", "ActivateControllerAction")
 _FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
 """Attributes of drivers who change lane where their route needs it, and for nothing else."""
 
@@ -132,6 +133,10 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
     if begin.environment.box and not fog["banks"]:
         root.remark("the BoundingBox of the fog lies next to the ego's route: the air is clear there")
+    if ego not in {*begin.orders, *begin.aims} and any(one.tag in _CONTROLLERS for one in root.walk()):
+        positions.vehicles[ego].node.remark(
+            f"{ego} has no SpeedAction in Init: it stands until the storyboard orders a speed"
+        )
     description = root.need("FileHeader").get("description")
     root.check_read()
     root.findings.close(root.file)

@@ -90,9 +90,13 @@ class Storyboard:
             actors = group.all("Actors")
             names = self.actions.vehicles.selected(one for block in actors for one in block.all("EntityRef"))
             for event in (one for one in group.walk() if one.tag == "Event"):
-                actions = [one for one in event.walk() if one.tag == "LongitudinalDistanceAction"]
-                is_at_once = all(map(self._begins_at_once, (group.above, event)))
-                for action in actions if is_at_once else ():
+                if not all(map(self._begins_at_once, (group.above, event))):
+                    continue
+                # Times of trajectories that begin with the run are those of the run.
+                self.actions.positions.at_once |= {
+                    id(one) for one in event.walk() if one.tag == "FollowTrajectoryAction"
+                }
+                for action in (one for one in event.walk() if one.tag == "LongitudinalDistanceAction"):
                     if action.one("DynamicConstraints") is None and not action.flag("continuous"):
                         found += [(name, action) for name in names]
                         self.actions.positions.at_once.add(id(action))

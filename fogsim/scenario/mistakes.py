@@ -11,7 +11,7 @@ from fogsim.errors import nearest, printable, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
-from fogsim.units.quantities import UNIT_OF_SUFFIX, split_quantity
+from fogsim.units.quantities import UNIT_OF_SUFFIX, example_of, split_quantity
 
 _MOST_LISTED = 50
 """Maximum number of mistakes that are listed one by one."""
@@ -108,7 +108,7 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
     match detail["type"]:
         case "extra_forbidden":
             known = [*_keys_of(one.models), *(beside if len(one.path) == 1 else ())]
-            return f"unknown key; {suggest(str(one.path[-1]), known)}"
+            return _unknown_key(str(one.path[-1]), known, detail["input"])
         case "union_tag_invalid":
             allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
             key, tag = one.path[-1], str(context["tag"])
@@ -124,6 +124,15 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
         # A message about a whole block names its values itself.
         return f"{message}; got a block of keys" if detail["type"].endswith("_type") else message
     return f"{message}; got {shown(value)}{_plain_number(one.path, value)}"
+
+
+def _unknown_key(key: str, known: Sequence[str], value: object) -> str:
+    """A key that is not known, or that lacks its unit."""
+    units = [(full, unit) for suffix, unit in UNIT_OF_SUFFIX.items() if (full := f"{key}_{suffix}") in known]
+    if not units or isinstance(value, dict):
+        return f"unknown key; {suggest(key, known)}"
+    full, unit = units[0]
+    return f"expected a value with its unit such as {example_of(unit)!r}, or {full}; got {shown(value)}"
 
 
 def _plain_number(path: KeyPath, value: object) -> str:

@@ -356,7 +356,7 @@ class ClosedLoop:
 
     def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
         time, ending = self._periods.time(index), self._ending(index, snapshot)
-        sent = () if self._step is None else camera_messages(self._step)
+        sent = () if self._step is None or self._config.reports.cameras is None else camera_messages(self._step)
         sent += self._equipment.look_from_roadside(time, snapshot.state)
         self._fleet.ask(index, time, snapshot, sent)
         step = self._equipment.complete_step(index, time, snapshot, command, ending, sent)

@@ -198,7 +198,7 @@ class TrafficRun:
 
     def _truth(self, snapshot: NetworkSnapshot, time: float) -> Truth:
         fog = field_at(self._fog_now, time)
-        metered = fog if self._sees_patches else dataclasses.replace(fog, patches=None)
+        metered = fog if self._sees_patches or fog.patches is None else dataclasses.replace(fog, patches=None)
         measured = float(extinction(metered, self._meters).max())
         seen = extinction(fog, snapshot.state.position + EYES)
         self._section_meters.hear(self._reporters.heard_from_roadside(time, fog))

@@ -263,20 +263,23 @@ class SumoTraffic:
         return refused
 
     def _elapsed(self, run: _Run) -> float:
-        """Time since the ego appeared [s]."""
-        return float(run.api.simulation.getTime()) - self._begun
+        """Time since the ego appeared [s], by a roster that is up to date."""
+        return run.roster.time - self._begun
 
     @_translates_errors
     def advance(self, command: Command) -> None:
         """Move by one traffic step; see `Traffic.advance`."""
-        self.obey(command)
+        run = self._running
+        self._obey(run, command)
         self._link.step()
-        self.look()
+        self._read_step(run)
 
     @_translates_errors
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step of a simulation that another program steps."""
-        run = self._running
+        self._obey(self._running, command)
+
+    def _obey(self, run: _Run, command: Command) -> None:
         self._command = command
         orders = self._play_script(run, command)
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:

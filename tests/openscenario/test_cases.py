@@ -13,7 +13,7 @@ import fogsim
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.scenario import Scenario
-from tests.openscenario.writing import CASES, DATA, QUIET, changed, motion, run, speed_of
+from tests.openscenario.writing import CAR, CASES, DATA, QUIET, changed, lane, motion, run, speed_of, write
 
 
 def _changed(tmp_path: Path, name: str, *texts: tuple[str, str]) -> Path:
@@ -135,6 +135,26 @@ def test_an_intensity_up_to_1_by_day_is_a_share_of_the_sky(tmp_path: Path, inten
     ):
         scenario = fogsim.load_scenario(file, QUIET)
     assert scenario.light.illuminance_lx == pytest.approx(lux, rel=1e-3)
+
+
+def test_an_unknown_cloud_cover_is_refused_with_those_that_there_are(tmp_path: Path) -> None:
+    for new, message in [
+        (
+            'fractionalCloudCover="0.5"',
+            "Weather: fractionalCloudCover: FogSim has no '0.5' here; known: zeroOktas, oneOk",
+        ),
+        ('cloudState="foggy"', "Weather: cloudState: FogSim has no 'foggy' here; known: free, cloudy, overcast, rainy"),
+    ]:
+        with pytest.raises(InputError, match=re.escape(message)):
+            _loaded(_changed(tmp_path, "stop_with_two_delays", ('fractionalCloudCover="eightOktas"', new)))
+
+
+def test_an_ego_that_only_a_controller_would_move_stands_with_a_warning(tmp_path: Path) -> None:
+    controller = '<AssignControllerAction><Controller name="c"><Properties/></Controller></AssignControllerAction>'
+    begin = {"Ego": f"{lane(30)}\n<PrivateAction><ControllerAction>{controller}</ControllerAction></PrivateAction>"}
+    message = r"Ego has no SpeedAction in Init: it stands until the storyboard orders a speed"
+    with pytest.warns(LeftOutWarning, match=message):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, begin, {}))
 
 
 def test_files_of_carla_have_their_own_axes(tmp_path: Path) -> None:

@@ -252,6 +252,12 @@ def test_what_cannot_be_followed_is_refused(tmp_path: Path) -> None:
             read_openscenario(file)
 
 
+def test_times_of_a_trajectory_that_begins_with_the_run_are_those_of_the_run(tmp_path: Path) -> None:
+    action = _follows((0, world(33.7, -1.75)), (4, world(73.7, -1.75))).replace('"relative"', '"absolute"')
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, {"Ego": event("e", action, after(0.0))})
+    assert read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["path"]["at_s"] == [0.0, 4.0]
+
+
 def test_what_waits_for_an_unknown_end_is_refused_and_for_none_never_comes(tmp_path: Path) -> None:
     here = '<Position><RelativeObjectPosition entityRef="Ego" dx="{}" dy="0"/></Position>'
     line = _follows((None, here.format(0)), (None, here.format(30)), reference="<None/>")

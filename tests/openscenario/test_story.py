@@ -103,6 +103,13 @@ def test_what_happens_at_once_needs_no_dimension_and_what_takes_time_does(tmp_pa
         read_openscenario(file)
 
 
+@pytest.mark.parametrize(("shape", "lasts"), [("linear", 4.0), ("sinusoidal", 2.0 * math.pi), ("cubic", 6.0)])
+def test_a_rate_is_the_greatest_acceleration(tmp_path: Path, shape: str, lasts: float) -> None:
+    slows = event("slows", speed(4, RATE.replace("linear", shape)), after(1.0))
+    done = read_openscenario(_two_cars(tmp_path, slows, after(9.0))).data["timeline"][-1]["do"]["Lead"]["speed"]
+    assert (20.0 - 4.0) / done["rate_mps2"] == pytest.approx(lasts)
+
+
 def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
     never = event("never", speed(2, linear(0, "rate")), after(1.0))
     steps = run(_two_cars(tmp_path, never, after(3.0), at=10.0))

@@ -42,6 +42,10 @@ def test_what_is_refused(written):
     for fog, told in [
         ("{visibility: 150 s}", r"u\.yaml:4: fog\.visibility: the unit 's' does not fit"),
         ("\n  visibility: 10 cm", r"u\.yaml:5: fog\.visibility_m: .*; got 0\.1"),
+        (
+            "{visibility: 150}",
+            r"fog\.visibility: expected a value with its unit such as '10 m', or visibility_m; got 150",
+        ),
         ("{visibility: 150 m, visibility_m: 150}", r"fog\.visibility: the key visibility_m is given too"),
     ]:
         with pytest.raises(InputError, match=told):

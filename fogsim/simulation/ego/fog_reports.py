@@ -56,12 +56,14 @@ class Beats:
 
     def __init__(self, draw: int) -> None:
         self._draw = draw
+        self._phases: dict[str, float] = {}
         self._numbers: dict[str, int] = {}
 
     def is_due(self, name: str, period: float, time: float) -> bool:
         """Whether a sender is to report again; its report is then the next one."""
-        phase = zlib.crc32(f"{name} {self._draw}".encode()) / 2**32
-        number = math.floor(time / period + phase)
+        if name not in self._phases:
+            self._phases[name] = zlib.crc32(f"{name} {self._draw}".encode()) / 2**32
+        number = math.floor(time / period + self._phases[name])
         if self._numbers.get(name) == number:
             return False
         self._numbers[name] = number
@@ -78,8 +80,10 @@ class FogReports:
     def __init__(self, senders: ReportsConfig, route: Floats) -> None:
         self._roadside, self._vehicles, self._cameras = senders.roadside, senders.vehicles, senders.cameras
         self._route, self._places = route, RoutePlaces(route)
+        self._sensors: Floats = np.zeros(0)
         if senders.roadside is not None:
-            sensor_places(senders.roadside, float(self._places.stations[-1]))
+            self._sensors = sensor_places(senders.roadside, float(self._places.stations[-1]))
+        self._names = [f"{SENSOR} {i}" for i in range(len(self._sensors))]
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -107,22 +111,24 @@ class FogReports:
         """Let sensors next to the road measure; return all reports that have arrived by now."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
+        if not self._under_way:
+            return ()
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)
         self._under_way = [(due, report) for due, report in self._under_way if due > time + 1e-9]
         return arrived
 
     def _measure_roadside(self, sensors: RoadsideSender, time: float, fog: FogField) -> None:
-        places = sensor_places(sensors, self._places.stations[-1])
-        due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period, time)]
+        due = [i for i, name in enumerate(self._names) if self._beats.is_due(name, sensors.period, time)]
         if not due:
             return
         # A run begins with the sensors' earlier reports, made in the fog of that moment.
         time = time if self._has_begun else time - sensors.delay
         self._has_begun = True
-        points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
+        places = self._sensors[due]
+        points = np.stack([np.interp(places, self._places.stations, axis) for axis in self._route.T], axis=1)
         measured = extinction(fog, points + np.array([0.0, 0.0, _METER_HEIGHT]))
-        for i, k in zip(due, measured.tolist(), strict=True):
-            self._send(f"{SENSOR} {i}", float(places[i]), k, sensors, time)
+        for i, place, k in zip(due, places.tolist(), measured.tolist(), strict=True):
+            self._send(self._names[i], place, k, sensors, time)
 
     def _measure_vehicles(self, radio: RadioSender, time: float, state: TrafficState, ego: int, fog: FogField) -> None:
         for row, place in self._senders(radio, state, ego):

@@ -2,8 +2,10 @@
 
 import math
 from collections import deque
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.camera import Pixels
 from fogsim.values import Frame, LeadMeasurement
@@ -52,17 +54,19 @@ def why_useless(frame: Frame, time: float) -> str:
     """Say why a frame, news or not, does not show the road of now; empty if it may (`time` [s])."""
     if time - frame.time > _LATEST:
         return f"the frame is {time - frame.time:.2f} s late"
-    dark, bright = _dark_and_bright(frame.image[::_APART, ::_APART])
+    levels = np.sort(frame.image[::_APART, ::_APART], axis=None)
+    dark, bright = _quantile(levels, 0.01), _quantile(levels, 0.99)
     if bright - dark < _LEAST_CONTRAST * (2**frame.camera.bits - 1):
         return f"the picture shows nothing: {dark:.0f} … {bright:.0f} grey levels"
     return ""
 
 
-def _dark_and_bright(image: Pixels) -> tuple[float, float]:
-    """Quantiles of 1 and 99 % of an image's values, as `numpy.quantile` interpolates but in a tenth of its time."""
-    levels = np.sort(image, axis=None).astype(np.float64)
-    dark, bright = np.interp(np.array([0.01, 0.99]) * (levels.size - 1), np.arange(levels.size), levels)
-    return float(dark), float(bright)
+def _quantile(levels: NDArray[Any], share: float) -> float:
+    """Quantile of sorted values, as `numpy.quantile` interpolates but in a tenth of its time."""
+    place = share * (levels.size - 1)
+    below = int(place)
+    low, high = float(levels[below]), float(levels[min(below + 1, levels.size - 1)])
+    return low + (place - below) * (high - low)
 
 
 class LeadHistory:

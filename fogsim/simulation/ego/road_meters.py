@@ -22,28 +22,28 @@ class RoadMeters:
         self._stretches = road_sections(sections, float(stations(route)[-1]))
         self._places = meter_places(sections, self._stretches, route)
         self._limits = section_limits(self._stretches, route, limits)
-        self._along = [stretch.start for stretch in self._stretches]
-        self._reported: dict[str, tuple[float, float]] = {}
+        self.reset()
 
     def reset(self) -> None:
         """Begin a run, in which no sensor has reported anything."""
-        self._reported = {}
+        self._reported: dict[str, tuple[float, float]] = {}
+        self._nearest: list[float | None] = [None] * len(self._stretches)
 
     def hear(self, reports: Iterable[FogReport]) -> None:
         """Let sensors next to the road report."""
         # Later ones come later: all are on their way for the same time.
-        self._reported.update((one.source, (one.place, one.extinction)) for one in reports if is_of_sensor(one))
+        if new := {one.source: (one.place, one.extinction) for one in reports if is_of_sensor(one)}:
+            self._reported.update(new)
+            self._nearest = [self._reported_near(stretch.start) for stretch in self._stretches]
 
     def measure(self, fog: FogField) -> tuple[RoadSection, ...]:
         """What they measure, in the direction of travel."""
         if not self._stretches:
             return ()
-        measured, reported = extinction(fog, self._places).tolist(), [self._nearest(at) for at in self._along]
-        sections = zip(self._stretches, measured, self._limits, reported, strict=True)
+        measured = extinction(fog, self._places).tolist()
+        sections = zip(self._stretches, measured, self._limits, self._nearest, strict=True)
         return tuple(itertools.starmap(RoadSection, sections))
 
-    def _nearest(self, place: float) -> float | None:
+    def _reported_near(self, place: float) -> float:
         """What has been reported last by the sensor whose report is of the place nearest to one on the route [1/m]."""
-        if not self._reported:
-            return None
         return min(self._reported.values(), key=lambda one: abs(one[0] - place))[1]

@@ -62,7 +62,7 @@ def face_leaders(
     facing: NDArray[np.float64],
     lines: NDArray[np.float64],
 ) -> None:
-    """Put down where leaders are, how fast that changes, and the lines on which drivers look at them.
+    """Put down where leaders are, how fast that changes, and in uneven fog the lines on which drivers look at them.
 
     Takes `vehicles` (2n, 7), all followers before their leaders, `gaps` (n,) [m], `facing` (10, n), `lines` (2, n, 3)
     [m].
@@ -75,6 +75,8 @@ def face_leaders(
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
         facing[_DEEPENING, i] = closing.extinction * (facing[_CLOSING, i] if closing.is_even else apart)
+        if closing.is_even:
+            continue
         x, y, z = other[_X] - own[_X], other[_Y] - own[_Y], other[Z] - own[Z]
         height = own[EYE_HEIGHT]
         z += min(height, BODY_MIDDLE) - height
@@ -182,9 +184,9 @@ def judge_leaders(
 def draw_lines_of_sight(
     observers: NDArray[np.float64], parts: NDArray[np.float64], ends: NDArray[np.int64], lines: NDArray[np.float64]
 ) -> None:
-    """Write to `lines` (n, 10) the straight lines from observers' eyes to the nearest part of what they look at.
+    """Write to `lines` (n, 11) the straight lines from observers' eyes to the nearest part of what they look at.
 
-    Takes `observers` (n, 5), where front bumpers are [m], headings [rad] and heights of eyes [m], and all straight
+    Takes `observers` (n, 7), where front bumpers are [m], headings [rad] and heights of eyes [m], and all straight
     `parts` (m, 7) of bodies, of whom each observer's end before `ends` (n,): where their front ends are [m], headings
     [rad], how far behind the front bumper they begin, lengths and widths [m].
     """

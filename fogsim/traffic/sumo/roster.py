@@ -59,6 +59,7 @@ class Roster:
         self._step = float(api.simulation.getDeltaT())
         self._checked = 0.0
         self._entered: list[str] = []
+        self._entries = 0
         self.present: set[str] = set()
         self.teleported: Sequence[str] = ()
         self.removals = 0
@@ -113,6 +114,7 @@ class Roster:
         if vehicles:
             new = [v for v in vehicles if v not in self.present]
             self._entered += new
+            self._entries += len(new)
             self.present.update(new)
 
     def _leave(self, vehicles: Collection[str]) -> None:
@@ -122,8 +124,7 @@ class Roster:
 
     def entered_since(self, since: int) -> tuple[list[str], int]:
         """Vehicles that have entered since an earlier call, and the mark to give to the next call."""
-        entered = self._entered
-        return (entered[since:], len(entered)) if since < len(entered) else ([], since)
+        return (self._entered[since:], self._entries) if since < self._entries else ([], since)
 
 
 MAX_RELATIVE_ACCELERATION = 20.0
@@ -170,23 +171,22 @@ class UpdateSchedule:
 
     def add(self, vehicles: Sequence[str], time: float) -> None:
         """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
-        if vehicles:
-            self._due[self._slots([time])[0]] += vehicles
+        self._due_at(time).extend(vehicles)
 
     def add_each(self, vehicles: Sequence[str], times: Iterable[float]) -> None:
         """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
-        due = self._due
-        for vehicle, slot in zip(vehicles, self._slots(times), strict=True):
-            due[slot] += (vehicle,)
+        # Mostly many wait for the same time.
+        due: dict[float, list[str]] = {}
+        for vehicle, time in zip(vehicles, times, strict=True):
+            if time not in due:
+                due[time] = self._due_at(time)
+            due[time].append(vehicle)
 
-    def _slots(self, times: Iterable[float]) -> list[float]:
-        """Numbers of the steps in which who waits until a time is due."""
-        step, batch, following = self._step, self._batch, self._current + 1
-        # As in `_number`, without a call for each vehicle.
-        numbers = [
-            number if number > following else following for number in [(t / step + _ROUNDING) // 1.0 for t in times]
-        ]
-        return [number - number % batch if number - following >= batch - 1 else number for number in numbers]
+    def _due_at(self, time: float) -> list[str]:
+        """Those who wait with who waits until a time."""
+        following, batch = self._current + 1, self._batch
+        number = max(self._number(time), following)
+        return self._due[number - number % batch if number - following >= batch - 1 else number]
 
     def bring_forward(self, vehicle: str) -> None:
         """Make a vehicle that waits due in the next step; one that waits for nothing stays so."""
@@ -243,7 +243,8 @@ class DueVehicles:
 
     def schedule(self, vehicles: Sequence[str], pause: float) -> None:
         """Schedule vehicles that have been taken out (`pause` [s])."""
-        self._schedule.add(vehicles, self._roster.time + pause)
+        if vehicles:
+            self._schedule.add(vehicles, self._roster.time + pause)
 
     def schedule_each(self, vehicles: Sequence[str], pauses: Iterable[float]) -> None:
         """Schedule vehicles that have been taken out, each for a pause of its own (`pauses` [s])."""

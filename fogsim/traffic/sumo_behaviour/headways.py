@@ -27,13 +27,13 @@ class KeepingUp:
         self._sight = sight
         self._keeps_up = np.array([kind.keeps_up for kind in table.kinds])
 
-    def keepers(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Which of some drivers keep up with a leader in the fog where they are (`rows` (n,) int)."""
+    def keepers(self, values: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Which of some drivers keep up with a leader in the fog where they are (`values`: their rows)."""
         if self._sight is None or not self._keeps_up.any():
             return np.empty(0, dtype=np.intp)
-        values = self._table.values[rows]
         in_fog = values[:, Column.VISIBILITY] < UNAFFECTED_ABOVE
-        return np.flatnonzero(in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)])
+        keeps_up: NDArray[np.bool_] = in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)]
+        return keeps_up.nonzero()[0]
 
     def kept_speeds(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen (`rows` (n,) int)."""
@@ -74,7 +74,7 @@ class HeadwayControl:
         due = (in_fog & ~(unchanged & self._is_near(values, kinds))) | (
             ~in_fog & (values[:, Column.HEADWAY_SET] != values[:, Column.HEADWAY])
         )
-        for i in np.flatnonzero(due).tolist():
+        for i in due.nonzero()[0].tolist():
             own = float(values[i, Column.HEADWAY])
             wanted = self._wanted(vehicles[i], values[i]) if in_fog[i] else own
             if abs(wanted - values[i, Column.HEADWAY_SET]) > _UNNOTICED_RATIO * own or wanted == own:

@@ -22,7 +22,7 @@ from fogsim.traffic.drivers.speed_choice import (
     speed_share,
 )
 from fogsim.traffic.setup import TrafficSetup
-from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.headways import HeadwayControl, KeepingUp
@@ -45,7 +45,7 @@ class _FogChoices:
     def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:
         """Choose where the fog is another than at the last choice (`rows` (n,) int, `extinction` (n,) [1/m])."""
         table = self._table
-        changed = np.flatnonzero(extinction != table.values[rows, Column.EXTINCTION])
+        changed = (extinction != table.values[rows, Column.EXTINCTION]).nonzero()[0]
         if not len(changed):
             return
         of, here = rows[changed], extinction[changed].tolist()
@@ -201,6 +201,8 @@ class SumoDesiredSpeeds:
             vehicle_getter(api, "getAllowedSpeed"),
             vehicle_getter(api, "getMaxSpeed"),
         )
+        self._lane, self._speed_factor = vehicle_getter(api, "getLaneID"), vehicle_getter(api, "getSpeedFactor")
+        self._lane_limit = getter(api, "lane", "getMaxSpeed")
         self._step = float(api.simulation.getDeltaT())
         self._compliance = {display: setup.drivers.compliance_with(display) for display in Display}
         self._fog = fog
@@ -245,8 +247,11 @@ class SumoDesiredSpeeds:
             self._advised_since = heard_since(advised, self._advised_since, time)
             others = self._drivers()
             rows = self._table.rows(others)
-            choosing = [others[i] for i in self._keeping_up.keepers(rows).tolist()] if settled else others
-            self._update_choices(choosing, advised)
+            if settled:
+                keepers = self._keeping_up.keepers(self._table.values[rows])
+                self._update_choices([others[i] for i in keepers.tolist()], rows[keepers], advised)
+            else:
+                self._update_choices(others, rows, advised)
             self._headways.update(others, rows)
         self._top_speeds.update(time, present)
         self._shares.update(time, present)
@@ -265,31 +270,31 @@ class SumoDesiredSpeeds:
             advised = self._hearing.enter(command, entering)
             for display, speeds in advised.items():
                 self._advised_since.setdefault(display, {}).update(dict.fromkeys(speeds, -math.inf))
-            rows, desired, shares = self._desired(entering, advised)
+            rows = self._table.rows(entering)
+            desired, shares = self._desired(entering, rows, advised)
             self._shares.set_at_entry(entering, rows, shares)
             self._top_speeds.set_at_entry(entering, rows, desired)
         if len(entering) < len(new):
             # They hear other advice than that to them by name when all listen again.
-            self._update_choices([v for v in new if v not in set(entering)], advised_by_name(command))
+            others = [v for v in new if v not in set(entering)]
+            self._update_choices(others, self._table.rows(others), advised_by_name(command))
         self._headways.update(new, self._table.rows(new))
 
-    def _update_choices(self, ids: Sequence[str], advised: Heard) -> None:
+    def _update_choices(self, ids: Sequence[str], rows: NDArray[np.intp], advised: Heard) -> None:
         if ids:
-            rows, desired, shares = self._desired(ids, advised)
+            desired, shares = self._desired(ids, rows, advised)
             self._shares.set_desired(ids, rows, shares)
             self._top_speeds.set_desired(ids, rows, desired)
 
     def _desired(
-        self, ids: Sequence[str], advised: Heard
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
-        """Rows of vehicles, and what their drivers desire: top speeds (n,) [m/s], shares of the speed in clear air."""
-        table = self._table
-        rows = table.rows(ids)
+        self, ids: Sequence[str], rows: NDArray[np.intp], advised: Heard
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What drivers desire: top speeds (n,) [m/s], shares of the speed in clear air."""
         self._choices.update(rows, self._extinctions(ids))
-        values = table.values[rows]
+        values = self._table.values[rows]
         desired = np.minimum(values[:, Column.FACTOR] * values[:, Column.CHOICE], values[:, Column.LIMIT])
         desired, shares = np.minimum(desired, values[:, Column.TOP_SPEED]), values[:, Column.SHARE]
-        keepers = self._keeping_up.keepers(rows)
+        keepers = self._keeping_up.keepers(values)
         if len(keepers):
             kept = self._keeping_up.kept_speeds([ids[i] for i in keepers], rows[keepers])
             in_clear_air = self._all_allowed([ids[i] for i in keepers]) / values[keepers, Column.SHARE_SET]
@@ -306,7 +311,7 @@ class SumoDesiredSpeeds:
                     # Of several, what makes the driver slowest counts.
                     desired[i] = min(float(desired[i]), wanted) if i in followed else wanted
                     followed.add(i)
-        return rows, desired, shares
+        return desired, shares
 
     def _reached(
         self,
@@ -316,7 +321,7 @@ class SumoDesiredSpeeds:
         speeds: Mapping[str, float],
     ) -> list[int]:
         """Which of some vehicles an advice reaches, which is remembered: who is there, and gets what is said there."""
-        gets = np.flatnonzero(values[:, Column.REACHED_FROM] < compliance.reached_share).tolist()
+        gets = (values[:, Column.REACHED_FROM] < compliance.reached_share).nonzero()[0].tolist()
         reached = [i for i in gets if ids[i] in speeds]
         for vehicle in (ids[i] for i in reached):
             self._heard[vehicle] = min(speeds[vehicle], self._heard.get(vehicle, math.inf))
@@ -355,9 +360,8 @@ class SumoDesiredSpeeds:
             return math.inf
         if allowed < self._top_speed(vehicle):
             return allowed
-        get = self._api.vehicle
         # The top speed is the lower one, and SUMO gives only that.
-        return float(self._api.lane.getMaxSpeed(get.getLaneID(vehicle)) * get.getSpeedFactor(vehicle))
+        return float(self._lane_limit(self._lane(vehicle)) * self._speed_factor(vehicle))
 
     def release(self) -> None:
         """Withdraw from every vehicle on the road what was claimed of its top speed and headway."""

@@ -37,7 +37,8 @@ class TopSpeedControl:
     def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Set the desired speeds of drivers (`rows` (n,) int, `desired` (n,) [m/s])."""
         table = self._table
-        for i in np.flatnonzero(np.abs(desired - table.values[rows, Column.SPEED_DESIRED]) > _UNNOTICED_SPEED).tolist():
+        noticed = np.abs(desired - table.values[rows, Column.SPEED_DESIRED]) > _UNNOTICED_SPEED
+        for i in noticed.nonzero()[0].tolist():
             vehicle, row, speed = vehicles[i], int(rows[i]), float(desired[i])
             table.values[row, Column.SPEED_DESIRED] = speed
             top_speed = float(table.values[row, Column.SPEED_SET])
@@ -54,8 +55,8 @@ class TopSpeedControl:
     def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Let vehicles that have just departed drive no faster than their drivers desire."""
         table = self._table
-        slower = np.flatnonzero(desired < table.values[rows, Column.TOP_SPEED] - _UNNOTICED_SPEED)
-        for i in slower.tolist():
+        slower = desired < table.values[rows, Column.TOP_SPEED] - _UNNOTICED_SPEED
+        for i in slower.nonzero()[0].tolist():
             vehicle, speed = vehicles[i], float(desired[i])
             if speed < self._speed(vehicle):
                 # It has not braked for that: its acceleration is 0.
@@ -115,7 +116,7 @@ class SpeedShareControl:
     def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Set the shares that drivers want (`rows` (n,) int, `desired` (n,))."""
         table = self._table
-        for i in np.flatnonzero(_is_noticed(desired, table.values[rows, Column.SHARE_DESIRED])).tolist():
+        for i in _is_noticed(desired, table.values[rows, Column.SHARE_DESIRED]).nonzero()[0].tolist():
             vehicle, row, share = vehicles[i], int(rows[i]), float(desired[i])
             table.values[row, Column.SHARE_DESIRED] = share
             if share >= table.values[row, Column.SHARE_SET]:
@@ -130,7 +131,7 @@ class SpeedShareControl:
 
     def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
         """Let vehicles that have just departed drive no faster than the share that their drivers want."""
-        for i in np.flatnonzero(_is_noticed(desired, np.ones(len(desired)))).tolist():
+        for i in _is_noticed(desired, np.ones(len(desired))).nonzero()[0].tolist():
             vehicle, row = vehicles[i], int(rows[i])
             self._table.values[row, Column.SHARE_DESIRED] = desired[i]
             self._set(vehicle, row, float(desired[i]))

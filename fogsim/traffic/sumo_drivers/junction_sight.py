@@ -141,17 +141,19 @@ class JunctionSight:
         due = self._due.take()
         if due.gone:
             self._unseen.forget(due.gone, due.new)
-        vehicles, unseen = due.vehicles, self._unseen.drivers
-        speeds = dict(zip(vehicles, map(self._speed, vehicles), strict=True))
-        places = zip(vehicles, map(self._lane, vehicles), map(self._lane_position, vehicles), strict=True)
-        # A dictionary, whose order is the same in every run.
-        far = dict.fromkeys(
-            v for v, lane, place in places if v not in unseen and self._is_far(v, lane, place, speeds[v])
-        )
-        near = {v: self._foes_in_doubt(v, speeds[v]) for v in vehicles if v not in far}
-        self._due.schedule(list(far), _ALONG_A_LANE)
-        self._due.schedule([driver for driver, foes in near.items() if not foes], _MAX_PAUSE)
-        doubts = {driver: foes for driver, foes in near.items() if foes}
+        far: list[str] = []
+        near: list[str] = []
+        doubts: dict[str, dict[str, float]] = {}
+        unseen = self._unseen.drivers
+        for driver, speed in zip(due.vehicles, map(self._speed, due.vehicles), strict=True):
+            if driver not in unseen and self._is_far(driver, speed):
+                far.append(driver)
+            elif foes := self._foes_in_doubt(driver, speed):
+                doubts[driver] = foes
+            else:
+                near.append(driver)
+        self._due.schedule(far, _ALONG_A_LANE)
+        self._due.schedule(near, _MAX_PAUSE)
         if doubts:
             self._decide(doubts, own_lamps)
 
@@ -172,8 +174,9 @@ class JunctionSight:
             self._unseen.decide(driver, {}, self._roster.time)
         return doubtful
 
-    def _is_far(self, driver: str, lane: str, place: float, speed: float) -> bool:
-        """Whether no junction can come near a driver for `_ALONG_A_LANE` (`place` [m], `speed` [m/s])."""
+    def _is_far(self, driver: str, speed: float) -> bool:
+        """Whether no junction can come near a driver for `_ALONG_A_LANE` (`speed` [m/s])."""
+        lane = self._lane(driver)
         if lane not in self._lanes:
             length = float(self._lane_length(lane)) if lane else 0.0
             self._lanes[lane] = length, self._directions.is_two_way(lane)
@@ -182,7 +185,7 @@ class JunctionSight:
             return False
         fastest = speed + _FASTEST_GAIN
         reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)
-        return length - place > reach + fastest * fastest / (2.0 * _BRAKING)
+        return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * _BRAKING))
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)

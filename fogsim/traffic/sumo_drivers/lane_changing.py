@@ -15,7 +15,6 @@ Drivers look each `_LOOK_PERIOD`; who has no one unseen about is not touched.
 """
 
 import contextlib
-import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -256,17 +255,17 @@ class LaneChanging:
         """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         speed, certain_until = self._leaders.speed, self._certain_until
         soon, later = self._roster.time + 0.5 * _LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
-        until = map(certain_until.get, drivers, itertools.repeat(0.0))
-        looking = [driver for driver, certain in zip(drivers, until, strict=True) if certain <= soon]
-        leaders = self._neighbours.left_leaders(looking)
-        near = [self._certainly_seen < gap <= REACH for _, gap in leaders]
-        certain_until |= dict.fromkeys([v for v, is_near in zip(looking, near, strict=True) if not is_near], later)
-        looking, leaders = list(itertools.compress(looking, near)), list(itertools.compress(leaders, near))
-        speeds = zip(map(speed, looking), map(speed, [leader for leader, _ in leaders]), strict=True)
-        slow = [other <= own + _MUCH_FASTER for own, other in speeds]
-        hardly_faster = list(itertools.compress(zip(looking, leaders, strict=True), slow))
-        unseen = {driver: None for driver, (_, gap) in hardly_faster if gap > self._certainly_hidden}
-        doubtful = [(driver, leader) for driver, (leader, gap) in hardly_faster if gap <= self._certainly_hidden]
+        looking = [driver for driver in drivers if certain_until.get(driver, 0.0) <= soon]
+        unseen: dict[str, None] = {}
+        doubtful: list[tuple[str, str]] = []
+        for driver, (leader, gap) in zip(looking, self._neighbours.left_leaders(looking), strict=True):
+            if not self._certainly_seen < gap <= REACH:
+                certain_until[driver] = later
+            elif speed(leader) <= speed(driver) + _MUCH_FASTER:
+                if gap > self._certainly_hidden:
+                    unseen[driver] = None
+                else:
+                    doubtful.append((driver, leader))
         perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
         return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}
 

@@ -138,10 +138,14 @@ class NeighbourSight:
         self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps, time: float
     ) -> dict[tuple[str, str], bool]:
         """Whether each observer perceives a target (`pairs` (str, str), `time` [s])."""
-        if self._hidden_at:
-            self._hidden_at = {pair: at for pair, at in self._hidden_at.items() if time - at < self._reaction_time}
+        hidden = self._hidden_at
+        if hidden:
+            hidden = self._hidden_at = {pair: at for pair, at in hidden.items() if time - at < self._reaction_time}
         asked = tuple(dict.fromkeys(pairs))
-        seen = self._sight.sees(asked, own_lamps) if asked else []
-        perceived = {pair: is_seen and pair not in self._hidden_at for pair, is_seen in zip(asked, seen, strict=True)}
-        self._hidden_at.update((pair, time) for pair, is_seen in zip(asked, seen, strict=True) if not is_seen)
+        perceived = dict(zip(asked, self._sight.sees(asked, own_lamps), strict=True))
+        for pair, is_seen in perceived.items():
+            if not is_seen:
+                hidden[pair] = time
+            elif pair in hidden:
+                perceived[pair] = False
         return perceived

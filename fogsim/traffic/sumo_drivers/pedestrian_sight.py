@@ -58,14 +58,14 @@ class PedestrianSight:
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore pedestrians that they do not see."""
         now = self._roster.time
-        if self._certainly_seen >= _FARTHEST_PERSON or now < self._next:
+        if self._certainly_seen >= _FARTHEST_PERSON or now < self._next or not self._has_crossings:
             return
         self._next = now + _LOOK_PERIOD
         new, self._mark = self._roster.entered_since(self._mark)
         present = self._roster.present
         self._unseen.forget([v for v in self._unseen.drivers if v not in present] + new, present.intersection(new))
         doubts: dict[str, list[str]] = {driver: [] for driver in self._unseen.drivers}
-        if self._person_count() and self._has_crossings:
+        if self._person_count():
             for driver, person in self._pairs_near():
                 doubts.setdefault(driver, []).append(person)
         for driver, persons in doubts.items():
@@ -73,7 +73,7 @@ class PedestrianSight:
 
     @functools.cached_property
     def _has_crossings(self) -> bool:
-        """Whether there is a crossing in the network; asked for once, as lists of many persons take long."""
+        """Whether there is a crossing in the network."""
         parts = (edge.rpartition("_")[2] for edge in self._api.edge.getIDList() if edge.startswith(":"))
         return any(part.startswith(_CROSSING) for part in parts)
 

@@ -12,7 +12,6 @@ is new (one of the two has changed lane, or somebody came within `REACH`) is not
 looked for in each step.
 """
 
-import functools
 import itertools
 from collections.abc import Collection, Sequence
 from types import MappingProxyType
@@ -59,6 +58,13 @@ _FASTEST_DRIFT = 30.0
 _STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
 
+_SIGNALS = 127
+"""Bits of SUMO's vehicle signals that stand for lamps."""
+
+_LIT = [int(OTHERS_LAMPS) | lamps_from_signals(signals) for signals in range(_SIGNALS + 1)]
+_REAR_LIGHTS = np.array([[rear_intensity(lit | soon) for lit in _LIT] for soon in (0, int(Lamp.STOP))])
+"""Luminous intensity of the brightest rear lamp that signals light, and that may soon be lit (2, n) [cd]."""
+
 _Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
 
@@ -86,7 +92,7 @@ class LeaderSight:
         if own_lamps and self._most_glare > 0.0:
             self._doubt_own_beams(judged, pauses, pairs, own_lamps)
         seen: list[bool] = (judged == SEEN).tolist()
-        for i in np.flatnonzero(judged == DAZZLED).tolist() if self._most_glare > 0.0 else ():
+        for i in (judged == DAZZLED).nonzero()[0].tolist() if self._most_glare > 0.0 else ():
             seen[i] = self._is_seen(pairs[i], facing[:, i], own_lamps)
         return seen, pauses.tolist()
 
@@ -98,17 +104,20 @@ class LeaderSight:
         known = self._extinction
         facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
         facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
-        facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
+        facing[INTENSITY : BRIGHTEST + 1] = _REAR_LIGHTS[:, [lit & _SIGNALS for lit in map(self._signals, leaders)]]
         return facing
 
     def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        """What is known of vehicles (n, 7), where they are and how fast first."""
-        read = np.empty((len(vehicles), EYE_HEIGHT + 1))
-        flat = itertools.chain.from_iterable(map(self._position, vehicles))
-        read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
-        read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        read[:, MINIMUM_GAP:] = self._vehicles.traits(vehicles)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
-        return read
+        """What is known of vehicles (n, 7): where they are, which does not matter in even fog, how fast, and so on."""
+        # Mostly who leads one follows another.
+        rows = {vehicle: row for row, vehicle in enumerate(dict.fromkeys(vehicles))}
+        read = np.empty((len(rows), EYE_HEIGHT + 1))
+        if not self._closing.is_even:
+            flat = itertools.chain.from_iterable(map(self._position, rows))
+            read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(rows)).reshape(-1, 3)
+        read[:, SPEED] = np.fromiter(map(self._speed, rows), np.float64, len(rows))
+        read[:, MINIMUM_GAP:] = self._vehicles.traits(rows)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
+        return read[[rows[vehicle] for vehicle in vehicles]]
 
     @staticmethod
     def _doubt_own_beams(
@@ -151,24 +160,17 @@ class LeaderSight:
         return float(self._fog.extinction((x, y, z + self._vehicles.body(vehicle).eye_height)))
 
 
-@functools.lru_cache(maxsize=1024)
-def _rear_light(signals: int) -> tuple[float, float]:
-    """Luminous intensity of the brightest rear lamp that SUMO's signals light, and that may soon be lit [cd]."""
-    lit = int(OTHERS_LAMPS) | lamps_from_signals(signals)
-    return rear_intensity(lit), rear_intensity(lit | int(Lamp.STOP))
-
-
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
 
 _LARGEST_MINIMUM_GAP = 5.0
 """No driver's minimum gap is larger than this [m]."""
 
-_FASTEST_APPROACH = 70.0
-"""Faster than this no gap changes [m/s]: 250 km/h towards a standing vehicle."""
-
 MAX_PAUSE = 0.5
 """Every driver's sight is computed at least this often [s], for leaders change."""
+
+_LONG_WAY = 70.0 * MAX_PAUSE
+"""By more than this no gap changes until then [m]: at 250 km/h towards a standing vehicle."""
 
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
@@ -237,8 +239,6 @@ class Perception:
         )
         # And none farther than this is seen, wherever the fog is thinnest.
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
-        margin = _FASTEST_APPROACH * MAX_PAUSE
-        self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
     def expect_unseen(self, follower: str, leader: str) -> None:
         """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step."""
@@ -264,45 +264,43 @@ class Perception:
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
         """Decide where the gap alone is enough, and give back the rest."""
-        ignored, seen, hidden = self._ignored, self._certainly_seen, self._certainly_hidden
-        ahead = zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=True)
-        pairs = [(follower, *found) for follower, found in ahead if found and found[0]]
-        behind = self._obstructed(pairs)
-        doubtful = [p for p in pairs if p[2] <= hidden and (p[2] > seen or p[0] in ignored) and p[0] not in behind]
-        out_of_sight = [pair for pair in pairs if pair[2] > hidden or pair[0] in behind]
-        near_edge = [
-            (follower, leader, 0.0 if follower in behind else abs(gap - (hidden if gap > hidden else seen)))
-            for follower, leader, gap in pairs
-            if follower in behind
-            or hidden < gap <= self._hidden_for_long
-            or (self._seen_for_long < gap <= seen and follower not in ignored)
-        ]
+        ignored, speed, seen, hidden = self._ignored, self.speed, self._certainly_seen, self._certainly_hidden
+        ahead = list(map(self.leader, due, itertools.repeat(REACH)))
+        behind = self._obstructed(due, ahead)
         # Most vehicles are far from any doubt, and pause for the longest time.
-        waiting = {pair[0] for pair in (*near_edge, *doubtful)}
-        self._due.schedule([follower for follower in due if follower not in waiting], MAX_PAUSE)
-        self._pause_near_edge(near_edge)
-        with_leaders = {pair[0] for pair in pairs}
-        for follower in [v for v in due if v in ignored and v not in with_leaders]:
-            self._reveal(follower)
-        for follower, leader, _ in out_of_sight:
-            self._hide(follower, leader)
+        calm: list[str] = []
+        doubtful: list[_Pair] = []
+        pauses: dict[str, float] = {}
+        for follower, found in zip(due, ahead, strict=True):
+            if not found or not found[0]:
+                calm.append(follower)
+                if follower in ignored:
+                    self._reveal(follower)
+                continue
+            leader, gap = found
+            if gap > hidden or follower in behind:
+                self._hide(follower, leader)
+                near_edge = 0.0 if follower in behind else gap - hidden
+            elif gap > seen or follower in ignored:
+                doubtful.append((follower, leader, gap))
+                continue
+            else:
+                near_edge = seen - gap
+            if near_edge >= _LONG_WAY:
+                calm.append(follower)
+            else:
+                # Until the gap could have changed by so much.
+                pauses[follower] = near_edge / closing_speed_bound(speed(follower), speed(leader), MAX_PAUSE)
+        self._due.schedule(calm, MAX_PAUSE)
+        self._due.schedule_each(tuple(pauses), [min(pause, MAX_PAUSE) for pause in pauses.values()])
         return doubtful
 
-    def _obstructed(self, pairs: Sequence[_Pair]) -> Collection[str]:
+    def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""
         if self._hidden_vehicles is None:
             return ()
-        hidden = self._hidden_vehicles.are_hidden([pair[:2] for pair in pairs])
-        return {pair[0] for pair, is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
-
-    def _pause_near_edge(self, waiting: Sequence[_Pair]) -> None:
-        """Leave followers alone until their gaps to leaders could have changed by a distance each [m]."""
-        if waiting:
-            followers, leaders, distances = zip(*waiting, strict=True)
-            flat = map(self.speed, followers + leaders)
-            speed = np.fromiter(flat, np.float64, 2 * len(waiting)).reshape(2, -1)
-            pauses = np.minimum(distances / closing_speed_bound(speed[0], speed[1], MAX_PAUSE), MAX_PAUSE)
-            self._due.schedule_each(followers, pauses.tolist())
+        pairs = [(v, found[0]) for v, found in zip(followers, ahead, strict=True) if found and found[0]]
+        return {v for (v, _), hidden in zip(pairs, self._hidden_vehicles.are_hidden(pairs), strict=True) if hidden}
 
     def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
@@ -314,8 +312,9 @@ class Perception:
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
         followers = [pair[0] for pair in pairs]
-        waits = [0.0 if follower in emerging else pause for follower, pause in zip(followers, pauses, strict=True)]
-        self._due.schedule_each(followers, waits)
+        if emerging:
+            pauses = [0.0 if v in emerging else pause for v, pause in zip(followers, pauses, strict=True)]
+        self._due.schedule_each(followers, pauses)
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

@@ -53,6 +53,9 @@ class _SeenBody(NamedTuple):
 _CONTRAST, _EYES_TO_WIDTH = 1, slice(2, 5)
 """Columns of bodies in an array."""
 
+_OF_TARGET = 10
+"""Column of lines of sight, after those that kernels draw: the target's contrast."""
+
 
 class _SeenVehicles:
     """Bodies, each read once, and lit lamps of vehicles."""
@@ -218,29 +221,28 @@ class VehicleSight:
         lines = self.lines_of_sight(pairs)
         distance = lines[:, LINE]
         seen = distance <= self._seen_through_fog
-        doubtful = ~seen & (distance <= _FARTHEST)
-        if doubtful.any():
-            seen[doubtful] = self._are_seen(list(itertools.compress(pairs, doubtful)), lines[doubtful], own_lamps)
+        doubtful = (~seen & (distance <= _FARTHEST)).nonzero()[0]
+        if len(doubtful):
+            seen[doubtful] = self._are_seen([pairs[i] for i in doubtful.tolist()], lines[doubtful], own_lamps)
         if self._hidden_vehicles is not None:
             seen &= ~np.array(self._hidden_vehicles.are_hidden(pairs))
         answer: list[bool] = seen.tolist()
         return answer
 
     def lines_of_sight(self, pairs: _Pairs) -> NDArray[np.float64]:
-        """Straight lines (n, 10) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
+        """Straight lines (n, 11) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
         observers, targets = zip(*pairs, strict=True)
         both, count = observers + targets, len(pairs)
-        read = np.empty((2 * count, 7))
+        read, lines, traits = np.empty((2 * count, 7)), np.empty((count, _OF_TARGET + 1)), self._vehicles.traits(both)
         flat = itertools.chain.from_iterable(map(self._position, both))
         read[:, :3] = np.fromiter(flat, np.float64, 6 * count).reshape(-1, 3)
         read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, both), np.float64, 2 * count))
-        read[:, 4:] = self._vehicles.traits(both)[:, _EYES_TO_WIDTH]
+        read[:, 4:], lines[:, _OF_TARGET] = traits[:, _EYES_TO_WIDTH], traits[count:, _CONTRAST]
         bodies, ends = read[count:], np.arange(1, count + 1)
         bodies[:, 4] = 0.0
         if (bodies[:, 5] > LONGEST_RIGID).any():
             bodies, ends = self._bend(targets, bodies)
-        lines = np.empty((count, 10))
-        draw_lines_of_sight(read[:count, :5].copy(), bodies, ends, lines)
+        draw_lines_of_sight(read[:count], bodies, ends, lines)
         return lines
 
     def _bend(
@@ -264,16 +266,15 @@ class VehicleSight:
 
     def _are_seen(self, pairs: _Pairs, lines: NDArray[np.float64], own_lamps: OwnLamps) -> NDArray[np.bool_]:
         """Whether targets are seen through the fog (n,)."""
-        eyes, looks, known = np.ascontiguousarray(lines[:, EYES:END]), np.zeros((4, len(pairs))), self._extinction
-        looks[0], looks[1] = lines[:, LINE], self._vehicles.traits([target for _, target in pairs])[:, _CONTRAST]
-        ends = np.ascontiguousarray(lines[:, END:LINE])
-        depths = self._fog.optical_depth(eyes, ends) if known is None else known * looks[0]
+        eyes, looks, known = lines[:, EYES:END], np.zeros((4, len(pairs))), self._extinction
+        looks[0], looks[1] = lines[:, LINE], lines[:, _OF_TARGET]
+        depths = self._fog.optical_depth(eyes, lines[:, END:LINE]) if known is None else known * looks[0]
         # Mostly the body is seen, whatever lamps are lit.
         seen = np.asarray(depths <= self._sight.depth_limits(looks))
         dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)}
         if dazzling:
             seen &= [observer not in dazzling for observer, _ in pairs]
-        doubtful = np.flatnonzero(~seen)
+        doubtful = (~seen).nonzero()[0]
         if len(doubtful):
             looks, vehicles, rows = np.take(looks, doubtful, axis=1), self._vehicles, doubtful.tolist()
             for n, (row, line) in enumerate(zip(rows, lines[doubtful].tolist(), strict=True)):

@@ -26,6 +26,10 @@ class _Piece(NamedTuple):
     opposite: tuple[str, ...] = ()
 
 
+_Spot = tuple[str, float]
+"""A vehicle, and how far from the beginning of its lane it is [m]."""
+
+
 class SumoVehiclePlaces:
     """Finds vehicles edge by edge; see `VehiclePlaces`."""
 
@@ -42,36 +46,38 @@ class SumoVehiclePlaces:
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
         self._route: tuple[str, tuple[str, ...]] = ("", ())
         self._roads: dict[tuple[str, ...], tuple[_Piece, ...]] = {}
+        self._read: tuple[float, dict[str, Sequence[_Spot]]] = math.nan, {}
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
         """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`."""
         past = {}
-        for vehicle, piece, is_against in self._on_pieces(self._find_pieces(stretch), among):
-            station = float(self._station(vehicle))  # far below 0 off the lanes
-            # SUMO counts from where the oncoming lane begins.
-            position = piece.end - station if is_against else piece.start + station
-            if stretch.start <= position < stretch.end:
-                past[vehicle] = position - stretch.start
-        return past
-
-    def _on_pieces(self, pieces: Sequence[_Piece], among: Collection[str] | None) -> Iterator[tuple[str, _Piece, bool]]:
-        """Vehicles on pieces, each with its piece and whether it is there on the oncoming lane."""
         found = self._present_on if among is None else self._sorted_by_edge(among)
-        for piece in pieces:
+        for piece in self._find_pieces(stretch):
             for edge in (piece.edge, *piece.opposite):
                 is_against = edge is not piece.edge
-                for vehicle in found(edge):
-                    if not piece.opposite or self._is_against(vehicle) == is_against:
-                        yield vehicle, piece, is_against
+                for vehicle, station in found(edge):
+                    if piece.opposite and self._is_against(vehicle) != is_against:
+                        continue
+                    # SUMO counts from where the oncoming lane begins, and far below 0 off the lanes.
+                    position = piece.end - station if is_against else piece.start + station
+                    if stretch.start <= position < stretch.end:
+                        past[vehicle] = position - stretch.start
+        return past
 
-    def _present_on(self, edge: str) -> Iterable[str]:
-        present = self._roster.present
-        return (v for v in self._on_edge(edge) if v in present)
+    def _present_on(self, edge: str) -> Sequence[_Spot]:
+        time, read = self._read
+        if time != self._roster.time:
+            read = {}
+            self._read = self._roster.time, read
+        if edge not in read:
+            there = [v for v in self._on_edge(edge) if v in self._roster.present]
+            read[edge] = list(zip(there, map(self._station, there), strict=True))
+        return read[edge]
 
-    def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Iterable[str]]:
-        there: dict[str, list[str]] = {}
+    def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Sequence[_Spot]]:
+        there: dict[str, list[_Spot]] = {}
         for vehicle in vehicles:
-            there.setdefault(self._edge(vehicle), []).append(vehicle)
+            there.setdefault(self._edge(vehicle), []).append((vehicle, self._station(vehicle)))
         return lambda edge: there.get(edge, ())
 
     def _is_against(self, vehicle: str) -> bool:

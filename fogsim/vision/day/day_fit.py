@@ -11,7 +11,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.day.evidence_kernels import evidence_grid
-from fogsim.vision.day.row_data import RowBins, curves_of, free_depth, read_rows, row_bins
+from fogsim.vision.day.row_data import RowBins, curves_of, free_depth, near_horizon, read_rows, row_bins
 from fogsim.vision.day.row_kernels import (
     AIRLIGHT,
     COLUMNS,
@@ -88,6 +88,7 @@ class DayFit:
     doubt: float = 0.0
     images: int = 1  # Images of the drive up to this one
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
+    farthest: float = math.inf  # Depth of the farthest rows that surely are below the horizon [m]
 
     @property
     def response_deviation(self) -> float:
@@ -133,6 +134,8 @@ def fit_day(
     rows = read_rows(pixels, bins, camera, horizon.row)
     doubt = _contradiction(rows, camera, horizon, claimed)
     fit = replace(_weighed(rows, camera, horizon, earlier), doubt=doubt, free=free)
+    farthest = camera.row_distance / near_horizon(horizon.standard_deviation)
+    fit = replace(fit, farthest=min(free, farthest))
     if earlier is None:
         return fit
     tried = _left(earlier, fit.responses.size)[0]

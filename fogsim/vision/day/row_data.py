@@ -340,10 +340,15 @@ the bins below [-]."""
 
 
 @lru_cache(maxsize=64)
+def near_horizon(deviation: float) -> float:
+    """Rows on either side of the horizon that may be sky or road (`deviation` [px])."""
+    return _NEAR_HORIZON * deviation + 1.0
+
+
 def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
     """Lay bins over the image of a camera (`deviation` [px])."""
     bottom = camera.height - 1
-    around = _NEAR_HORIZON * deviation + 1.0
+    around = near_horizon(deviation)
     step = max(round(deviation / 2.5), 1)
     edges = [math.floor(horizon - around)]
     top = max(math.floor(horizon - _SKY_HEIGHT * camera.focal_length), 0)

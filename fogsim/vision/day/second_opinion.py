@@ -111,6 +111,9 @@ _LANE = 4
 """Lines that meet where the road vanishes from which on it is one although shade lies on it, whose patches follow no
 law; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
+_SUSPECTED = 0.2
+"""Probability from which on a road may be wet, or its image mapped locally: about twice that before it is seen [-]."""
+
 _HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
@@ -144,6 +147,7 @@ class DayVerdict:
     response_deviation: float
     is_road: bool = True  # Whether a road is likelier than none
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
+    farthest: float = math.inf  # Depth of the farthest rows that were read [m]
 
     @property
     def is_clear(self) -> bool:
@@ -163,7 +167,8 @@ class DayVerdict:
     @property
     def reach(self) -> float:
         """Distance up to which it speaks of the fog [m]."""
-        return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
+        middle = math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], _FOG))))
+        return min(middle, self.farthest)
 
 
 def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdict:
@@ -200,13 +205,14 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
         is_road=is_road,
         free=fit.free,
+        farthest=fit.farthest,
     )
 
 
 def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     """Why a posterior is no answer."""
     hidden = sky < _MOSTLY or float(fit.surfaces[_USUAL_SURFACES + 1 :].sum()) > _MOSTLY
-    wet = float(fit.lights[LIGHTS.is_wet].sum()) > _MOSTLY
+    wet = float(fit.lights[LIGHTS.is_wet].sum()) > _SUSPECTED
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
         (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
@@ -283,8 +289,8 @@ class SecondOpinion:
         self._fit, self._looked = fit, time
         verdict = verdict_of(fit, self._scale, lines or 0)
         if own.valid and math.isfinite(min(free, verdict.free)) and verdict.doubt <= MOST_DOUBT:
-            # Before what stands in the lane it sees less.
-            return own
+            # Before what stands in the lane it sees less, but too little of a road that may be wet for either.
+            return own if verdict.outside <= _SUSPECTED else _of_day(own, verdict)
         self._response = verdict.response_deviation if verdict.is_sure else 0.0
         if own.valid and lines is None:
             # It follows no bend: there it shows what responses change, not how dense the fog is.

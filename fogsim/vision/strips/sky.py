@@ -318,6 +318,10 @@ _DARKER = 0.012
 _UNSEEN, _CLOSE = 0.3, 0.01
 """Deviation of the sky's luminance for each radian that is hidden above the horizon [1/rad], but for so much [rad]."""
 
+_STEEPEST_FALL, _FALLEN = 5.0, 1.0 / math.sqrt(3.0)
+"""Most that a sky in fog darkens downward, over its level [1/rad] (3.4 in nine photographs above roads), and deviation
+of its luminance at the horizon downward, over how much darker what may be sky is above it [-]: of an even law."""
+
 _MOST_HIDDEN = 0.14
 """Angle above the horizon up to which something may hide all of the sky, beyond which it is no road that lies ahead but
 a wall or a wood [rad]."""
@@ -362,11 +366,17 @@ def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin
             free[seen], light[seen] = rows[i], bright[i]
             seen += 1
     shading = _shading(image, free[:seen], axis, light[:seen], noise, level, scatter)
-    unseen = _UNSEEN * max(lowest - margin / axis[3] - _CLOSE, 0.0) * shading.level
-    deviation = math.hypot(shading.deviation, unseen)
+    hidden = max(lowest - margin / axis[3] - _CLOSE, 0.0)
+    upward = math.hypot(shading.deviation, _UNSEEN * hidden * shading.level)
+    # What darkens gently below may be sky as well.
+    end, fall = last, _STEEPEST_FALL * (height[0] - height[-1]) / (rows.size - 1) * shading.level
+    while 0 <= end < rows.size - 1 and bright[end] - bright[end + 1] < fall:
+        end += 1
+    fallen = max(shading.level - bright[end], 0.0) if hidden > 0.0 else 0.0
+    deviation = math.hypot(upward, _FALLEN * fallen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = np.median(share) < _PATCHY and shading.deviation > _SCATTERED * shading.level
-    upward = _BRIGHTER * shading.level if covered else deviation
+    upward = _BRIGHTER * shading.level if covered else upward
     heights = ((axis[2] - free[0]) / axis[3], (axis[2] - free[seen - 1]) / axis[3]) if seen else (0.0, 0.0)
     level_and_noise = (shading.level, deviation, upward, noise, saturated, clipped)
     lens = (shading.vignetting, shading.vignetting_deviation, shading.unevenness)

@@ -83,6 +83,12 @@ def test_what_the_joint_fit_does_not_know_ends_its_estimate_and_proves_no_other(
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
+def test_before_what_stands_in_the_lane_the_joint_fit_answers_unless_the_road_may_be_wet(said):
+    hidden = replace(SILENT, free=20.0, outside=0.1)
+    assert said(OWN, hidden)[0].extinction == OWN.extinction
+    assert said(OWN, replace(hidden, outside=0.3))[0].diagnostics["reason"] == "dark"
+
+
 def test_on_a_bent_road_the_joint_fit_answers_and_the_day_model_says_what_responses_change(said):
     found, looks = said(OWN, replace(DENSER, response_deviation=0.1), lines=None)
     assert looks == 1
@@ -119,6 +125,12 @@ def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):
     assert found.valid
     assert found.extinction == 0.001
     assert found.visibility_interval[1] == math.inf
+
+
+def test_clear_air_is_reported_only_as_far_as_road_was_read(said):
+    found, _ = said(Estimate.invalid("joint_road", "too dark"), replace(CLEAR, farthest=110.0))
+    assert found.valid
+    assert found.reach == 110.0
 
 
 def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch):

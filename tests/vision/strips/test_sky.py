@@ -66,6 +66,16 @@ def test_a_wood_leaves_the_sky_above_it_and_between_its_trees_and_a_wall_none():
     assert sky_above(photographed(trees), CAMERA, 3.0).luminance == pytest.approx(180.0, abs=3.0)
 
 
+def test_what_darkens_toward_the_horizon_may_be_sky_or_hide_it():
+    height = np.clip((CAMERA.horizon_row - ROWS) / CAMERA.focal_length, 0.0, None)
+    falling = 180.0 * (1.0 - 0.3 * np.clip(1.0 - height / 0.14, 0.0, 1.0) ** 2)
+    sky = sky_above(photographed(falling), CAMERA, 3.0)
+    assert sky.luminance - 2.5 * sky.deviation < 0.7 * 180.0 < sky.luminance - sky.deviation
+    assert sky.upward < 0.1 * sky.luminance
+    behind_a_wood = sky_above(photographed(np.where(height < 0.06, 40.0, 180.0)), CAMERA, 3.0)
+    assert behind_a_wood.deviation == pytest.approx(behind_a_wood.upward, rel=0.1)
+
+
 def test_saturated_and_clipped_pixels_are_counted():
     image = np.full((240, 320, 3), 200, np.uint8)
     image[:60, :, 0] = 255

@@ -1,66 +1,46 @@
 """Time of a first run, which compiles its kernels, and of a second one, which finds them on the disk.
 
 Each is a `fogsim run` of one simulated second in a process of its own, the first with an empty folder for what is
-compiled. Processor time says more than wall time on a machine that does other work too; both are printed, with the
-machine's load when the run began, and how many kernels the first run kept.
+compiled. Processor time says more than wall time on a machine that does other work too; both are printed, and how many
+kernels the runs kept.
 
 It measures the FogSim of the Python that runs it: away from the checkout, that of an environment with a wheel.
 
     python benchmarks/cold_start.py [--json] [--repeat 3] [--scenario motorway_fog_bank ...]
 """
 
-import json
 import os
-import platform
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
-from harness import parse_options
+from harness import Row, median, parse_options, publish
 
 SCENARIOS = ("motorway_fog_bank", "night_motorway_fog")
 
 
 def main() -> None:
-    """Measure, and print a table or JSON."""
-    told = parse_options(__doc__, repeat=(3, "repetitions"), scenario=(list(SCENARIOS), "which"))
-    records = [record for name in told.scenario for record in measured(name, told.repeat)]
-    if told.json:
-        print(json.dumps({"machine": machine(), "records": records}, indent=2))
-        return
-    print(", ".join(f"{name} {value}" for name, value in machine().items()))
-    for record in records:
-        wall, processor = (" … ".join(f"{t:.1f}" for t in sorted(record[key])) for key in ("wall_s", "processor_s"))
-        print(
-            f"{record['scenario']}, {record['run']}: {statistics.median(record['wall_s']):.1f} s ({wall}), processor "
-            f"{statistics.median(record['processor_s']):.1f} s ({processor}), load {record['load']}, "
-            f"{record['kernels']} kernels kept"
-        )
+    """Measure and print."""
+    given = parse_options(__doc__, repeat=(3, "repetitions"), scenario=(list(SCENARIOS), "which"))
+    publish(given, [record for name in given.scenario for record in measured(name, given.repeat)])
 
 
-def machine() -> dict[str, Any]:
-    """What it was measured on."""
-    return {"python": platform.python_version(), "processor": platform.processor(), "processors": os.cpu_count()}
-
-
-def measured(scenario: str, repeat: int) -> list[dict[str, Any]]:
-    """Times of first and second runs of a scenario [s], one of each a repetition."""
-    records: list[dict[str, Any]] = [
-        {"scenario": scenario, "run": run, "wall_s": [], "processor_s": [], "load": []} for run in ("first", "second")
-    ]
+def measured(scenario: str, repeat: int) -> list[Row]:
+    """Records of first and second runs of a scenario, one of each a repetition."""
+    spent: dict[str, list[tuple[float, float]]] = {"first": [], "second": []}
     for _ in range(repeat):
         with tempfile.TemporaryDirectory() as folder:
-            for record in records:
-                record["load"].append(round(os.getloadavg()[0], 1))
-                wall, processor = timed_run(scenario, Path(folder))
-                record["wall_s"].append(round(wall, 2))
-                record["processor_s"].append(round(processor, 2))
-                record["kernels"] = sum(1 for _ in Path(folder, "kernels").rglob("*.nbc"))
+            for runs in spent.values():
+                runs.append(timed_run(scenario, Path(folder)))
+            kernels = sum(1 for _ in Path(folder, "kernels").rglob("*.nbc"))
+    records = []
+    for run, runs in spent.items():
+        wall, processor = zip(*runs, strict=True)
+        times = {"wall_s": median(wall, 1), "slowest_s": round(max(wall), 1), "processor_s": median(processor, 1)}
+        records.append({"scenario": scenario, "run": run, **times, "kernels": kernels})
     return records
 
 

@@ -18,6 +18,7 @@ from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api, SumoLink, has_lane
 from fogsim.traffic.sumo.loaded_files import (
+    LEFT_OUT,
     LoadedRoads,
     check_microscopic,
     check_step_length,
@@ -188,6 +189,7 @@ class SumoTraffic:
 
     def _ended(self, error: SimulationError, ego: str | None) -> SimulationError:
         """An error that ends the simulation, with what SUMO has warned of."""
+        self._run = None
         self.close()
         return SimulationError("; ".join(filter(None, (str(error), describe_warnings(self._link.warnings(), ego)))))
 
@@ -437,5 +439,8 @@ class SumoTraffic:
 
     def close(self) -> None:
         """End the simulation; see `Traffic.close`."""
+        was_running, self._run = self._run is not None, None
         self._link.end()
-        self._run = None
+        left_out = [one for one in self._link.warnings() if LEFT_OUT.search(one)]
+        if was_running and left_out:
+            warnings.warn(describe_warnings(left_out, None), stacklevel=2)

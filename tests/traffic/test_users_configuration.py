@@ -51,6 +51,12 @@ def test_warnings_of_others_are_told_if_there_is_none_of_the_ego(tmp_path: Path)
         next(fogsim.run(loaded(config, "nobody")))
 
 
+def test_vehicles_that_sumo_leaves_out_are_reported(tmp_path: Path) -> None:
+    config = configuration(tmp_path, vehicle("ego", 2.0, "we1 we2") + vehicle("early", 1.0, "we1 we2"))
+    with pytest.warns(UserWarning, match=r"^SUMO warned: .* ignoring 'early'!$"):
+        list(fogsim.run(loaded(config, "ego", "duration_s=1")))
+
+
 def test_a_mistake_that_sumo_finds_on_the_way_is_told_as_it_is(tmp_path: Path) -> None:
     config = configuration(tmp_path, vehicle("ego", 0.0, "we1 we2") + vehicle("lost", 1.0, "we2 we1"))
     with pytest.raises(SimulationError, match=r"^SUMO cannot go on: Vehicle 'lost' has no valid route\..*'we1'\.?$"):

@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +29,9 @@ _NEAREST = 3
 
 _MOST_WARNINGS = 3
 """Warnings of SUMO's that a message repeats."""
+
+LEFT_OUT = re.compile("ignor|discard|skipp", re.IGNORECASE)
+"""What SUMO's warnings have in common that say which part of its files it does not use."""
 
 
 def describe_seen(ego: str, seen: Collection[str]) -> str:

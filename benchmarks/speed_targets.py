@@ -1,6 +1,6 @@
 """Speed against its targets: this version, the commit that ended the first batch (c4d9aa66) and highway-env in turn.
 
-It runs loop.py, frames.py, traffic.py and cold_start.py, about 12 minutes on a quiet machine. Ratios are of processor
+It runs loop.py, frames.py, traffic.py and cold_start.py, about 10 minutes on a quiet machine. Ratios are of processor
 time, which other work disturbs little; only the first run is wall time.
 
     python benchmarks/speed_targets.py [--json] [--docs] [--then c4d9aa66] [--repeat 2]
@@ -62,7 +62,7 @@ def frame_targets(then: Path, repeat: int) -> Iterator[Row]:
     """Time of a frame on the CPU relative to then, the fastest of many."""
     fastest: dict[tuple[str, int], list[float]] = {key: [9e9, 9e9] for key in FRAMES}
     for who, version in (*enumerate((ROOT, then)),) * repeat:
-        for one in script("frames", "--renderer", "cpu", "--repeat", 2, version=version):
+        for one in script("frames", "--renderer", "cpu", "--light", "day", "--light", "night", version=version):
             times = fastest[one["light"], one["width"]]
             times[who] = min(times[who], one["ms_min"])
     for (light, width), asked in FRAMES.items():

@@ -387,6 +387,7 @@ def test_the_observed_estimate_of_version_2_is_the_first_valid_one() -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("policy", ["rule", "fixed", "oracle"])
 def test_returns_without_frames_are_those_with_frames(policy: str) -> None:
     """Version 2 with frames and without, in the same fog, light and traffic: means within each other's intervals."""

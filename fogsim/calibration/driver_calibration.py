@@ -3,21 +3,21 @@
 In fog a driver without a slower vehicle ahead drives the smaller of f·c(V) and s(V)·v₀: v₀ is the speed in clear air
 and f the driver's own factor, both log-normal; c and s are `ObservedSpeed`'s limits (docs/explanation/drivers.md). The
 likelihood of the smaller of two independent values gives c's ratio, s's lowest value and the spreads; intervals are
-from the sandwich covariance, over sessions where the data have them. Shares of the kinds of drivers are those of a
-mixture: each kind turns the headways measured in clear air into headways in fog.
+those of the profile likelihood, wider by the sandwich covariance over sessions where the data have them. Shares of the
+kinds of drivers are those of a mixture: each kind turns the headways measured in clear air into headways in fog.
 """
 
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import optimize, special, stats
 
 from fogsim.core.files.readers import column_names, number_in_text, read_text, refuse_other_length
 from fogsim.core.linear_algebra import inverse_of, matrix_product
@@ -44,6 +44,10 @@ FITTED = ("slowest_share", "overdriving", "speed_spread")
 _NORMAL_90 = 1.6448536
 _LEAST_DEVIATION = 0.005
 """Smallest standard deviation of the logarithm of speeds in clear air; below, they are classes or limits [-]."""
+_FIRST_STEP = 0.1
+"""First step of the search for the end of an interval, in logarithms [-]."""
+_END = 1e-3
+"""Accuracy of the ends of an interval, in logarithms [-]."""
 _STEP = 1e-4
 """Step of numerical derivatives, in logarithms [-]."""
 
@@ -176,13 +180,54 @@ class _SpeedModel:
         self._density = np.array([1.0 - least.share(v) for v in visibility]) / 0.5
         clear = self._log_speed[visibility >= UNAFFECTED_ABOVE]
         lost = 1.0 - usual.slowest_share
-        self.begin = np.array(
-            [clear.mean(), math.log(clear.std()), math.log(lost / (1.0 - lost)), math.log(usual.overdriving), -2.3]
-        )
+        begin = [clear.mean(), math.log(clear.std()), math.log(lost / (1.0 - lost)), math.log(usual.overdriving), -2.3]
+        # The second begins where sight limits none.
+        self.starts = (np.array(begin), np.array([*begin[:3], math.log(8.0), begin[4]]))
 
     def losses(self, parameters: Floats) -> Floats:
         """Negative logarithm of each vehicle's likelihood (n,)."""
         return np.asarray(-np.logaddexp(*self._by_limit(parameters)))
+
+    def most_likely(self, starts: Iterable[Floats], fixed: int | None = None) -> Floats:
+        """The parameters of the least loss that a search from any of the starts finds; one may stay as it is there."""
+        fits = []
+        for start in starts:
+            bounds = [
+                (at, at) if i == fixed else bound for i, (at, bound) in enumerate(zip(start, _BOUNDS, strict=True))
+            ]
+            fits.append(optimize.minimize(self._loss, start, method="L-BFGS-B", bounds=bounds))
+        return np.asarray(min(fits, key=lambda fit: float(fit.fun)).x)
+
+    def interval(self, found: Floats, index: int, excess: float) -> tuple[float, float]:
+        """Ends of the 90 % interval of a parameter: there, the likelihood of the best others has fallen enough.
+
+        Unlike multiples of a standard deviation, they hold where a parameter is nearly unlimited on one side.
+        """
+        limit = self._loss(found) + 0.5 * excess * _NORMAL_90**2 / len(self._log_speed)
+        nearest = found
+
+        def rise(value: float) -> float:
+            nonlocal nearest
+            starts = [np.where(np.arange(len(found)) == index, value, one) for one in (nearest, self.starts[1])]
+            nearest = self.most_likely(starts, index)
+            return self._loss(nearest) - limit
+
+        ends = []
+        for bound, sign in zip(_BOUNDS[index], (-1.0, 1.0), strict=True):
+            nearest, inside, step, is_bracketed = found, float(found[index]), _FIRST_STEP, False
+            outside = inside
+            while not is_bracketed and outside != bound:
+                outside = float(np.clip(inside + sign * step, *sorted((bound, found[index]))))
+                is_bracketed = rise(outside) > 0.0
+                inside, step = (inside, step) if is_bracketed else (outside, 2.0 * step)
+            while is_bracketed and abs(outside - inside) > _END:
+                middle = 0.5 * (inside + outside)
+                inside, outside = (inside, middle) if rise(middle) > 0.0 else (middle, outside)
+            ends.append(outside)
+        return ends[0], ends[1]
+
+    def _loss(self, parameters: Floats) -> float:
+        return float(self.losses(parameters).mean())
 
     def seen(self, parameters: Floats) -> Floats:
         """Probability that sight limits each vehicle's speed (n,) [-]."""
@@ -190,14 +235,14 @@ class _SpeedModel:
         return np.asarray(np.exp(by_sight - np.logaddexp(by_own, by_sight)))
 
     def _by_limit(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Logarithms of each vehicle's likelihood with its own wish, and with sight, as the smaller limit."""
+        """Logarithms of each vehicle's likelihood with its own wish, or sight, as the limit, but for a constant."""
         centre, log_deviation, logit, log_ratio, log_spread = parameters
         share = 1.0 - self._density / (1.0 + math.exp(-logit))
         own = (self._log_speed - centre - np.log(share)) / math.exp(log_deviation)
         limit = self._log_safe + np.log1p((math.exp(log_ratio) - 1.0) * self._rise)
         seen = (self._log_speed - limit) / math.exp(log_spread)
-        by_own = stats.norm.logpdf(own) - log_deviation + stats.norm.logsf(seen)
-        by_sight = stats.norm.logpdf(seen) - log_spread + stats.norm.logsf(own)
+        by_own = special.log_ndtr(-seen) - 0.5 * own**2 - log_deviation
+        by_sight = special.log_ndtr(-own) - 0.5 * seen**2 - log_spread
         return by_own, by_sight
 
 
@@ -207,20 +252,19 @@ _BOUNDS = ((None, None), (-6.0, 2.0), (-8.0, math.log(9.0)), (math.log(0.5), mat
 
 def _fitted_speeds(passages: Passages, free: NDArray[np.bool_]) -> dict[str, Interval]:
     model = _SpeedModel(passages.visibility[free], passages.speed[free])
-    fit = optimize.minimize(lambda at: float(model.losses(at).mean()), model.begin, method="L-BFGS-B", bounds=_BOUNDS)
-    found = fit.x
-    reach = _NORMAL_90 * _deviations(model, found, passages.session[free])
-    low, high = found - reach, found + reach
+    found = model.most_likely(model.starts)
+    excess = _excess(model, found, passages.session[free])
+    low, high = np.transpose([(at, at) if i < 2 else model.interval(found, i, excess[i]) for i, at in enumerate(found)])
     kept = 1.0 / (1.0 + np.exp([found[2], high[2], low[2]]))
     ratio, spread = (np.exp([found[i], low[i], high[i]]) for i in (3, 4))
     seen = model.seen(found)[passages.visibility[free] < UNAFFECTED_ABOVE]
-    by_sight = float(seen.sum())
+    by_sight = float(seen.sum()) if all(high[i] < _BOUNDS[i][1] for i in (3, 4)) else 0.0
     values = zip(FITTED, (kept, ratio, spread), (len(seen) - by_sight, by_sight, by_sight), strict=True)
     return {name: Interval(*map(float, value)) for name, value, count in values if count >= LEAST}
 
 
-def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) -> Floats:
-    """Standard deviations of fitted parameters: the sandwich of the scores, summed over sessions."""
+def _excess(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) -> Floats:
+    """Sandwich variance of the fitted parameters, of scores summed over sessions, as a multiple of the model's own."""
     steps = _STEP * np.eye(len(found))
 
     def scores(at: Floats) -> Floats:
@@ -231,7 +275,8 @@ def _deviations(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) ->
     if int(session[0]) >= 0:
         each = np.stack([np.bincount(session, weights=score) for score in each])
     bread, meat = inverse_of(0.5 * (curvature + curvature.T)), matrix_product(each, each.T)
-    return np.asarray(np.sqrt(np.diag(matrix_product(matrix_product(bread, meat), bread))))
+    own, sandwich = np.diag(bread), np.diag(matrix_product(matrix_product(bread, meat), bread))
+    return np.divide(sandwich, own, np.ones(len(own)), where=own > 0.0)
 
 
 def _fitted_shares(passages: Passages, following: NDArray[np.bool_], clear: Floats) -> dict[str, Interval]:

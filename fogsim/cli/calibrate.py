@@ -143,7 +143,7 @@ def calibrate_drivers_command(
         raise typer.Exit(INTERRUPTED) from None
     write_text(out, fitted.as_yaml(printable(data.name, in_one_line=True)))
     if lacking := [name for name in FITTED if name not in fitted.constants]:
-        reason = f"fewer than {LEAST} vehicles in fog show it at these visibilities; the default stays"
+        reason = f"fewer than {LEAST} vehicles in fog show it, or leave it open above; the default stays"
         print_remarks("not fitted", (f"{', '.join(lacking)}: {reason}",))
     found = {**fitted.constants, **{f"following.{kind}": share for kind, share in fitted.following.items()}}
     if as_json:

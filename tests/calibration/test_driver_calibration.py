@@ -47,13 +47,18 @@ def test_speeds_come_back() -> None:
 
 
 @pytest.mark.nightly
-def test_intervals_of_constants_hold() -> None:
+@pytest.mark.parametrize(
+    # In light fog, few vehicles show whether sight or the driver's own wish limits their speed.
+    ("reach", "most_missed"),
+    [((25.0, 200.0), 14), ((90.0, 200.0), 7)],
+)
+def test_intervals_of_constants_hold(reach: tuple[float, float], most_missed: int) -> None:
     held = []
     for seed in range(24):
-        found = fit_drivers(passages(500, seed)).constants
+        found = fit_drivers(passages(500, seed, reach=reach)).constants
         held += [one.low <= TRUE[name] <= one.high for name, one in found.items()]
-    # Of 72 intervals of 90 %, 7.2 exclude the truth on average, with a standard deviation of 2.5.
-    assert sum(not one for one in held) <= 14
+    # Of 72 intervals of 90 %, 7.2 exclude the truth on average, with a standard deviation of 2.5; of 27, 2.7 and 1.6.
+    assert sum(not one for one in held) <= most_missed
 
 
 def test_shares_of_kinds_come_back() -> None:

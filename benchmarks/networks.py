@@ -7,7 +7,7 @@ are in SUMO alone: ``same`` compares the files of floating car data (place, spee
 second, with 12 digits after the point).
 
     python benchmarks/networks.py [--json] [--seconds 600] [--visibilities inf 100 30] [--networks grid rail …]
-        [--step 0.2] [--per-hour 1500] [--jobs 1 | --one-process]
+        [--step 0.2] [--per-hour 1500] [--one-process]
 
 ``collisions`` are pairs of vehicles, ``teleports`` those that SUMO takes out of jams and blockades, ``cpu_s`` the time
 of the run. Networks of packages that are not installed are left out, and named. The exit code is 1 if a run fails, or
@@ -22,10 +22,9 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -179,19 +178,8 @@ def record(network: str, run: str, link: CountingLink, began: float) -> Row:
     }
 
 
-def measured(networks: Sequence[str], task: Task, jobs: int) -> Iterator[Row]:
-    """Records of networks, each run in a process of its own, so that what ends one ends no other; 0 jobs: in this."""
-    if not jobs:
-        for network in networks:
-            yield from measure(network, task)
-        return
-    with ThreadPoolExecutor(jobs) as pool:
-        for records in pool.map(partial(measure_apart, task), networks):
-            yield from records
-
-
-def measure_apart(task: Task, network: str) -> list[Row]:
-    """Records of a network, measured in a process of its own."""
+def measure_apart(network: str, task: Task) -> list[Row]:
+    """Records of a network, measured in a process of its own, so that what ends one ends no other."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
             return pool.submit(measure, network, task).result()
@@ -213,11 +201,11 @@ def main() -> None:
         per_hour=(1500.0, "vehicles an hour where the traffic is ours"),
         visibilities=([math.inf, 100.0, 30.0], "V_met [m]"),
         networks=(list(NETWORKS), "which", NETWORKS),
-        jobs=(1, "networks at once, each in a process of its own"),
         one_process=(False, "all in this process: quicker, and a crash ends all"),
     )
     task = Task(given.seconds, given.step, given.per_hour, tuple(given.visibilities))
-    records = list(measured(given.networks, task, 0 if given.one_process else given.jobs))
+    measured = measure if given.one_process else measure_apart
+    records = [record for network in given.networks for record in measured(network, task)]
     publish(given, records)
     sys.exit(any(map(failed, records)))
 

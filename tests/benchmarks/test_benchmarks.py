@@ -23,9 +23,6 @@ QUICK = {
     "junctions.py --seeds 1 --minutes 2 --visibility 20": (
         "visibility_m crossings accepted_least_s refused_most_s collisions_per_1000 impact_mps"
     ),
-    "metrics.py --frames none --vehicles 6 --seconds 4 --block 2": (
-        "frames vehicles_read ms_step ms_metrics share share_low share_high blocks"
-    ),
     "traffic.py --vehicles 20 --seconds 1": "vehicles ms_sumo ms_total ratio",
 }
 """Keys of the records of benchmarks by command."""
@@ -51,7 +48,6 @@ SLOW = {
         "pool visibility_m method psnr_db ssim e r s_pct sift_range_m range_ratio ms"
     ),
     "frames.py --size 64x48 --frames 2 --repeat 1": "renderer light width height samples ms_median ms_min ms_render",
-    "renderers.py --renderers 4 --frames 8 --renderer cpu": "growth_kib_per_renderer growth_kib_per_1000_frames",
     "grades.py --visibility 100 --duration 1 --drawings 1": "V_met road method frames valid bias median p95 held",
 }
 

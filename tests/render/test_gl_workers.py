@@ -9,6 +9,7 @@ from fogsim.render import gl_report
 from tests.helpers.command import run_python
 
 WORKERS = Path(__file__).with_name("workers.py")
+CHECKOUT = WORKERS.parents[2]
 PACKAGES = "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 
 
@@ -78,17 +79,33 @@ def test_without_opengl_the_cpu_draws(missing: str) -> None:
     assert "one frame" in run("-c", code)
 
 
+SOAK = f"""
+import sys
+sys.path[:0] = [{str(CHECKOUT)!r}, {str(CHECKOUT / "benchmarks")!r}]
+from fogsim.render import make_renderer
+from fogsim.scene import vehicle_batches
+from resets import growth
+from tests.render.conftest import camera, motorway
+
+place = motorway()
+vehicles = vehicle_batches(place.traffic, 0)
+
+def make_and_close(_):
+    renderer = make_renderer(sys.argv[1], place.scene, 10_000.0)
+    for width, height in ((160, 120), (320, 240)):
+        renderer.render(vehicles, camera(width, height), place.pose)
+    renderer.close()
+
+print(growth(make_and_close, 10)[1])
+"""
+
+
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_opengl")
 @pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 def test_renderers_made_and_closed_leave_no_memory_behind(renderer: str) -> None:
-    code = (
-        "import sys\n"
-        f"sys.path[:0] = [{str(WORKERS.parents[2] / 'benchmarks')!r}]\n"
-        f"from renderers import soak\nprint(soak({renderer!r}, 10, 20)['heap_growth_kib_per_renderer'])"
-    )
-    grown = run("-c", code).strip()
+    grown = run("-c", SOAK, renderer).strip()
     if grown == "None":
         pytest.skip("this C library does not tell what it has handed out")
-    # One renderer of the benchmark's scene holds some megabytes.
+    # One renderer of this scene holds some megabytes.
     assert float(grown) < 100.0

@@ -2,7 +2,7 @@
 
 Hypothesis edits valid files as people and attackers do. Each entry point reads the results in a process of its own,
 with limits on time and memory. An input that ends in another error than FogSim's, in a crash or a hang is shrunk and
-kept in the corpus, which is tried first in each search, and by `tests/faults/test_fuzz_corpus.py`.
+kept in the corpus, which `tests/faults/test_fuzz_corpus.py` reads again.
 """
 
 import argparse
@@ -11,6 +11,7 @@ import faulthandler
 import hashlib
 import importlib
 import io
+import itertools
 import json
 import multiprocessing
 import re
@@ -22,7 +23,6 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,30 +53,6 @@ def _files(*patterns: str) -> list[bytes]:
     return [path.read_bytes() for pattern in patterns for path in sorted(ROOT.glob(pattern))]
 
 
-TEST = b"""name: truck
-duration: 3 s
-clocks: {camera_period: 0.5 s, decision_period: 1 s}
-road: {template: curve, length: 500 m, limit: 100 km/h}
-actors:
-  ego: {position: 50 m}
-  truck: {type: truck, ahead_of: ego, gap: 150 m, stands: true}
-fog: {visibility: 60 m}
-camera: {width: 64, height: 48}
-timeline: [{at: 1 s, do: {truck: {brake: {deceleration: 3 m/s2}}}}]
-vary: {visibility: [60 m, 100 m]}
-expect:
-  in_time: {whenever: "gap(ego, truck) falls below 150 m", require: advice <= 60 km/h, within: 1 s}
-  safe: {never: ego.collision, always: ego.ttc >= 1.5 s}
-"""
-STUDY = b"""scenario: motorway_fog_bank
-settings: [duration_s=1, advice=none]
-factors:
-  policy: {none: [advice=none], ssd: ['advice={method: stopping_sight_distance, informed_by: truth}']}
-  visibility: {v60: [fog.visibility_m=60]}
-seeds: 3
-baseline: {policy: none}
-metrics: [mean_speed_mps]
-"""
 CAMERA = b"""width: 64
 height: 48
 focal_length_px: 58.0
@@ -93,19 +69,10 @@ GPX = b"""<gpx version="1.1"><trk><trkseg><trkpt lat="50.0" lon="8.0"><time>2026
 <trkpt lat="50.001" lon="8.0"><time>2026-01-01T00:00:05Z</time></trkpt></trkseg></trk></gpx>
 """
 TRACK = b"time_s,latitude,longitude,speed_mps\n0,50.0,8.0,10\n1,50.0001,8.0,10\n2,50.0002,8.0,10\n"
-GEOJSON = json.dumps(
-    {
-        "type": "FeatureCollection",
-        "features": [
-            {
-                "type": "Feature",
-                "id": "s1",
-                "geometry": {"type": "Point", "coordinates": [8.0, 50.0005]},
-                "properties": {"kind": "speed_limit", "value": 27.8, "diameter": 0.6, "height": 2.2, "heading": 0.1},
-            }
-        ],
-    }
-).encode()
+GEOJSON = b"""{"type": "FeatureCollection", "features": [{"type": "Feature", "id": "s1",
+"geometry": {"type": "Point", "coordinates": [8.0, 50.0005]},
+"properties": {"kind": "speed_limit", "value": 27.8, "diameter": 0.6, "height": 2.2, "heading": 0.1}}]}
+"""
 MODULE = b"""import sys
 class Mine:
     method = "mine:Mine"
@@ -150,8 +117,16 @@ def entries() -> dict[str, Entry]:
         "scenario": Entry(
             ".yaml", _files("tests/data/road/scenario.yaml"), lambda p: load_cases(p, may_import=import_nothing)
         ),
-        "test": Entry(".fog.yaml", [TEST], lambda p: collect([p], may_import=import_nothing)),
-        "study": Entry(".yaml", [STUDY], lambda p: load_study(p, may_import=import_nothing)),
+        "test": Entry(
+            ".fog.yaml",
+            _files("scenarios/cut_in_at_15_m/scenario.yaml", "scenarios/pedestrian_crossing_fog/scenario.yaml"),
+            lambda p: collect([p], may_import=import_nothing),
+        ),
+        "study": Entry(
+            ".yaml",
+            _files("scenarios/studies/highway_99.yaml", "scenarios/studies/which_sensor.yaml"),
+            lambda p: load_study(p, may_import=import_nothing),
+        ),
         "camera": Entry(".yaml", [CAMERA], load_calibration),
         "openscenario": Entry(".xosc", _files("tests/data/openscenario/*.xosc"), load_scenario),
         "opendrive": Entry(".xodr", _files("tests/data/openscenario/*.xodr"), opendrive_net),
@@ -371,45 +346,25 @@ def _turn(name: str, seed: int, seconds: float) -> tuple[int, str | None]:
         return int(count), why
 
 
-def replayed() -> list[str]:
-    """Findings among the inputs of the corpus: none, unless a fault has come back."""
-    known, found = entries(), []
-    for path in sorted(CORPUS.glob("*/*")):
-        with tempfile.TemporaryDirectory(prefix="fogsim-fuzz-") as folder:
-            try:
-                try_input(known[path.parent.name], path.read_bytes(), Path(folder))
-            except FindingError as finding:
-                found.append(f"{path.relative_to(ROOT)}: {finding}")
-    return found
-
-
 def main(arguments: Sequence[str]) -> int:
     """Search for some time; 1 if anything was found."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0, help="another seed tries other inputs")
     parser.add_argument("--only", action="append", help="an entry point; may be given several times")
-    parser.add_argument("-j", type=int, default=2, help="processes at once")
     chosen = parser.parse_args(arguments)
-    found = replayed()
-    names = chosen.only or list(entries())
-    until, tried, turn = time.monotonic() + 60.0 * chosen.minutes, dict.fromkeys(names, 0), 0
-
-    def search(_: int) -> None:
-        nonlocal turn
-        while time.monotonic() < until:
-            number, turn = turn, turn + 1
-            name = names[number % len(names)]
-            seconds = min(SLICE, until - time.monotonic())
-            count, why = _turn(name, chosen.seed * 1_000 + number, max(seconds, 1.0))
-            tried[name] += count
-            if why is not None:
-                found.append(f"{name}: {why}")
-                print(f"FOUND {found[-1]}", flush=True)  # noqa: T201 - what the command says
-            print(f"{name}: {tried[name]} inputs", flush=True)  # noqa: T201
-
-    with ThreadPoolExecutor(chosen.j) as pool:
-        list(pool.map(search, range(chosen.j)))
+    found, names = [], chosen.only or list(entries())
+    until, tried = time.monotonic() + 60.0 * chosen.minutes, dict.fromkeys(names, 0)
+    for number, name in enumerate(itertools.cycle(names)):
+        left = until - time.monotonic()
+        if left <= 0.0:
+            break
+        count, why = _turn(name, chosen.seed * 1_000 + number, max(min(SLICE, left), 1.0))
+        tried[name] += count
+        if why is not None:
+            found.append(f"{name}: {why}")
+            print(f"FOUND {found[-1]}", flush=True)  # noqa: T201 - what the command says
+        print(f"{name}: {tried[name]} inputs", flush=True)  # noqa: T201
     print(f"{sum(tried.values())} inputs of {len(names)} entry points, {len(found)} findings")  # noqa: T201
     for one in found:
         print(one)  # noqa: T201

@@ -1,15 +1,12 @@
-"""Speed of environments: steps a second next to highway-env's fastest, resets, and what a second worker gains.
+"""Speed of environments: steps a second next to highway-env's fastest, and resets.
 
 Any id that Gymnasium knows once ``fogsim_envs`` is imported. The agent holds the middle of the action space, and time
 that resets take between two steps is not counted. highway-fast-v0, which draws no camera, is measured alternately in
-the same process, so that what else the machine does slows both: their ratio holds where speeds do not. A reset in
-another scenario is one after an episode with other options (``--other``); it goes back and forth between the two.
-Workers are processes; their ratio is two workers' steps a second over one's.
+the same process, so that what else the machine does slows both: their ratio holds where speeds do not.
 
 An id that makes vectors only is one of 256 environments, whose steps are counted each, and whose resets are by one.
 
     python benchmarks/environments.py [--json] [--env ID …] [--kwargs JSON] [--steps 100] [--repeat 3] [--resets 5]
-                                      [--other JSON] [--no-workers]
 """
 
 import argparse
@@ -68,37 +65,14 @@ def steps_per_second(env: Env | Vector, steps: int, action: Any) -> tuple[float,
     return number / spent, number / worked
 
 
-def reset_ms(env: Env | Vector, options: list[dict[str, Any] | None], repeat: int) -> float:
-    """Time of a reset with each of some options in turn, the first ones not counted [ms]."""
+def reset_ms(env: Env | Vector, repeat: int) -> float:
+    """Time of a reset, the first one not counted [ms]."""
     times = []
     for number in range(repeat + 1):
-        for option in options:
-            started = time.perf_counter()
-            env.reset(seed=number, options=option)
-            times.append(1e3 * (time.perf_counter() - started))
-    return round(statistics.median(times[len(options) :]) / getattr(env, "num_envs", 1), 3)
-
-
-def worker_ratio(env_id: str, kwargs: dict[str, Any], steps: int, action: Any, repeat: int) -> float:
-    """Steps a second of two workers over those of one, taken alternately."""
-    own_vectors = gymnasium.spec(env_id).vector_entry_point is not None
-    mode = None if own_vectors else "async"
-    vectors = [gymnasium.make_vec(env_id, count, vectorization_mode=mode, **kwargs) for count in (1, 2)]
-    actions = [np.stack([np.asarray(action)] * vector.num_envs) for vector in vectors]
-    ratios = []
-    for vector in vectors:
-        vector.reset(seed=1)
-    for _ in range(repeat):
-        spent = []
-        for vector, held in zip(vectors, actions, strict=True):
-            started = time.perf_counter()
-            for _ in range(steps):
-                vector.step(held)
-            spent.append(time.perf_counter() - started)
-        ratios.append(2.0 * spent[0] / spent[1])
-    for vector in vectors:
-        vector.close()
-    return round(statistics.median(ratios), 3)
+        started = time.perf_counter()
+        env.reset(seed=number)
+        times.append(1e3 * (time.perf_counter() - started))
+    return round(statistics.median(times[1:]) / getattr(env, "num_envs", 1), 3)
 
 
 def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> Row:
@@ -126,14 +100,9 @@ def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> Row:
         "peer": PEER_ID,
         "peer_steps_per_s": round(statistics.median(peers), 2),
         "ratio": round(statistics.median(a / b for (a, _), b in zip(own, peers, strict=True)), 3),
-        "reset_ms": reset_ms(env, [None], arguments.resets),
-        "reset_other_ms": reset_ms(env, [None, arguments.other], arguments.resets)
-        if arguments.other and not is_batch
-        else None,
+        "reset_ms": reset_ms(env, arguments.resets),
     }
     env.close()
-    if not (arguments.no_workers or is_batch):
-        record["worker_ratio"] = worker_ratio(env_id, arguments.kwargs, arguments.steps, action, arguments.repeat)
     return record
 
 
@@ -145,14 +114,9 @@ def main() -> None:
         kwargs=("{}", "arguments of the environments, as JSON"),
         steps=(100, "steps a repetition"),
         repeat=(3, "repetitions"),
-        resets=(5, "resets of each kind"),
-        other=(
-            '{"overrides": ["drivers.reaction_time_s=1.5"]}',
-            "options of a reset that make it another scenario, as JSON; null for none",
-        ),
-        no_workers=(False, "leave processes out"),
+        resets=(5, "resets"),
     )
-    given.kwargs, given.other = json.loads(given.kwargs), json.loads(given.other)
+    given.kwargs = json.loads(given.kwargs)
     peer: Env = gymnasium.make(PEER_ID)
     records = [measure(given, env_id, peer) for env_id in given.env]
     peer.close()

@@ -30,8 +30,8 @@ QUICK = {
 SLOW = {
     "loop.py --size 64x48 --steps 3 --repeat 1": "env camera vehicles steps_per_s",
     "photograph_roads.py --images 1": "pool method visibility_m pictures valid_share",
-    "environments.py --env fogsim/FogAdvisory-v1 --steps 2 --repeat 1 --resets 1 --no-workers": (
-        "env camera vehicles steps_per_s peer_steps_per_s reset_ms reset_other_ms"
+    "environments.py --env fogsim/FogAdvisory-v1 --steps 2 --repeat 1 --resets 1": (
+        "env camera vehicles steps_per_s peer_steps_per_s reset_ms"
     ),
     "sign_detector.py --pictures painted --kinds stop --visibilities 100 --distances 20 40 --draws 1 --frames 0": (
         "pictures kind operating_range_m recall_half_pct false_alarms_with false_alarms_without"

@@ -1,7 +1,7 @@
-"""A town in SUMO, as a user starts it, to attach FogSim to."""
+"""A town in SUMO, or another simulation, as a user starts it, to attach FogSim to."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,9 @@ ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-ste
 
 
 @contextlib.contextmanager
-def libsumo_in_town() -> Iterator[Any]:
+def libsumo_in_town(arguments: Sequence[str] = ARGUMENTS) -> Iterator[Any]:
     with contextlib.closing(load_libsumo()) as library:
-        library.start(["sumo", *ARGUMENTS])
+        library.start(["sumo", *arguments])
         yield library
 
 
@@ -29,8 +29,8 @@ def conduct(api: Any, vehicle: str) -> tuple[float, ...]:
 
 
 @contextlib.contextmanager
-def traci_in_town(sumo_process: Callable) -> Iterator[Any]:
-    with sumo_process(ARGUMENTS) as (port, _):
+def traci_in_town(sumo_process: Callable[..., Any], arguments: Sequence[str] = ARGUMENTS) -> Iterator[Any]:
+    with sumo_process(arguments) as (port, _):
         connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
         yield connection
         connection.close()

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fogsim.errors import MissingDependencyError
+from fogsim.render import gl_report
 from fogsim.render.drawing import RECORD, Drawing, MeshTable
 from fogsim.scene import build_scene
 from fogsim.traffic.road.network import read_net, road_network
@@ -86,6 +88,15 @@ def traffic(places: list[tuple[np.ndarray, float]]) -> TrafficState:
         lamps=[lamps | (int(Lamp.STOP) if i % 3 == 0 else 0) for i in range(len(places))],
         paint=np.array([PAINTS[i % len(PAINTS)] for i in range(len(places))]).reshape(-1, 3),
     )
+
+
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skip what needs OpenGL where there is none."""
+    try:
+        gl_report()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from fogsim.errors import InputError, MissingDependencyError, UnknownNameError
+from fogsim.errors import InputError, UnknownNameError
 from fogsim.render import Renderer, RenderError, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.values import Camera, CameraPose, Lamp, RoadNetwork, Scene, SignMap, TrafficState
@@ -22,11 +22,7 @@ ILLUMINANCE = 18e3
 
 
 @pytest.fixture(scope="session")
-def make() -> Iterator[Maker]:
-    try:
-        gl_report()
-    except MissingDependencyError as error:
-        pytest.skip(str(error))
+def make(opengl: None) -> Iterator[Maker]:
     made: list[Renderer] = []
 
     def renderer(scene: Scene) -> Renderer:

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fogsim.errors import MissingDependencyError
-from fogsim.render import Renderer, gl_report, make_renderer
+from fogsim.render import Renderer, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Batch, Camera, CameraPose, Scene, SignMap, View
@@ -25,10 +24,6 @@ Pair = tuple[Renderer, Renderer]
 
 
 def pair(scene: Scene) -> Iterator[Pair]:
-    try:
-        gl_report()
-    except MissingDependencyError as error:
-        pytest.skip(str(error))
     made = (make_renderer("opengl", scene, ILLUMINANCE), make_renderer("cpu", scene, ILLUMINANCE))
     yield made
     for one in made:
@@ -42,12 +37,12 @@ def route() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def drawn(place: Place) -> Iterator[Pair]:
+def drawn(opengl: None, place: Place) -> Iterator[Pair]:
     yield from pair(place.scene)
 
 
 @pytest.fixture(scope="module")
-def town() -> Iterator[Pair]:
+def town(opengl: None) -> Iterator[Pair]:
     network = road_network(read_net(ROOT / "tests" / "data" / "grid" / "grid.net.xml"), ["A0B0"])
     yield from pair(build_scene(network, SignMap(), np.random.default_rng(1)))
 
@@ -96,13 +91,11 @@ def test_at_junctions_of_a_town(town: Pair) -> None:
             assert len(np.unique(view.instance)) > 2
 
 
+@pytest.mark.usefixtures("opengl")
 def test_a_wall_is_as_far_as_it_is_and_hides_what_is_hardly_farther() -> None:
     for renderer in ["opengl", "cpu"]:
         for distance, tolerance in [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)]:
-            try:
-                one = make_renderer(renderer, walls((1.0 + tolerance) * distance, distance), ILLUMINANCE)
-            except MissingDependencyError as error:
-                pytest.skip(str(error))
+            one = make_renderer(renderer, walls((1.0 + tolerance) * distance, distance), ILLUMINANCE)
             level = dataclasses.replace(LARGE, pitch=0.0)
             view = one.render((), level, CameraPose((0.0, 0.0, 0.0), 0.0))
             one.close()

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fogsim.errors import MissingDependencyError
 from fogsim.render import RenderError
 from fogsim.render.cpu.rasteriser import CPURasteriser
 from fogsim.render.drawing import NEAR, NOTHING, MeshTable
@@ -18,16 +17,10 @@ from fogsim.values.pinhole import camera_axes
 from tests.helpers.command import run_python
 from tests.render.conftest import drawing_of, mesh
 
+pytestmark = pytest.mark.usefixtures("opengl")
+
 CAMERA = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
 POSE = CameraPose((3.0, -2.0, 1.38), heading=0.7)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _opengl() -> None:
-    try:
-        context()
-    except MissingDependencyError as error:
-        pytest.skip(str(error))
 
 
 def scattered(rng: np.random.Generator, number: int, axes: np.ndarray) -> np.ndarray:

@@ -4,21 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import MissingDependencyError
-from fogsim.render import gl_report
 from tests.helpers.command import run_python
 
 WORKERS = Path(__file__).with_name("workers.py")
 CHECKOUT = WORKERS.parents[2]
 PACKAGES = "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
-
-
-@pytest.fixture
-def _opengl() -> None:
-    try:
-        gl_report()
-    except MissingDependencyError as error:
-        pytest.skip(str(error))
 
 
 def run(*arguments: str, **environment: str) -> str:
@@ -27,7 +17,7 @@ def run(*arguments: str, **environment: str) -> str:
     return done.stdout + done.stderr
 
 
-@pytest.mark.usefixtures("_opengl")
+@pytest.mark.usefixtures("opengl")
 # Fork with cpu draws below, where the parent drew first.
 @pytest.mark.parametrize(
     ("method", "renderer"),
@@ -42,7 +32,7 @@ def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None
 
 
 @pytest.mark.nightly
-@pytest.mark.usefixtures("_opengl")
+@pytest.mark.usefixtures("opengl")
 def test_workers_that_are_spawned_after_the_parent_drew_draw() -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "opengl", "--draw-first")
 
@@ -101,7 +91,7 @@ print(growth(make_and_close, 10)[1])
 
 
 @pytest.mark.nightly
-@pytest.mark.usefixtures("_opengl")
+@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 def test_renderers_made_and_closed_leave_no_memory_behind(renderer: str) -> None:
     grown = run("-c", SOAK, renderer).strip()

@@ -1,6 +1,5 @@
 """Vehicles off the lanes: parked, waiting as taxis, or moved beside the road by another simulator."""
 
-import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import traci
 
 import fogsim
 from fogsim.errors import InputError, SimulationError
@@ -20,6 +18,7 @@ from fogsim.simulation.recording import record_run
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Command, SpeedAdvice, Step
 from fogsim.values.script import ChangeLane, Depart
+from tests.helpers.attached import libsumo_in_town, traci_in_town
 from tests.traffic.common import DATA, configured, driven, even, running
 
 CASES = DATA / "off_lanes"
@@ -112,16 +111,13 @@ ARGUMENTS = ("-c", str(CASES / "two.sumocfg"), "--step-length", "0.1", "--no-ste
 
 @pytest.fixture
 def connection(sumo_process: Callable[..., Any]) -> Iterator[Any]:
-    with sumo_process(ARGUMENTS) as (port, _):
-        connected = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+    with traci_in_town(sumo_process, ARGUMENTS) as connected:
         yield connected
-        connected.close()
 
 
 @pytest.fixture
 def in_process() -> Iterator[Any]:
-    with contextlib.closing(load_libsumo()) as library:
-        library.start(["sumo", *ARGUMENTS])
+    with libsumo_in_town(ARGUMENTS) as library:
         yield library
 
 
@@ -186,7 +182,5 @@ def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
         scenario_from_config(config, "ego", BLIND)
     with pytest.raises(InputError, match=told.removeprefix("mesosim: ")):
         scenario("two", "ego", 60.0, "traffic.sumo_options.mesosim=true")
-    with contextlib.closing(load_libsumo()) as library:
-        library.start(["sumo", *ARGUMENTS, "--mesosim"])
-        with pytest.raises(SimulationError, match=told):
-            fogsim.attach(library, ego="ego", visibility=120.0)
+    with libsumo_in_town([*ARGUMENTS, "--mesosim"]) as library, pytest.raises(SimulationError, match=told):
+        fogsim.attach(library, ego="ego", visibility=120.0)

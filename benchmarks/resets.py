@@ -2,9 +2,8 @@
 
 Parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and the
 steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered, and
-``highway`` of fogsim/FogHighway-v0, without SUMO. ``episodes`` is the bare ``load`` of what fogsim/FogAdvisory-v2
-draws, another road and traffic each time, and ``advisory-v2``, ``fast-v2``, ``drive-v2`` and ``highway-v1`` are those
-environments.
+``highway`` of fogsim/FogHighway-v0, without SUMO. ``advisory-v2``, ``fast-v2``, ``drive-v2`` and ``highway-v1`` draw
+another road and traffic each time.
 The first quarter of the resets is not counted (libraries load, caches fill, the allocator's pools settle). Growth is
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
 separates a leak from scattered free memory.
@@ -22,7 +21,6 @@ from functools import partial
 from pathlib import Path
 
 import gymnasium
-import numpy as np
 from harness import Row, apart, median, parse_options, publish, timed
 
 import fogsim
@@ -30,7 +28,6 @@ import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic, command_line
-from fogsim_envs.task.sampling import MOTORWAY_2, EpisodeChoice, EpisodeSource
 
 SCENARIO = "motorway_fog_bank"
 
@@ -63,19 +60,6 @@ def traffic(_: str) -> Iterator[Reset]:
 
 
 @contextmanager
-def episodes(_: str) -> Iterator[Reset]:
-    """SUMO alone, on the roads and with the demand that fogsim/FogAdvisory-v2 draws."""
-    link, source = LibsumoLink(), EpisodeSource(None, None, None, (), "train", MOTORWAY_2)
-
-    def reset(seed: int) -> None:
-        _, drawn = source.draw(np.random.default_rng(seed), EpisodeChoice())
-        link.begin(command_line(build.traffic_setup(drawn.scenario), seed))
-
-    yield reset
-    link.end()
-
-
-@contextmanager
 def environment(size: str, env_id: str) -> Iterator[Reset]:
     """Everything; an environment that draws no frames needs no size."""
     width, height = map(int, size.split("x"))
@@ -101,7 +85,6 @@ ENVIRONMENTS = {
 PARTS: dict[str, Part] = {
     "sumo": sumo,
     "traffic": traffic,
-    "episodes": episodes,
     **{part: partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
 }
 

@@ -23,20 +23,21 @@ check: ## Say in one line what the system lacks, if anything
 	@command -v $(PYTHON) >/dev/null || { echo "FogSim needs Python 3.11 or newer: sudo apt-get install python3 python3-venv"; exit 1; }
 	@$(PYTHON) tools/check_system.py
 
+# That of continuous integration includes all others, so that they are not installed one after another.
+INSTALLED := $(addprefix $(VENV)/.installed,-test -cluster -notebooks -docs)
 $(VENV)/.installed: EXTRAS :=
-$(VENV)/.installed: pyproject.toml | check
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "Installing FogSim into $(VENV) (once, a minute or two) …"
-	@$(INSTALL)
-	@touch $@
-
-# One installation, not two after one another; bytecode is made as modules are used.
 $(VENV)/.installed-test: EXTRAS := [test]
-$(VENV)/.installed-test: pyproject.toml | check
+$(VENV)/.installed-cluster: EXTRAS := [test,ray]
+$(VENV)/.installed-notebooks: EXTRAS := [notebooks]
+$(VENV)/.installed-docs: EXTRAS := [docs,notebooks]
+$(VENV)/.installed-ci: EXTRAS := [test,notebooks,docs,ray]
+$(VENV)/.installed-ci: INCLUDED := $(INSTALLED)
+$(filter-out %-test,$(INSTALLED)): $(VENV)/.installed-test
+$(VENV)/.installed $(INSTALLED) $(VENV)/.installed-ci: pyproject.toml | check
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "Installing FogSim and the test tools into $(VENV) (once, a minute or two) …"
+	@echo "Installing FogSim$(EXTRAS) into $(VENV) (once, a minute or two) …"
 	@$(INSTALL)
-	@touch $(VENV)/.installed $@
+	@touch $(VENV)/.installed $(INCLUDED) $@
 
 $(VENV)/.compiled: $(VENV)/.installed-test
 	@echo "Compiling kernels (once, a minute or two) …"
@@ -72,7 +73,7 @@ hooks: $(VENV)/.installed-test ## Check style, types and contracts before each c
 portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
 	@$(BIN)/python -m pytest tests/portability
 
-$(VENV)/.installed-cluster: EXTRAS := [test,ray]
+cluster: EXTRAS := [test,ray]
 $(VENV)/.installed-cluster: $(VENV)/.installed-test
 	@$(INSTALL)
 	@touch $@
@@ -80,20 +81,8 @@ $(VENV)/.installed-cluster: $(VENV)/.installed-test
 cluster: $(VENV)/.installed-cluster ## Run a study on a Ray cluster of two nodes, and kill one (installs Ray)
 	@$(BIN)/python -m pytest tests/cluster
 
-$(VENV)/.installed-notebooks: EXTRAS := [notebooks]
-$(VENV)/.installed-notebooks: pyproject.toml $(VENV)/.installed-test
-	@echo "Installing Jupyter's kernel into $(VENV) (once) …"
-	@$(INSTALL)
-	@touch $@
-
 notebooks: $(VENV)/.installed-notebooks ## Run the notebooks from their first cell to their last
 	@$(BIN)/python -m pytest -q -n auto tests/notebooks
-
-$(VENV)/.installed-docs: EXTRAS := [docs,notebooks]
-$(VENV)/.installed-docs: pyproject.toml $(VENV)/.installed-test
-	@echo "Installing MkDocs into $(VENV) (once) …"
-	@$(INSTALL)
-	@touch $@
 
 site: export NO_MKDOCS_2_WARNING := 1
 site: $(VENV)/.installed-docs $(VENV)/.compiled ## Build the documentation site into site/; runs the notebooks (some minutes) if code has changed
@@ -127,14 +116,6 @@ types: $(VENV)/.installed-test ## Check types
 
 contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
-
-# All at once, not four installations after one another.
-$(VENV)/.installed-ci: EXTRAS := [test,notebooks,docs,ray]
-$(VENV)/.installed-ci: pyproject.toml | check
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "Installing FogSim, the test tools, Jupyter's kernel, MkDocs and Ray into $(VENV) (once, a few minutes) …"
-	@$(INSTALL)
-	@touch $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-notebooks $(VENV)/.installed-docs $(VENV)/.installed-cluster $@
 
 # What works on one processor, or waits, goes beside something else; the tests themselves take all processors.
 ci: $(VENV)/.installed-ci ## Everything that .ci/run checks

@@ -7,7 +7,6 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from fogsim.cli.compile import compile_command
 from fogsim.cli.printing import escape, stdout
@@ -44,10 +43,10 @@ def doctor_command(
 ) -> None:
     """List what works on this machine, what is missing, and how to install it."""
     findings = examine()
-    table = Table(box=None, show_header=False, pad_edge=False)
+    width = max(len(finding.subject) for finding in findings)
     for finding in findings:
-        table.add_row("[green]fine[/]" if finding.works else "[red]missing[/]", finding.subject, escape(finding.detail))
-    stdout.print(table)
+        mark = "[green]fine   [/]" if finding.works else "[red]missing[/]"
+        stdout.print(f"{mark} {finding.subject:<{width}} {escape(finding.detail)}", soft_wrap=True)
     if not all(finding.works for finding in findings):
         raise typer.Exit(1)
     if ahead:
@@ -73,7 +72,7 @@ def _package(name: str) -> Finding:
 def _try(subject: str, check: Callable[[], str]) -> Finding:
     try:
         return Finding(subject, True, check())
-    except FogSimError as error:
+    except (FogSimError, ImportError, OSError) as error:  # as of a library that is not there, or not whole
         return Finding(subject, False, str(error))
 
 

@@ -13,9 +13,9 @@ from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 
 from fogsim.core.files.atomic import partial_path, write_bytes, write_json
 from fogsim.core.files.output_targets import refuse_unwritable_folder
-from fogsim.core.files.readers import read_bytes, read_json
+from fogsim.core.files.readers import open_regular, read_bytes, read_json
 from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock
-from fogsim.dataset.encoding import png
+from fogsim.dataset.encoding import PNG_END, png
 from fogsim.errors import InputError, shown
 
 IDENTITY = "dataset.json"
@@ -24,9 +24,6 @@ LAYERS = ("frames", "depth", "instance", "semantic", "transmission", "sign_map",
 """Folders of the images."""
 
 _RECORDS = "records"
-
-_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-"""Last bytes of a PNG file that is not cut off."""
 
 
 class _ImageEntry(BaseModel, strict=True):
@@ -50,7 +47,8 @@ class DatasetDirectory:
     """The directory of one data set, new or to be continued, with one writer at a time.
 
     A frame is complete when its record is written, after its images; only the data set's own files are replaced.
-    `identity` is JSON data, and InputError is raised if the directory holds anything else.
+    `identity` is JSON data, and InputError is raised if the directory holds anything else. A data set without frames is
+    begun again, whatever its identity.
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
@@ -95,7 +93,8 @@ class DatasetDirectory:
         if not isinstance(there, dict):
             raise InputError(f"{self.path / IDENTITY}: expected what a data set was made from, got {shown(there)}")
         unlike = _differences(there, json.loads(json.dumps(identity)))
-        if unlike:
+        # Without frames, as after a simulation that could not start, its inputs may have been mended since.
+        if unlike and (there.keys() != identity.keys() or any(self.path.glob("*/*"))):
             raise InputError(
                 f"{self.path} holds another data set: {'; '.join(unlike[:4])}{' …' if len(unlike) > 4 else ''}. "
                 "Choose another directory with --out, or continue that one as it was begun"
@@ -159,10 +158,10 @@ class DatasetDirectory:
 def _is_whole(image: Path) -> bool:
     """Whether a PNG file is there and not cut off."""
     try:
-        with image.open("rb") as file:
-            file.seek(-len(_PNG_END), os.SEEK_END)
-            return file.read() == _PNG_END
-    except OSError:
+        with open_regular(image) as file:
+            file.seek(-len(PNG_END), os.SEEK_END)
+            return file.read() == PNG_END
+    except (InputError, OSError):
         return False
 
 

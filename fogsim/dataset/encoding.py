@@ -20,6 +20,10 @@ TRANSMISSION_UNIT = 1.0 / 65_535
 _MOST = 65_535
 _COMPRESSION = 3  # of 9; more takes several times as long for a few per cent
 
+_PNG_START = b"\x89PNG\r\n\x1a\n"
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+"""Last bytes of a PNG file that is not cut off."""
+
 
 def encoded_depth(distance: NDArray[np.float32]) -> NDArray[np.uint16]:
     """Distance along the ray as 16-bit values in centimetres.
@@ -102,12 +106,16 @@ def read_png(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
     Raises
     ------
     InputError
-        If it is not a readable PNG file.
+        If it is not a readable PNG file, or has opacity.
     """
-    data = np.frombuffer(read_bytes(Path(path)), np.uint8)
+    data = read_bytes(Path(path))
+    if not (data.startswith(_PNG_START) and PNG_END in data):
+        raise InputError(f"{path}: expected a PNG file, got another one or a part of one")
     image: NDArray[Any] | None = None
     with contextlib.suppress(cv2.error, MemoryError):  # of a header that announces more pixels than OpenCV reads
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise InputError(f"{path} is no image that can be read")
+        raise InputError(f"{path}: this PNG file is damaged")
+    if image.ndim == 3 and image.shape[2] > 3:
+        raise InputError(f"{path}: expected a grey or colour image as in a data set, got one with opacity")
     return image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])

@@ -185,17 +185,24 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
         "every": every,
         "scenario": resolved(scenario),
         "inputs": input_digests(scenario),
-        "versions": found,
+        "versions": {**found, **build.own_methods(scenario)},
     }
 
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of each SUMO file of a scenario, by name: net, routes, additional, configuration."""
+    """SHA-256 of each SUMO file of a scenario, by name: net, routes, additional, configuration.
+
+    Files of the same name in different folders share an entry.
+    """
     setup = build.traffic_setup(scenario)
     files = [*([] if setup.net is None else [setup.net]), *setup.routes, *setup.additional]
     if setup.config is not None:
         files += [setup.config, *input_files(setup.config)]
-    return {_name(file, scenario.directory): _digest(file) for file in files}
+    digests: dict[str, str] = {}
+    for file in dict.fromkeys(files):
+        name, digest = _name(file, scenario.directory), _digest(file)
+        digests[name] = f"{digests[name]} {digest}" if name in digests else digest
+    return digests
 
 
 def _name(file: Path, folder: Path) -> str:

@@ -40,7 +40,7 @@ class Reading:
     def of(cls, time: float, estimate: Estimate) -> "Reading":
         """From an estimate at an instant [s]."""
         low, high = estimate.visibility_interval
-        reason = "" if estimate.valid else str(estimate.diagnostics.get("reason", "no reason given"))
+        reason = "" if estimate.valid else str(estimate.diagnostics.get("reason") or "no reason given")
         return cls(time, estimate.visibility if estimate.valid else math.nan, low, high, reason)
 
 
@@ -76,7 +76,7 @@ class Clip:
 
 
 def _summary(readings: list[Reading]) -> Iterator[str]:
-    valid = [one for one in readings if not one.reason]
+    valid = [one for one in readings if not math.isnan(one.visibility)]
     end = readings[-1].time
     recent = [one for one in valid if one.time >= end - _RECENT]
     length = end - readings[0].time

@@ -1,5 +1,6 @@
 """Contrast restoration of images and videos from disk."""
 
+from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,8 +153,11 @@ def restore_files(
     is_folder = len(targets) > 1
     if is_folder:
         refuse_unwritable_folder(out)
+    # Comparing each target with all sources would take minutes for thousands of images.
+    sources = {_identity(path): (path,) for path in source.paths}
     for target in targets:
-        refuse_unwritable_image(target, "--out", overwrite=overwrite, read=source.paths, makes_folder=is_folder)
+        read = sources.get(_identity(target), ())
+        refuse_unwritable_image(target, "--out", overwrite=overwrite, read=read, makes_folder=is_folder)
     if is_folder:
         out.mkdir(parents=True, exist_ok=True)
     for target, one in zip(targets, _restored_images(source, camera, wish), strict=True):
@@ -167,11 +171,19 @@ def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:
     """Output path of each image; InputError if two are the same."""
     if len(paths) == 1:
         return (out,)
-    names = [path.name for path in paths]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(f"{twice}: two images have this name, and both would go to {out / twice}; restore them apart")
-    return tuple(out / name for name in names)
+    name, count = Counter(path.name for path in paths).most_common(1)[0]
+    if count > 1:
+        raise InputError(f"{name}: {count} images have this name, and would all go to {out / name}; restore them apart")
+    return tuple(out / path.name for path in paths)
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and inode of a file; None if there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def restore_video(

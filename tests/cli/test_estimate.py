@@ -152,6 +152,9 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
     assert found == pytest.approx([80.0] * len(found), rel=0.15)
 
 
+NOT_FOR_A_GUESS = (("--json",), ("--method", "all"), ("--overlay", "o.mp4"), ("--night",), ("--setback", "0"))
+
+
 def test_mistakes_end_with_exit_code_2(estimate, folder: Path) -> None:
     (folder / "typo.yaml").write_text(CAMERA_YAML.replace("width", "widht"), encoding="utf-8")
     (folder / "aside.yaml").write_text(CAMERA_YAML + "yaw_deg: 55\n", encoding="utf-8")
@@ -164,6 +167,8 @@ def test_mistakes_end_with_exit_code_2(estimate, folder: Path) -> None:
         (("camera.yaml", "--camera", "camera.yaml"), "the only image cannot be read"),
         (("drive", "--camera", "camera.yaml", "--mount-height", "1.4"), "--mount-height is for a guess"),
         (("drive", "--guess-camera"), "--camera camera.yaml"),
+        *(((*guess, *option), f"{option[0]} does not go with --guess-camera") for option in NOT_FOR_A_GUESS),
+        (("drive", "--camera", "camera.yaml", "--track-offset", "3"), "--track-offset goes with --track"),
         (("drive", "--camera", "camera.yaml", "--json", "--csv"), "give one of them"),
         (("drive", "--camera", "camera.yaml", "--stills", "--plot", "v.png"), "--plot draws over time"),
         (("drive", "--camera", "camera.yaml", "--plot", "v.bmp"), "--plot must end in .png, .svg or .pdf"),

@@ -11,8 +11,10 @@ import typer
 from flat_road import Road, photograph, scan
 
 from fogsim.cli.images.restore import restore_command
+from fogsim.errors import InputError
 from fogsim.offline.camera_file import load_calibration
-from fogsim.offline.restoration import Restored
+from fogsim.offline.input_paths import find_source
+from fogsim.offline.restoration import RestorationWish, Restored, restore_files
 from fogsim.offline.source import Picture
 from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
@@ -90,6 +92,37 @@ def test_images_that_are_not_restored_are_not_kept_in_memory(folder: Path, monke
     with pytest.raises(typer.Exit):
         restore_command([str(folder / "fog.png")], folder / "camera.yaml", folder / "out.png")
     assert max(alive) <= 2
+
+
+def test_why_no_image_could_be_read_is_reported(folder: Path, command: Command) -> None:
+    for names in (("broken.png",), ("broken.png", "torn.png")):
+        (folder / names[-1]).write_text("no image", encoding="utf-8")
+        done = command("restore", *names, *WITH_CAMERA, "--out", "out.png" if len(names) == 1 else "clear", cwd=folder)
+        assert done.returncode == 2
+        assert all(f"  {name}: this is no image that can be read" in done.stderr for name in names)
+
+
+def test_targets_are_not_compared_with_every_source(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "in").mkdir()
+    (folder / "out").mkdir()
+    for number in range(20):
+        (folder / "in" / f"{number}.png").write_bytes((folder / "fog.png").read_bytes())
+        (folder / "out" / f"{number}.png").touch()
+    compared, is_same = list[Path](), Path.samefile
+
+    def noted(path: Path, other: Path) -> bool:
+        compared.append(path)
+        return is_same(path, other)
+
+    monkeypatch.setattr(Path, "samefile", noted)
+    source, camera = find_source(folder / "in"), load_calibration(folder / "camera.yaml").camera
+    restoring = restore_files(source, camera, RestorationWish("tarel2009"), folder / "out", overwrite=True)
+    next(restoring)
+    assert len(compared) <= 20
+    (folder / "out" / "3.png").unlink()
+    (folder / "out" / "3.png").symlink_to(folder / "in" / "7.png")
+    with pytest.raises(InputError, match=r"3\.png would replace what is read"):
+        next(restore_files(source, camera, RestorationWish("tarel2009"), folder / "out", overwrite=True))
 
 
 def put_video(path: Path, frames: list[np.ndarray]) -> None:

@@ -15,7 +15,7 @@ from early_motorway import EARLY, ROUTES
 import fogsim
 from fogsim.dataset import read_png
 from fogsim.dataset.directory import LAYERS, DatasetDirectory
-from fogsim.dataset.write import input_digests
+from fogsim.dataset.write import identity, input_digests
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, scenario_from_config
 
@@ -136,13 +136,56 @@ def test_a_data_set_is_not_continued_with_other_inputs(tmp_path: Path) -> None:
     assert contents(out) == before
 
 
+def test_a_data_set_without_frames_is_begun_again_with_mended_inputs(tmp_path: Path) -> None:
+    mine = {"seed": 1}
+    with DatasetDirectory(tmp_path, {"seed": 0}):
+        pass
+    with DatasetDirectory(tmp_path, mine):
+        assert json.loads((tmp_path / "dataset.json").read_text(encoding="utf-8")) == mine
+    (tmp_path / "frames" / "000000.png").touch()
+    with pytest.raises(InputError, match="holds another data set: seed is 1 there"):
+        DatasetDirectory(tmp_path, {"seed": 0})
+    (tmp_path / "frames" / "000000.png").unlink()
+    (tmp_path / "dataset.json").write_text('{"name": "of another tool"}', encoding="utf-8")
+    with pytest.raises(InputError, match="holds another data set: name is "):
+        DatasetDirectory(tmp_path, mine)
+    assert "another tool" in (tmp_path / "dataset.json").read_text(encoding="utf-8")
+
+
+def test_own_methods_are_part_of_the_identity(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(small().directory, tmp_path / "mine"))
+    method = folder / "own_lamps.py"
+    found = []
+    for lamps in range(2):
+        method.write_text(f"class Lit:\n    def lamps(self, *_): return {lamps}\n", encoding="utf-8")
+        scenario = fogsim.load_scenario(str(folder), ["lighting=own_lamps:Lit"])
+        found.append(identity(scenario, 0, 1)["versions"]["own_lamps:Lit"])
+    assert found[0] != found[1]
+
+
+def test_inputs_of_one_name_in_several_folders_all_count(tmp_path: Path) -> None:
+    grid = Path(__file__).resolve().parents[1] / "data" / "grid"
+    folder = Path(shutil.copytree(grid, tmp_path / "grid"))
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "more.add.xml").write_text("<additional/>", encoding="utf-8")
+    config = folder / "grid.sumocfg"
+    more = f'<additional-files value="{tmp_path}/a/more.add.xml,{tmp_path}/b/more.add.xml"/>'
+    config.write_text(config.read_text(encoding="utf-8").replace("</input>", f"{more}</input>"), encoding="utf-8")
+    found = [input_digests(scenario_from_config(config, "veh18", ["fog.visibility_m=120"]))]
+    for name in ("a", "b"):
+        (tmp_path / name / "more.add.xml").write_text("<additional></additional>", encoding="utf-8")
+        found.append(input_digests(scenario_from_config(config, "veh18", ["fog.visibility_m=120"])))
+    assert len({digests["more.add.xml"] for digests in found}) == 3
+
+
 def test_its_manifest_names_every_input_and_version(whole: Path) -> None:
-    identity = json.loads((whole / "dataset.json").read_text(encoding="utf-8"))
+    written = json.loads((whole / "dataset.json").read_text(encoding="utf-8"))
     scenario = small()
     files = [scenario.traffic.net, *scenario.traffic.routes, *scenario.traffic.additional]
     digests = {Path(f).name: hashlib.sha256((scenario.directory / str(f)).read_bytes()).hexdigest() for f in files}
-    assert identity["inputs"] == digests
-    assert {"fogsim", "libsumo", "numpy", "python"} <= set(identity["versions"])
+    assert written["inputs"] == digests
+    assert {"fogsim", "libsumo", "numpy", "python"} <= set(written["versions"])
 
 
 def test_files_of_a_sumo_configuration_are_inputs() -> None:

@@ -1,10 +1,12 @@
 """Data sets whose records or identity were damaged: made again, or one line; never taken as they are."""
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fogsim.dataset import read_png
 from fogsim.dataset.directory import IDENTITY, LAYERS, DatasetDirectory
@@ -70,7 +72,18 @@ def test_a_damaged_identity_is_refused_in_one_line(directory: DatasetDirectory) 
 
 
 def test_a_layer_that_is_no_image_is_refused(tmp_path: Path) -> None:
-    for data in [b"", b"no image", b"\x89PNG\r\n\x1a\n"]:
+    pixels = np.random.default_rng(0).integers(0, 255, (64, 64, 4), np.uint8)
+    whole, photo, clear = (io.BytesIO() for _ in range(3))
+    Image.fromarray(pixels[..., :3]).save(whole, "PNG")
+    Image.fromarray(pixels[..., :3]).save(photo, "JPEG")
+    Image.fromarray(pixels).save(clear, "PNG")
+    for data, message in [
+        *((data, "expected a PNG file") for data in (b"", b"no image", whole.getvalue()[:-30], photo.getvalue())),
+        (whole.getvalue()[:100] + whole.getvalue()[-12:], "this PNG file is damaged"),
+        (clear.getvalue(), "expected a grey or colour image"),
+    ]:
         (tmp_path / "x.png").write_bytes(data)
-        with pytest.raises(InputError, match=r"x\.png"):
+        with pytest.raises(InputError, match=rf"x\.png: {message}"):
             read_png(tmp_path / "x.png")
+    (tmp_path / "x.png").write_bytes(whole.getvalue() + b"more")
+    assert np.array_equal(read_png(tmp_path / "x.png"), pixels[..., :3])

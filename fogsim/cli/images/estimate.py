@@ -15,7 +15,7 @@ from fogsim.cli.progress import counting_bar, progress_bar
 from fogsim.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from fogsim.offline import Calibration, CameraGuess, FrameEstimates, NightDrive, SignWatch, Source
     from fogsim.offline.clip_summary import Clip
@@ -54,7 +54,7 @@ def estimate_command(
         float | None, typer.Option(min=1e-6, max=1e6, help="Images per second of a sequence. Default: 10.")
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
+        bool, typer.Option("--overwrite", help="Replace an overlay, a plot or a guessed camera file.")
     ] = False,
     signs: Annotated[Path | None, typer.Option(help="Sign map: GeoJSON, points in WGS 84. With --track.")] = None,
     track: Annotated[
@@ -99,10 +99,16 @@ def estimate_command(
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
     from fogsim.offline import chosen_methods, find_source
 
+    if track is None:
+        _refuse_given({"--track-offset": track_offset or None}, "goes with --track")
     guessing = _Guessing(mount_height, field_of_view, horizon_row, track, track_offset)
     if guess_camera:
         if camera is None:
             raise InputError("--guess-camera writes a camera file and needs its name: --camera camera.yaml")
+        estimating = {"--method": method, "--json": as_json, "--csv": as_csv, "--plot": plot, "--overlay": overlay}
+        by_night = {"--night": night, "--lamps": lamps, "--setback": setback, "--head-lamps": head_lamps}
+        unused = {**estimating, "--signs": signs, **by_night, "--halos": halos}
+        _refuse_given(unused, "does not go with --guess-camera, which estimates no visibility")
         _guess(find_source(images, sequence=sequence, rate=rate), camera, overwrite, guessing)
         return
     if camera is not None:
@@ -118,6 +124,13 @@ def estimate_command(
     _check_plot(outputs, source)
     calibration = _calibration(source, camera, guessing)
     _estimate(source, calibration, methods, outputs, (signs, track, track_offset), drive)
+
+
+def _refuse_given(options: "Mapping[str, object]", reason: str) -> None:
+    """Refuse the first option that is given; those that are not are None, or False for flags."""
+    for option, value in options.items():
+        if value is not None and value is not False:
+            raise InputError(f"{option} {reason}")
 
 
 def _methods(named: list[str] | None, night: "NightDrive | None", *, mapped: bool) -> list[str]:
@@ -140,9 +153,8 @@ class _Guessing:
     track_offset: float
 
     def refuse_all(self) -> None:
-        for name in ("mount_height", "field_of_view", "horizon_row"):
-            if getattr(self, name) is not None:
-                raise InputError(f"--{name.replace('_', '-')} is for a guess; the camera file has it")
+        stated = {"--mount-height": self.mount_height, "--field-of-view": self.field_of_view}
+        _refuse_given({**stated, "--horizon-row": self.horizon_row}, "is for a guess; the camera file has it")
 
     def __call__(self, source: "Source") -> "CameraGuess":
         from fogsim.offline import guess_camera
@@ -195,14 +207,8 @@ def _night_drive(
     from fogsim.offline import NightDrive
 
     if not night:
-        for option, value in (
-            ("--lamps", lamps),
-            ("--setback", setback),
-            ("--head-lamps", head_lamps),
-            ("--halos", halos),
-        ):
-            if value is not None:
-                raise InputError(f"{option} goes with --night")
+        by_night = {"--lamps": lamps, "--setback": setback, "--head-lamps": head_lamps, "--halos": halos}
+        _refuse_given(by_night, "goes with --night")
         return None
     for option, file in (("--head-lamps", head_lamps), ("--halos", halos)):
         if file is not None and not file.is_file() and str(file) not in KNOWN_HEAD_LAMPS:
@@ -243,7 +249,7 @@ def _estimate(
             progress.advance(task)
     if rows.are_summed_up:
         for line in clip.lines():
-            _say(line)
+            _say(printable(line, in_one_line=True))
     if watch is not None:
         _show_signs(watch, quiet=outputs.as_json or outputs.as_csv)
     if outputs.plot is not None:

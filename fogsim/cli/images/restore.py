@@ -58,21 +58,29 @@ def restore_command(
     source, pinhole = straightened(given, calibration)
     is_files, lacking, counts = isinstance(given, ImageFiles), list[str](), Counter[str]()
     restore = restore_files if is_files else restore_video
-    with (
-        progress_bar(stderr) as progress,
-        contextlib.closing(restore(source, pinhole, wish, out, overwrite=overwrite)) as results,
-    ):
-        task = progress.add_task(source.description, total=source.count)
-        for one in results:
-            if one.image is None:  # its text alone: a drive's images would fill the memory
-                named = is_files and not one.picture.error
-                lacking.append(f"{one.picture.name}: {one.reason}" if named else one.reason)
-            counts["restored" if one.image is not None else "lacking"] += 1
-            counts["held"] += one.held
-            last = one
-            progress.advance(task)
+    try:
+        with (
+            progress_bar(stderr) as progress,
+            contextlib.closing(restore(source, pinhole, wish, out, overwrite=overwrite)) as results,
+        ):
+            task = progress.add_task(source.description, total=source.count)
+            for one in results:
+                if one.image is None:  # its text alone: a drive's images would fill the memory
+                    named = is_files and not one.picture.error
+                    lacking.append(f"{one.picture.name}: {one.reason}" if named else one.reason)
+                counts["restored" if one.image is not None else "lacking"] += 1
+                counts["held"] += one.held
+                last = one
+                progress.advance(task)
+    finally:
+        if is_files:
+            _report_missing(lacking)
     _print_counts(out, wish, counts, last)
-    _report_missing(lacking, is_files)
+    if lacking and is_files:
+        raise typer.Exit(BAD_INPUT)
+    if lacking:
+        text = f"{len(lacking)} frames before the first estimate are as they were: {lacking[0]}"
+        print_remarks("not restored", (text,))
 
 
 def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", last: "Restored") -> None:
@@ -90,15 +98,10 @@ def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", la
         print_remarks("held", (f"in {counts['held']} images had no estimate; the last one was used",))
 
 
-def _report_missing(lacking: list[str], files: bool) -> None:
-    """Report why images were not restored; frames of a video are left unchanged."""
+def _report_missing(lacking: list[str]) -> None:
+    """Report why images were not restored."""
     if not lacking:
-        return
-    if not files:
-        text = f"{len(lacking)} frames before the first estimate are as they were: {lacking[0]}"
-        print_remarks("not restored", (text,))
         return
     print_error(f"{len(lacking)} of the images could not be restored (--visibility does without an estimate):")
     for reason in lacking:
         stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
-    raise typer.Exit(BAD_INPUT)

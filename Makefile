@@ -73,11 +73,6 @@ hooks: $(VENV)/.installed-test ## Check style, types and contracts before each c
 portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
 	@$(BIN)/python -m pytest tests/portability
 
-cluster: EXTRAS := [test,ray]
-$(VENV)/.installed-cluster: $(VENV)/.installed-test
-	@$(INSTALL)
-	@touch $@
-
 cluster: $(VENV)/.installed-cluster ## Run a study on a Ray cluster of two nodes, and kill one (installs Ray)
 	@$(BIN)/python -m pytest tests/cluster
 

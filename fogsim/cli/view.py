@@ -35,7 +35,7 @@ def view_command(
 ) -> None:
     """Show the world around the ego, in clear air, in pyrender's viewer, or write an image of it."""
     from fogsim.offline.image_files import refuse_unwritable_image, write_image
-    from fogsim.render import to_pyrender
+    from fogsim.render import gl_report, to_pyrender
     from fogsim.render.pyrender_reference import first_picture, open_viewer, require_display
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
@@ -44,6 +44,7 @@ def view_command(
         require_display()
     else:
         refuse_unwritable_image(out, "--out", overwrite=overwrite)
+        gl_report()
     around = _surrounding(loaded, at, seed)
     nodes = to_pyrender(
         around.scene,

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -161,10 +161,21 @@ def restore_files(
     if is_folder:
         out.mkdir(parents=True, exist_ok=True)
     for target, one in zip(targets, _restored_images(source, camera, wish), strict=True):
-        if one.image is not None:
-            # Stored with blue first.
-            write_image(target, one.image if one.image.ndim == 2 else one.image[..., ::-1].copy())
-        yield one
+        yield _written(target, one, is_one_of_several=is_folder)
+
+
+def _written(target: Path, one: Restored, *, is_one_of_several: bool) -> Restored:
+    """Write a restored image; one of several that its format cannot hold counts as not restored."""
+    if one.image is None:
+        return one
+    try:
+        # Stored with blue first.
+        write_image(target, one.image if one.image.ndim == 2 else one.image[..., ::-1].copy())
+    except InputError as error:
+        if not is_one_of_several:
+            raise
+        return replace(one, image=None, reason=str(error))
+    return one
 
 
 def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:

@@ -125,6 +125,17 @@ def test_targets_are_not_compared_with_every_source(folder: Path, monkeypatch: p
         next(restore_files(source, camera, RestorationWish("tarel2009"), folder / "out", overwrite=True))
 
 
+def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, command: Command) -> None:
+    cv2.imwrite(str(folder / "deep.pgm"), np.full((240, 320), 40_000, np.uint16))
+    line = (*WITH_CAMERA, "--method", "tarel2009", "--out")
+    done = command("restore", "deep.pgm", "fog.png", *line, "clear", cwd=folder)
+    assert done.returncode == 2
+    assert "  deep.pgm: clear/deep.pgm: an image of 16 bits is written as .png or .tif" in done.stderr
+    assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
+    done = command("restore", "deep.pgm", *line, "deep2.pgm", cwd=folder)
+    assert done.stderr == "error: deep2.pgm: an image of 16 bits is written as .png or .tif, not .pgm\n"
+
+
 def put_video(path: Path, frames: list[np.ndarray]) -> None:
     encoder = Encoder(encoder_command(path, 0.1, (320, 240), 8))
     for frame in frames:

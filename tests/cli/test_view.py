@@ -8,7 +8,7 @@ from early_motorway import EARLY
 from PIL import Image
 
 from fogsim.cli.view import view_command
-from fogsim.errors import InputError
+from fogsim.errors import InputError, MissingDependencyError
 from fogsim.scenario import load_scenario
 from fogsim.simulation.loop import ClosedLoop
 
@@ -36,6 +36,16 @@ def test_mistakes_are_told_before_the_display_and_the_run(tmp_path: Path, monkey
     with pytest.raises(InputError, match="--overwrite"):
         view_command("motorway_fog_bank", out=out)
     assert out.read_bytes() == b"mine"
+
+
+def test_missing_opengl_is_reported_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lacking() -> str:
+        raise MissingDependencyError("no OpenGL")
+
+    monkeypatch.setattr("fogsim.render.gl_report", lacking)
+    monkeypatch.setattr("fogsim.cli.view._surrounding", lambda *_: pytest.fail("the run has begun"))
+    with pytest.raises(MissingDependencyError, match="no OpenGL"):
+        view_command("motorway_fog_bank", out=tmp_path / "view.png")
 
 
 def test_an_instant_after_the_end_is_refused(tmp_path: Path) -> None:

@@ -124,28 +124,14 @@ def _has_words(annotation: Any) -> bool:
     return get_origin(annotation) is Literal or any(_has_words(part) for part in get_args(annotation))
 
 
-def columns() -> list[tuple[str, ...]]:
-    """Columns of steps.parquet, with those of one estimator."""
-    return _column_rows(table_columns(["METHOD"]))
-
-
-def traffic_columns() -> list[tuple[str, ...]]:
-    """Columns of steps.parquet of traffic alone."""
-    return _column_rows(traffic_table_columns())
-
-
-def _column_rows(found: Sequence[Column[Any]]) -> list[tuple[str, ...]]:
+def columns(found: Sequence[Column[Any]]) -> list[tuple[str, ...]]:
+    """Columns of steps.parquet."""
     return [(f"`{column.name}`", str(column.kind), column.meaning) for column in found]
 
 
-def trajectory_columns() -> list[tuple[str, ...]]:
-    """Columns of ``trajectories.parquet``."""
-    return [(f"`{name}`", str(kind), told) for name, (kind, told) in TRAJECTORY_COLUMNS.items()]
-
-
-def event_columns() -> list[tuple[str, ...]]:
-    """Columns of ``events.parquet``."""
-    return [(f"`{name}`", str(kind), told) for name, (kind, told) in EVENT_COLUMNS.items()]
+def columns_by_name(found: Mapping[str, tuple[Any, str]]) -> list[tuple[str, ...]]:
+    """Columns of ``trajectories.parquet`` or ``events.parquet``."""
+    return [(f"`{name}`", str(kind), meaning) for name, (kind, meaning) in found.items()]
 
 
 def metrics() -> list[tuple[str, ...]]:
@@ -327,10 +313,11 @@ TABLES = {
         "metrics": (("key", "meaning", "numerator", "denominator", "a policy moves it", "ranks policies"), metrics)
     },
     "reference/results.md": {
-        "columns": (("column", "type", "meaning"), columns),
-        "traffic_columns": (("column", "type", "meaning"), traffic_columns),
-        "trajectories": (("column", "type", "meaning"), trajectory_columns),
-        "events": (("column", "type", "meaning"), event_columns),
+        # With those of one estimator.
+        "columns": (("column", "type", "meaning"), partial(columns, table_columns(["METHOD"]))),
+        "traffic_columns": (("column", "type", "meaning"), partial(columns, traffic_table_columns())),
+        "trajectories": (("column", "type", "meaning"), partial(columns_by_name, TRAJECTORY_COLUMNS)),
+        "events": (("column", "type", "meaning"), partial(columns_by_name, EVENT_COLUMNS)),
     },
 }
 """Tables by file and marker, with their headings and rows."""

@@ -9,7 +9,6 @@ import argparse
 import contextlib
 import faulthandler
 import hashlib
-import importlib
 import io
 import itertools
 import json
@@ -25,6 +24,35 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import seed as seeded
+from hypothesis import strategies as st
+from PIL import Image
+
+import fogsim
+from fogsim.core.registry.user_code import import_nothing
+from fogsim.errors import FogSimError, LeftOutWarning, RenamedWarning, UnplayedWarning
+from fogsim.estimators import ESTIMATORS
+from fogsim.estimators.learned.onnx_model import read_model
+from fogsim.offline.camera_file import load_calibration
+from fogsim.offline.drive.sign_file import load_sign_file
+from fogsim.offline.drive.track_file import load_track
+from fogsim.offline.input_paths import find_source
+from fogsim.scenario.loading import load_cases, load_scenario
+from fogsim.study import load_study
+from fogsim.study.profiles import RunProfiles
+from fogsim.study.run_file import STUDY_RUN, read_run
+from fogsim.testing import collect
+from fogsim.testing.odd.odd_file import read_odd
+from fogsim.testing.odd.openodd_library import Coverage
+from fogsim.traffic.road.configuration import configured_files, ignored_options
+from fogsim.traffic.road.netconvert import opendrive_net
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.signs import sign_map
+from fogsim.values.result_checks import checked_estimate
 
 ROOT = Path(__file__).resolve().parents[1]
 CORPUS = ROOT / "tests" / "data" / "fuzz"
@@ -93,21 +121,7 @@ MODULE_TOKENS = [
 
 
 def entries() -> dict[str, Entry]:
-    """All entry points, whose libraries are imported only here."""
-    from fogsim.core.registry.user_code import import_nothing  # noqa: PLC0415
-    from fogsim.estimators.learned.onnx_model import read_model  # noqa: PLC0415 - the parent needs none of them
-    from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415
-    from fogsim.offline.drive.sign_file import load_sign_file  # noqa: PLC0415
-    from fogsim.offline.drive.track_file import load_track  # noqa: PLC0415
-    from fogsim.offline.input_paths import find_source  # noqa: PLC0415
-    from fogsim.scenario.loading import load_cases, load_scenario  # noqa: PLC0415
-    from fogsim.study import load_study  # noqa: PLC0415
-    from fogsim.study.run_file import STUDY_RUN, read_run  # noqa: PLC0415
-    from fogsim.testing import collect  # noqa: PLC0415
-    from fogsim.traffic.road.configuration import configured_files, ignored_options  # noqa: PLC0415
-    from fogsim.traffic.road.netconvert import opendrive_net  # noqa: PLC0415
-    from fogsim.traffic.road.network import read_net  # noqa: PLC0415
-    from fogsim.traffic.road.signs import sign_map  # noqa: PLC0415
+    """All entry points."""
 
     def pictures(path: Path) -> None:
         for _ in find_source([path]).pictures():
@@ -151,16 +165,12 @@ def entries() -> dict[str, Entry]:
 
 
 def _image(kind: str) -> bytes:
-    from PIL import Image  # noqa: PLC0415
-
     file = io.BytesIO()
     Image.linear_gradient("L").resize((64, 48)).convert("RGB").save(file, kind)
     return file.getvalue()
 
 
 def _video() -> bytes:
-    import imageio_ffmpeg  # noqa: PLC0415
-
     with tempfile.TemporaryDirectory() as folder:
         writer = imageio_ffmpeg.write_frames(f"{folder}/a.mp4", (64, 48))
         writer.send(None)
@@ -171,20 +181,12 @@ def _video() -> bytes:
 
 
 def _run_file() -> bytes:
-    from fogsim.study.profiles import RunProfiles  # noqa: PLC0415
-
     metrics = {"ending": "time", "mean_speed_mps": 20.5, "collisions": 0, "minimum_gap_m": None}
     return json.dumps({"status": "complete", "metrics": metrics, "profiles": RunProfiles().to_json()}).encode()
 
 
 def _use_module(path: Path) -> None:
     """Let a user's estimator read a frame."""
-    import numpy as np  # noqa: PLC0415
-
-    import fogsim  # noqa: PLC0415
-    from fogsim.estimators import ESTIMATORS  # noqa: PLC0415
-    from fogsim.values.result_checks import checked_estimate  # noqa: PLC0415
-
     camera = fogsim.Camera(width=8, height=8, focal_length=8, principal_point=(4, 4), mount_height=1.3, pitch=0.0)
     # A module is imported once under one name: each gets its own.
     name = f"m{hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"
@@ -196,9 +198,6 @@ def _use_module(path: Path) -> None:
 
 def _read_odd(path: Path) -> None:
     """Read a binding of the shipped domain, or a domain by the shipped binding."""
-    from fogsim.testing.odd.odd_file import read_odd  # noqa: PLC0415
-    from fogsim.testing.odd.openodd_library import Coverage  # noqa: PLC0415
-
     domain, binding = (ROOT / "fogsim/testing/odd/shipped" / name for name in ("driving_in_fog.yaml", "fog.odd.yaml"))
     if path.name.endswith(".odd.yaml"):
         shutil.copy(domain, path.parent)
@@ -251,14 +250,11 @@ class FindingError(AssertionError):
 
 @contextlib.contextmanager
 def _only_clear_errors() -> Iterator[None]:
-    from fogsim.errors import FogSimError  # noqa: PLC0415
-
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for name in ("UnplayedWarning", "LeftOutWarning", "RenamedWarning"):
-            warnings.simplefilter("ignore", getattr(importlib.import_module("fogsim.errors"), name))
         # Syntax of users' modules is theirs.
-        warnings.simplefilter("ignore", SyntaxWarning)
+        for category in (UnplayedWarning, LeftOutWarning, RenamedWarning, SyntaxWarning):
+            warnings.simplefilter("ignore", category)
         try:
             yield
         except FogSimError as error:
@@ -282,10 +278,6 @@ def try_input(entry: Entry, content: bytes, folder: Path) -> None:
 
 def _search(name: str, seed: int, seconds: float, folder: Path) -> None:
     """Search an entry point in this process; the last input tried is in the folder, and why it is a finding."""
-    from hypothesis import HealthCheck, given, settings  # noqa: PLC0415
-    from hypothesis import seed as seeded  # noqa: PLC0415
-    from hypothesis import strategies as st  # noqa: PLC0415
-
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     entry, until = entries()[name], time.monotonic() + seconds
     tokens = st.sampled_from([*HOSTILE, *(MODULE_TOKENS if name == "module" else [])]) | st.binary(max_size=8)

@@ -3,7 +3,6 @@
 The same pictures by both renderers. tests/docs/test_contact_sheet.py draws some of them again and compares.
 """
 
-import argparse
 import dataclasses
 import math
 
@@ -17,7 +16,6 @@ from fogsim.values import Lamp
 
 SIZE = (480, 360)
 COLUMNS = 4
-DRAWN_BY = ("cpu", "opengl")
 NIGHT = "light.illuminance_lx=0.05"
 HIGH = Lamp.POSITION | Lamp.HIGH_BEAM
 BRAKING = LIT | Lamp.STOP
@@ -107,9 +105,7 @@ def antialiasing() -> Image.Image:
 
 def main() -> None:
     """Draw and save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--renderer", action="append", choices=DRAWN_BY, help="default: all")
-    for renderer in parser.parse_args().renderer or DRAWN_BY:
+    for renderer in ("cpu", "opengl"):
         contact_sheet(renderer).save(PICTURES / f"contact_sheet_{renderer}.jpg", quality=88, subsampling=0)
     antialiasing().save(PICTURES / "antialiasing.png")
 

@@ -4,10 +4,9 @@ Of the table that `tools/make_airlight_table.py` makes, it keeps what an estimat
 droplets: their mean, by the optical height of the eye and the elevation of the line of sight. Albedo comes in as one
 factor, for the source of scattered light is linear in it.
 
-Usage: python tools/make_airlight_slopes.py fogsim/vision/data/airlight_slopes.npz
+Usage: python tools/make_airlight_slopes.py
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from fogsim.atmosphere import Droplets
 from fogsim.atmosphere.fog.layer_airlight import SlantAirlight, layer_table, path_means, slant_share
 
+TABLE = Path(__file__).parents[1] / "fogsim" / "vision" / "data" / "airlight_slopes.npz"
 DEPTHS = np.geomspace(0.002, 0.4, 12)
 """Optical heights of the eye above the ground [-]."""
 
@@ -57,12 +57,9 @@ def family_means(droplets):
 
 def main():
     """Write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    arguments = parser.parse_args()
     below, above = np.array([family_means(droplets) for droplets in FAMILIES]).transpose(1, 0, 2, 3)
     np.savez_compressed(
-        arguments.out,
+        TABLE,
         about="Airlight over black land, of lines of sight so far below or above the horizon: (level - below) and "
         "(above - level) over 1 - level; by droplets (small to large), optical height of the eye (depth) and "
         "angle [rad]. Command: python tools/make_airlight_slopes.py",

@@ -1,6 +1,6 @@
 """Make the table of airlight in a plane layer of fog, `fogsim/atmosphere/data/airlight.npz` (two minutes).
 
-    python tools/make_airlight_table.py fogsim/atmosphere/data/airlight.npz
+    python tools/make_airlight_table.py
 
 Light in a plane layer of fog that absorbs nothing, between a Lambertian ground and an overcast sky (CIE: luminance as
 1 + 2 sin γ), has no azimuth. The equation of transfer is solved by lambda iteration for the light of the sky over black
@@ -8,7 +8,6 @@ ground, and for that of a shining ground under a black sky; their sum at any alb
 nothing with the photon counts that the table is compared to but the phase function.
 """
 
-import argparse
 import math
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from fogsim.atmosphere.lamps.phase_function import Droplets, phase_function
 
+TABLE = Path(__file__).parents[1] / "fogsim" / "atmosphere" / "data" / "airlight.npz"
 _NEAR_HORIZON = (0, 0.1, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6.5, 8, 10, 12.5, 15, 18, 22, 26)
 LOOKS = np.array((*_NEAR_HORIZON, *range(30, 91, 5)), dtype=float)
 """Elevations of lines of sight above and below the horizon [degrees]."""
@@ -136,15 +136,12 @@ def layer(matrix, thickness):
 
 def main():
     """Write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    arguments = parser.parse_args()
     found = {}
     for droplets in Droplets:
         found |= {f"{droplets}_{name}": values for name, values in table_of(droplets).items()}
         print(f"done: {droplets}", flush=True)  # noqa: T201
     np.savez_compressed(
-        arguments.out,
+        TABLE,
         about="Source function of airlight in a plane layer of fog under a CIE overcast sky, over E / pi, E of the "
         "ground: black + albedo * per_albedo, by thickness (optical), place (share of it above the ground), elevation "
         "[degrees]. vertical: light of a vertical surface near the ground, over E, likewise. Albedo 0 to 1. "

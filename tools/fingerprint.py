@@ -5,9 +5,10 @@
 
 Shapes and scenes are hashes. A short drive by day and one by night are hashes of what was drawn and of the frames'
 bytes, decisions, the text of metrics.json, and numbers, which must agree to 1e-9 of their size; so is what every method
-of the day makes of a vehicle that drives away. Arguments name parts: python tools/fingerprint.py night shapes. With
---compare the differences are listed, and the exit code is 1 if there are any. Frames are drawn by FogSim's own
-renderer; what OpenGL draws is its driver's.
+of the day makes of a vehicle that drives away. The other parts are what users get: steps of every environment, files of
+a study, verdicts of `fogsim test`, lines of `fogsim estimate` and `fogsim reproduce --quick`, and what OpenSCENARIO
+files become. Arguments name parts: python tools/fingerprint.py night shapes. With --compare the differences are listed,
+and the exit code is 1 if there are any. Frames are drawn by FogSim's own renderer; what OpenGL draws is its driver's.
 """
 
 import argparse
@@ -15,16 +16,22 @@ import dataclasses
 import hashlib
 import json
 import math
+import re
+import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
+from PIL import Image
 
 import fogsim
+import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.calibration.staged_road import ILLUMINANCE, StagedVehicle, straight_road
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.metrics import RunMetrics
@@ -37,7 +44,8 @@ from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Camera, Estimate, RoadNetwork, Sign, SignMap, Step
 
 TOLERANCE, NOTHING = 1e-9, 1e-12
-TOWN = Path(__file__).resolve().parents[1] / "tests" / "data" / "grid" / "grid.net.xml"
+DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
+TOWN = DATA / "grid" / "grid.net.xml"
 COMMON = (
     "duration_s=1",
     "renderer=cpu",
@@ -57,6 +65,19 @@ DRIVES = {
     ),
     "night": ("night_motorway_fog", ("street_lamps=true",)),
 }
+
+STEPS = 4
+"""Of each environment."""
+
+STUDY = """
+scenario: motorway_fog_bank
+settings: [duration_s=4, camera.width=160, camera.height=120, renderer=cpu]
+factors: {policy: {none: [advice=none], ssd: [advice=stopping_sight_distance]}}
+seeds: 1
+baseline: {policy: none}
+"""
+TESTED = ("cut_in_at_15_m", "radar_dropout", "traffic_lights")
+PAPERS = ("huang2015",)
 
 
 def shapes() -> dict[str, str]:
@@ -121,6 +142,97 @@ def chase() -> dict[str, Any]:
     return told
 
 
+def environments() -> dict[str, Any]:
+    """Hashes of what each environment gives at its reset and in steps with random actions."""
+    ids = sorted(name for name in gymnasium.registry if name.startswith("fogsim/"))
+    return {name: _rollout(name) for name in ids}
+
+
+def _rollout(name: str) -> list[str]:
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+        env = gymnasium.make(name)
+    env.action_space.seed(1)
+    given = [env.reset(seed=1), *(env.step(env.action_space.sample()) for _ in range(STEPS))]
+    hashes = [_hash(*_arrays(one)) for one in given]
+    env.close()
+    return hashes
+
+
+def _arrays(value: object) -> Iterator[np.ndarray[Any, Any]]:
+    """Numbers of nested containers, in order; what is no number as its text."""
+    if isinstance(value, Mapping):
+        yield from _arrays([[key, value[key]] for key in sorted(value)])
+    elif isinstance(value, list | tuple):
+        for one in value:
+            yield from _arrays(one)
+    elif isinstance(value, np.ndarray | np.generic | bool | int | float):
+        yield np.asarray(value)
+    else:
+        yield np.frombuffer(f"{value!r} ".encode(), np.uint8)
+
+
+def study() -> list[str]:
+    """Rows of a study of two policies."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "advice.yaml")
+        file.write_text(STUDY)
+        _command("study", file, "--out", Path(folder, "out"))
+        return [re.sub(r"[0-9a-f]{12,}", "", row) for row in Path(folder, "out", "study.csv").read_text().splitlines()]
+
+
+def verdicts() -> list[str]:
+    """Cases of tests with their outcomes and messages, without times."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "junit.xml")
+        _command("test", *TESTED, "--junit", file, "--no-evidence", codes=(0, 1))
+        return [
+            _portable(re.sub(r' (time|timestamp|hostname)="[^"]*"', "", row)) for row in file.read_text().splitlines()
+        ]
+
+
+def estimates() -> list[str]:
+    """Lines of `fogsim estimate` with every method of the day over a few frames."""
+    scenario = fogsim.load_scenario(DRIVES["day"][0], [*COMMON[:1], *COMMON[2:4], "renderer=cpu", *DRIVES["day"][1]])
+    with tempfile.TemporaryDirectory() as folder:
+        for step in fogsim.run(scenario, seed=2):
+            Image.fromarray(step.observation.frame.image).save(Path(folder, f"{step.index:03}.png"))
+        return _command("estimate", folder, "--method", "all", "--json").replace(folder, "").splitlines()
+
+
+def reproduced() -> list[str]:
+    """Records of a paper's evaluation."""
+    return [row for paper in PAPERS for row in _command("reproduce", paper, "--quick", "--json").splitlines()]
+
+
+def openscenario() -> dict[str, list[str]]:
+    """What each OpenSCENARIO file of the tests becomes, as a hash, what is said of it, and why it is refused."""
+    return {file.name: _converted(file) for file in sorted((DATA / "openscenario").rglob("*.xosc"))}
+
+
+def _converted(file: Path) -> list[str]:
+    with warnings.catch_warnings(record=True, action="always") as caught:
+        try:
+            became = _hash(*_arrays(_portable(fogsim.load_scenario(file).model_dump_json())))
+        except fogsim.InputError as refusal:
+            became = str(refusal)
+    return [_portable(text) for text in (became, *(str(warning.message) for warning in caught))]
+
+
+def _portable(text: str) -> str:
+    """A text without this machine's folders."""
+    return re.sub(r"[^\s\"']*/(?=openscenario/|scenarios/)", "", text)
+
+
+def _command(*arguments: str | Path, codes: tuple[int, ...] = (0,)) -> str:
+    """What a command of FogSim prints."""
+    done = subprocess.run(  # noqa: S603 - FogSim's own command
+        [sys.executable, "-m", "fogsim", *arguments], capture_output=True, text=True, check=False, timeout=1200
+    )
+    if done.returncode not in codes:
+        raise RuntimeError(f"fogsim {arguments[0]} ended with {done.returncode}: {done.stderr[-2000:]}")
+    return done.stdout
+
+
 def _decisions(step: Step) -> str:
     valid = " ".join(f"{estimate.method} {estimate.valid}" for estimate in step.estimates)
     return f"{step.command.advice.speed!r} {int(step.command.lamps)} {len(step.traffic.ids)} {valid}"
@@ -177,6 +289,12 @@ PARTS: Mapping[str, Callable[[], Any]] = {
     "shapes": shapes,
     **{name: partial(drive, name) for name in DRIVES},
     "chase": chase,
+    "environments": environments,
+    "study": study,
+    "verdicts": verdicts,
+    "estimates": estimates,
+    "reproduced": reproduced,
+    "openscenario": openscenario,
 }
 
 

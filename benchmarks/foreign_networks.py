@@ -1,10 +1,8 @@
 """Networks that FogSim did not write, each with traffic on it, as SUMO configurations.
 
-They come with packages: netgenerate and networks of SUMO's own games and examples with eclipse-sumo (which the tests
-need), and, where it is installed, those of sumo-rl. Nothing of them is copied into this repository.
+They come with eclipse-sumo, which the tests need: netgenerate, and networks of SUMO's own games and examples.
 """
 
-import importlib.util
 import itertools
 import subprocess
 import sys
@@ -71,22 +69,8 @@ def game(folder: str, net: str, routes: str, additional: str = "", begin: float 
     return lambda *_: found
 
 
-def sumo_rl(name: str, routes: str, begin: float = 0.0) -> Make:
-    """One of sumo-rl's networks, with its own traffic."""
-
-    def make(*_: object) -> Files:
-        found = importlib.util.find_spec("sumo_rl")
-        if found is None or not found.submodule_search_locations:
-            raise ModuleNotFoundError("sumo_rl is not installed: pip install sumo-rl")
-        home = Path(found.submodule_search_locations[0], "nets")
-        return Files(home / f"{name}.net.xml", (home / f"{routes}.rou.xml",), begin=begin)
-
-    return make
-
-
 _TOWN = ("--default.lanenumber", "2", "--default-junction-type", "traffic_light", "--default.speed", "13.89")
 _SLOW = ("--default.speed", "8.33", "--default-junction-type", "right_before_left")
-_SINGLE = "2way-single-intersection/single-intersection"
 
 NETWORKS: dict[str, Make] = {
     "grid": generated("--grid", "--grid.number", "5", "--grid.length", "150", *_TOWN, pedestrians=True),
@@ -112,9 +96,6 @@ NETWORKS: dict[str, Make] = {
     ),
     # Three junctions with lights in a row.
     "corridor": game("corridor", "corridor.net.xml", "corridor.rou.xml"),
-    # A junction of Cologne at 7 o'clock.
-    "cologne": sumo_rl("RESCO/cologne1/cologne1", "RESCO/cologne1/cologne1", begin=25_200.0),
-    "two_way": sumo_rl(_SINGLE, f"{_SINGLE}-gen"),
 }
 
 

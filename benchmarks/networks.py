@@ -10,8 +10,8 @@ second, with 12 digits after the point).
         [--step 0.2] [--per-hour 1500] [--one-process]
 
 ``collisions`` are pairs of vehicles, ``teleports`` those that SUMO takes out of jams and blockades, ``cpu_s`` the time
-of the run. Networks of packages that are not installed are left out, and named. The exit code is 1 if a run fails, or
-if one in clear air is not the same. Traffic of the netgenerate networks: ``--per-hour`` vehicles.
+of the run. The exit code is 1 if a run fails, or if one in clear air is not the same. Traffic of the netgenerate
+networks: ``--per-hour`` vehicles.
 """
 
 import hashlib
@@ -145,10 +145,7 @@ def measure(network: str, task: Task) -> list[Row]:
     """Records of one network."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        try:
-            files = NETWORKS[network](folder, task.per_hour, task.seconds)
-        except ModuleNotFoundError as missing:
-            return [{"network": network, "left_out": str(missing)}]
+        files = NETWORKS[network](folder, task.per_hour, task.seconds)
         config = write_configuration(folder, files, FCD)
         began = time.process_time()
         link, ego = run_alone(config, task)

@@ -116,8 +116,10 @@ def test_diagnostics_say_what_was_found(render, road):
     assert PAPER.horizon_row < top < bottom == 514
 
 
-def test_a_road_as_bright_as_the_airlight_is_refused(render, road):
-    found = estimate(render(road.but(asphalt=195.0, terrain=190.0, mark=200.0)), road.camera)
+@pytest.mark.parametrize("method", ["joint_road", "negru2013"])
+def test_a_road_as_bright_as_the_airlight_is_refused(render, road, method):
+    image = render(road.but(asphalt=195.0, terrain=190.0, mark=200.0))
+    found = make(method, road.camera).update(Observation(image))
     assert not found.valid
     assert "bright" in str(found.diagnostics["reason"])
 

@@ -111,12 +111,6 @@ def test_saturated_sky_is_taken_as_a_lower_bound(render, road):
     assert not found.valid or found.visibility == pytest.approx(100, rel=0.15)
 
 
-def test_a_road_as_bright_as_the_airlight_is_refused(render, road):
-    found = estimate(render(road.but(asphalt=195.0, terrain=190.0, mark=200.0)), road.camera)
-    assert not found.valid
-    assert "bright" in str(found.diagnostics["reason"])
-
-
 def test_frames_and_bare_arrays_agree_and_nothing_is_remembered(render, road):
     estimator = make("negru2013", road.camera)
     image = render(road)

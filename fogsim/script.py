@@ -5,6 +5,7 @@ Arguments have the same keys as the file: ``Fog(visibility_m=80)`` is ``fog: {vi
 
 import copy
 import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +18,13 @@ from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held,
 from fogsim.core.files.atomic import write_text
 from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.core.parameters import checked_parameters
-from fogsim.errors import InputError, suggest
-from fogsim.scenario import Scenario, load_scenario
+from fogsim.errors import InputError, shown, suggest
+from fogsim.scenario import Scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.drivers_schema import DriversSection as Drivers
 from fogsim.scenario.expect.schema import Expectation
 from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
+from fogsim.scenario.loading import load_cases
 from fogsim.scenario.roads.schema import ActorSection as Actor
 from fogsim.scenario.roads.schema import DemandSection as Demand
 from fogsim.scenario.roads.schema import Road
@@ -120,7 +122,7 @@ def to_yaml(
     Raises
     ------
     InputError
-        If a key that is to vary is not there.
+        If a key that is to vary is not there, or a value is not plain, as an array is not.
     """
     data = as_written(scenario)
     if folder is not None and folder.resolve() != scenario.directory.resolve():
@@ -132,7 +134,11 @@ def to_yaml(
         data["vary"] = {name: copy.deepcopy(one.values) for name, one in vary.items()}
     if verdict is not None:
         data["verdict"] = verdict.model_dump(mode="json", exclude_unset=True)
-    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+    try:
+        text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+    except yaml.representer.RepresenterError as error:
+        plain = "numbers, text, true, false, lists and mappings, as .tolist() makes of an array"
+        raise InputError(f"vary: expected {plain}; got {shown(repr(error.args[-1]))}") from None
     return text
 
 
@@ -145,7 +151,7 @@ def write(
     *,
     overwrite: bool = False,
 ) -> Path:
-    """Write a scenario into a file, and check it there as `load_scenario` does.
+    """Write a scenario into a file, and check all its cases there as `load_scenario` does.
 
     Parameters
     ----------
@@ -168,12 +174,14 @@ def write(
     """
     refuse_unwritable(path, overwrite=overwrite)
     text = to_yaml(scenario, vary, verdict, path.parent)
-    trial = path.with_name(f".{path.name}")
-    try:
-        write_text(trial, text)
-        load_scenario(trial)
-    finally:
-        trial.unlink(missing_ok=True)
+    # SUMO's files are named relative to the folder.
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, prefix=".", suffix=path.suffix) as trial:
+        trial.write(text)
+        trial.flush()
+        try:
+            load_cases(trial.name)
+        except InputError as error:
+            raise InputError(str(error).replace(trial.name, str(path))) from error
     write_text(path, text)
     return path
 

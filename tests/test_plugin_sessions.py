@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 import fogsim
+from fogsim.errors import SimulationError
 from fogsim.simulation.plugin import AttachedSession
 from fogsim.values import Command, Stretch, StretchAdvice
 from tests.helpers.attached import ARGUMENTS, conduct, libsumo_in_town
@@ -107,6 +108,18 @@ def test_what_the_user_sets_meanwhile_stays(libsumo: Any) -> None:
     libsumo.vehicle.setMaxSpeed(another, 12.0)
     one.close()
     assert (libsumo.vehicle.getMaxSpeed(vehicle), libsumo.vehicle.getMaxSpeed(another)) == (20.0, 12.0)
+
+
+def test_a_closed_session_advises_nobody(libsumo: Any) -> None:
+    drive(libsumo, 20)
+    one = session(libsumo, EGO, *ADVISED)
+    step = one.observe()
+    assert step is not None
+    one.close()
+    with pytest.raises(SimulationError, match="the session is closed"):
+        one.advise(step, Command(advised_speeds=dict.fromkeys(step.traffic.ids, 4.0)))
+    drive(libsumo, 2)
+    assert min(top_speeds(libsumo).values()) > 50.0
 
 
 def test_a_session_of_another_simulation_gives_nothing_back_here(libsumo: Any) -> None:

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 import yaml
 
@@ -106,3 +107,25 @@ def test_a_file_with_a_mistake_is_not_written(tmp_path, patchy):
     (tmp_path / "there.yaml").write_text("")
     with pytest.raises(InputError, match="already exists"):
         fs.write(patchy, tmp_path / "there.yaml")
+
+
+def test_checking_a_file_touches_no_other(tmp_path, patchy):
+    (tmp_path / ".mine.fog.yaml").write_text("the user's own")
+    fs.write(patchy, tmp_path / "mine.fog.yaml")
+    assert (tmp_path / ".mine.fog.yaml").read_text() == "the user's own"
+    assert len(list(tmp_path.iterdir())) == 2
+    wrong = fs.varied(["60 m", "-3 m"], "fog.visibility_m")
+    with pytest.raises(InputError, match=r"wrong.fog.yaml:[0-9]+: fog.visibility.*\nin the case visibility=-3 m"):
+        fs.write(patchy, tmp_path / "wrong.fog.yaml", vary={"visibility": wrong})
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("values", [np.linspace(60.0, 80.0, 3), [np.float64(60.0)], range(60, 80)])
+def test_values_that_a_file_cannot_hold(patchy, values):
+    with pytest.raises(InputError, match=r"vary: expected numbers, text, .* as \.tolist"):
+        fs.to_yaml(patchy, vary={"visibility": fs.varied(values, "fog.visibility_m")})
+
+
+def test_a_signal_is_no_truth_value():
+    with pytest.raises(InputError, match=r"'ego\.collision' is true or false only in a run; use all_of"):
+        _ = fs.signal("ego.collision") and fs.signal("time") > "3 s"

@@ -71,7 +71,7 @@ def campaign_command(
     """Find where a scenario with `space:` fails, and how often; exit code 0 (all passed), 1 (not all) or 2."""
     from fogsim.testing.campaign.running import load_campaign, run_campaign, smallest_failing
 
-    _refuse_clashes(out, junit, against, {"--budget": budget, "--seed": seed, "--first": first})
+    _refuse_clashes(file, out, junit, against, {"--budget": budget, "--seed": seed, "--first": first})
     if address is not None and engine is CampaignEngine.LOCAL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
     chosen = with_timeout(settings, method_timeout)
@@ -106,9 +106,13 @@ def campaign_command(
         raise typer.Exit(FAILED)
 
 
-def _refuse_clashes(out: Path, junit: Path | None, against: Path | None, drawing: Mapping[str, object]) -> None:
+def _refuse_clashes(
+    file: str, out: Path, junit: Path | None, against: Path | None, drawing: Mapping[str, object]
+) -> None:
     """Refuse before the first run what could not be written after the last, and options that do not go together."""
-    from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
+    from fogsim.core.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
+    from fogsim.scenario.loading import scenario_file
+    from fogsim.testing.campaign.comparison import CASES
 
     for option, value in drawing.items():
         if against is not None and value is not None:
@@ -117,7 +121,9 @@ def _refuse_clashes(out: Path, junit: Path | None, against: Path | None, drawing
         raise InputError(f"--against {against}: --out is the same directory; give another, so that both are kept")
     refuse_unwritable_folder(out)
     if junit is not None:
-        refuse_unwritable(junit, "--junit", read=[], makes_folder=True)
+        read = [scenario_file(file), *([] if against is None else [against / CASES])]
+        refuse_unwritable(junit, "--junit", read=read, makes_folder=True)
+        refuse_clashes({"--junit": junit}, {"--out": out})
 
 
 def _report(

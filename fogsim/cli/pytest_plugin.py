@@ -5,6 +5,7 @@ FogSim is imported only for such a file or a test that requests the fixture.
 
 from __future__ import annotations
 
+import argparse
 import functools
 import tempfile
 from pathlib import Path
@@ -24,8 +25,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("fogsim")
     group.addoption(
-        "--fogsim-processes", type=int, default=None, metavar="N", help="Concurrent runs of *.fog.yaml [one per core]."
+        "--fogsim-processes",
+        type=_number_of_processes,
+        default=None,
+        metavar="N",
+        help="Concurrent runs of *.fog.yaml [one per core].",
     )
+
+
+def _number_of_processes(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+        raise argparse.ArgumentTypeError(f"expected 1 … 1024, got {text!r}")
+    return int(text)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FogFile | None:
@@ -70,10 +81,14 @@ class FogItem(pytest.Item):
 
     def runtest(self) -> None:
         """Raise NotPassedError unless all its clauses passed."""
+        from fogsim.errors import FogSimError
         from fogsim.testing.page import expectation_lines
 
         assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items
-        lines = expectation_lines(self.parent.outcome, self.name)
+        try:
+            lines = expectation_lines(self.parent.outcome, self.name)
+        except FogSimError as error:
+            lines = [str(error)]
         if lines:
             raise NotPassedError("\n".join(lines))
 

@@ -75,10 +75,13 @@ def signs_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
+    from fogsim.core.files.output_targets import refuse_unwritable
     from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario import load_scenario
+    from fogsim.scenario.loading import scenario_file
     from fogsim.simulation.recording import record_signs
 
+    refuse_unwritable(out, "--out", read=[scenario_file(scenario)], makes_folder=True)
     loaded = load_scenario(scenario, settings or (), may_import=import_nothing)
     signs = record_signs(loaded, out, overwrite=overwrite).signs
     stdout.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(out)}", soft_wrap=True)

@@ -31,6 +31,9 @@ class SignalTerm:
     def __str__(self) -> str:
         return self.text
 
+    def __bool__(self) -> bool:
+        raise InputError(f"{shown(self.text)} is true or false only in a run; use all_of, any_of and negated")
+
     def __lt__(self, other: "Comparand") -> Condition:
         return condition(f"{self} < {other}")
 

@@ -98,6 +98,8 @@ class AttachedSession:
 
         Returns what is in force.
         """
+        if self._closed:
+            raise SimulationError("the session is closed")
         self._command = self._policy.decide(step) if command is None else checked_command(command)
         if step is not self._last:
             self._begin_what_is_due(step)

@@ -322,12 +322,13 @@ def _information(
 def record_signs(scenario: ScenarioLike, out: str | Path, *, overwrite: bool = False) -> SignMap:
     """Write the sign map of a scenario as GeoJSON, without starting a simulation."""
     out = Path(out)
-    refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
     config = scenario.run_config()
     setup = config.traffic
     net_file, additional = setup.net, setup.additional
     if net_file is None and setup.config is not None:
         net_file, additional = configured_files(setup.config)
+    read = [one for one in (setup.config, net_file, *additional) if one is not None]
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=read, makes_folder=True)
     if net_file is None:
         raise InputError(f"{config.name}: the scenario names neither a SUMO network nor a SUMO configuration")
     net = read_net(net_file)

@@ -88,7 +88,9 @@ def smallest_case(
         nearer = _nearer(values, name, first[name], fails) if name in divisible else None
         if nearer is not None:
             values, passes_at[name] = nearer
-    return SmallestCase(values, passes_at, tried)
+    # With the values that others have since, it may fail there; and there may be no such case.
+    passing = {name: value for name, value in passes_at.items() if fails({**values, name: value}) is False}
+    return SmallestCase(values, passing, tried)
 
 
 def _values(result: CaseResult, gridded: Sequence[str]) -> Values:

@@ -1,11 +1,15 @@
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from fogsim.errors import InputError
 from fogsim.recorders import write_sign_map
+from fogsim.scenario import catalogue, load_scenario
+from fogsim.simulation.recording import record_signs
 from fogsim.values import Sign, SignMap
 
 LIMIT = Sign("limit.a", "speed_limit", 20.0, (10.0, -5.0, 2.6), math.radians(30.0), 0.9)
@@ -36,3 +40,13 @@ def test_longitude_and_latitude_where_they_are_known(tmp_path: Path) -> None:
     (limit,) = content["features"]
     assert limit["geometry"]["coordinates"] == pytest.approx([8.01, 49.995])
     assert (limit["properties"]["x_m"], limit["properties"]["y_m"]) == (10.0, -5.0)
+
+
+def test_a_sign_map_does_not_replace_what_it_is_made_of(tmp_path: Path) -> None:
+    shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path, dirs_exist_ok=True)
+    scenario = load_scenario(tmp_path)
+    net = tmp_path / "motorway.net.xml"
+    before = net.read_bytes()
+    with pytest.raises(InputError, match="would replace what is read"):
+        record_signs(scenario, net, overwrite=True)
+    assert net.read_bytes() == before

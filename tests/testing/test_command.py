@@ -9,6 +9,7 @@ import pytest
 from early_motorway import ROUTES
 
 from fogsim.core.files.writer_lock import LOCK_NAME
+from fogsim.errors import InputError
 from fogsim.testing import artefacts, check_one_case
 from fogsim.testing.execution import ThisProcess
 from tests.helpers.command import Command
@@ -135,3 +136,21 @@ def test_pytest_collects_files_and_runs(file: Path, pytester: pytest.Pytester, m
     assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in told
     assert "short.fog.yaml --case 'visibility=5 km'" in told
     assert "inconclusive: stops.whenever" in told
+
+
+def test_mistakes_in_pytest_have_no_traceback(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    (pytester.path / "short.fog.yaml").write_text(SCENARIO)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    options = ["-p", "fogsim.cli.pytest_plugin", "-p", "no:cacheprovider", "-c", os.devnull, "short.fog.yaml"]
+    done = pytester.runpytest_inprocess(*options, "--fogsim-processes", "-1")
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines(["*--fogsim-processes: expected 1 … 1024, got '-1'*"])
+
+    def refuse(*_: object) -> None:
+        raise InputError("no space for results")
+
+    monkeypatch.setattr("fogsim.testing.check_test", refuse)
+    done = pytester.runpytest_inprocess(*options)
+    done.assert_outcomes(failed=3)
+    assert "no space for results" in done.stdout.str()
+    assert "pytest_plugin.py" not in done.stdout.str()

@@ -12,7 +12,7 @@ from fogsim.core.files.atomic import write_json
 from fogsim.study.execution import RunWatch, result_file
 from fogsim.study.plan import StudyRun
 from fogsim.testing import collect, run_tests
-from fogsim.testing.shrinking import shrink, smallest_text
+from fogsim.testing.shrinking import shrink, smallest_case, smallest_text
 
 SCENARIO = f"""
 name: swept
@@ -78,3 +78,15 @@ def test_a_seed_stays_the_one_that_fails(file: Path, tmp_path: Path) -> None:
     found = shrink(outcome, outcome.judgements[0], [], engine, tmp_path / "out" / "results")
     assert found.values == {"visibility": "200 m", "light": "10000", "duration": "10", "run": "1"}
     assert (found.passes_at, found.tried) == ({}, 0)
+
+
+def test_only_what_did_pass_is_reported_as_passing() -> None:
+    """Where there is no case, as on the left, or where it fails again with what others have become."""
+    start, first = {"a": "8", "b": "8"}, {"a": "0", "b": "0"}
+    without = smallest_case(start, first, first, {}, lambda one: float(one["a"]) >= 4.0 or None)
+    assert (without.values, without.passes_at) == ({"a": "4", "b": "0"}, {})
+    crossing = smallest_case(start, first, first, {}, lambda one: (float(one["a"]) > 5.0) != (float(one["b"]) < 5.0))
+    assert crossing.passes_at
+    for name, value in crossing.passes_at.items():
+        moved = {**crossing.values, name: value}
+        assert (float(moved["a"]) > 5.0) == (float(moved["b"]) < 5.0)

@@ -17,9 +17,6 @@ from fogsim.core.linear_algebra import cholesky_factor, matrix_product, solved_l
 Points = NDArray[np.float64]
 """(n, d) places in the space, each coordinate 0 … 1 over the range of its parameter (in logarithms where declared)."""
 
-BAND = 1.645
-"""Half-width of the 90 % band about the boundary, in standard deviations of the latent function [-]."""
-
 _SHORTEST, _LONGEST = 0.1, 20.0
 """Bounds of the length scales, as shares of a parameter's range [-]."""
 

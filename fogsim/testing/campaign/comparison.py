@@ -1,6 +1,8 @@
 """Before and after: the cases of an earlier campaign, run again to find those whose outcome changed."""
 
 import csv
+import io
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +10,16 @@ from pathlib import Path
 from fogsim.core.files.readers import read_text
 from fogsim.errors import InputError, shown
 from fogsim.scenario.variation import number_with_unit
-from fogsim.testing.campaign.drawing_plan import Drawn, Findings, Purpose, Space, fitted, run_batch, verdict_of
+from fogsim.testing.campaign.drawing_plan import (
+    VERDICTS,
+    Drawn,
+    Findings,
+    Purpose,
+    Space,
+    fitted,
+    run_batch,
+    verdict_of,
+)
 from fogsim.testing.results import CaseResult
 
 CASES = "cases.csv"
@@ -44,7 +55,7 @@ def read_earlier(directory: Path, space: Space) -> tuple[EarlierCase, ...]:
     path = directory / CASES
     if not path.is_file():
         raise InputError(f"--against {directory}: no {CASES} of a campaign is there")
-    header, *rows = [*csv.reader(read_text(path).splitlines())] or [[]]
+    (_, header), *rows = _rows(path) or [(1, [])]
     wanted = first_columns(space)
     if header[: len(wanted)] != wanted:
         raise InputError(
@@ -52,19 +63,35 @@ def read_earlier(directory: Path, space: Space) -> tuple[EarlierCase, ...]:
         )
     if not rows:
         raise InputError(f"{path}: has no case")
-    return tuple(_case(path, line, row, space) for line, row in enumerate(rows, 2))
+    return tuple(_case(path, line, row, space) for line, row in rows)
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Rows of a table, and the line in which each ends; a message may have several."""
+    reader = csv.reader(io.StringIO(read_text(path), newline=""))
+    try:
+        return [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}: not a table with commas between its columns: {error}") from error
 
 
 def _case(path: Path, line: int, row: Sequence[str], space: Space) -> EarlierCase:
     try:
         _, purpose, *numbers, seed, verdict = row[: len(space.axes) + 4]
         values = {
-            name: number_with_unit(float(number), axis.unit)
+            name: number_with_unit(_finite(number), axis.unit)
             for number, (name, axis) in zip(numbers, space.axes.items(), strict=True)
         }
-        return EarlierCase(Drawn(Purpose(purpose), values), int(seed), verdict)
+        return EarlierCase(Drawn(Purpose(purpose), values), int(seed), VERDICTS[VERDICTS.index(verdict)])
     except ValueError as error:
         raise InputError(f"{path}:{line}: expected a case of a campaign, got {shown(','.join(row))}") from error
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(text)
+    return number
 
 
 def again(

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import qmc
 
-from fogsim.conditions import FindingVerdict
 from fogsim.core.randomness import named_generator
 from fogsim.scenario.variation import Draws, SeedLevels, Value, number_with_unit
 from fogsim.testing.campaign.boundary import Boundary, fit_boundary
 from fogsim.testing.campaign.failure_rate import FailureRate, Proposal, failure_rate, first_proposal, next_proposal
+from fogsim.testing.judgement import rate_bounds
 from fogsim.testing.results import CaseResult
 from fogsim.units.quantities import split_quantity
 
@@ -34,7 +34,7 @@ _LEAST_FOR_RATE = 200
 """Cases below which a search for the rate is not begun."""
 
 _LEVELS = 8
-"""Share of the cases for the rate that each level has: one in so many."""
+"""Share of the cases for the rate that each level has: one in so many; all levels together have at most half."""
 
 _PASSING = 1e-9
 """Margin of a case that passed, at the least [-]."""
@@ -95,6 +95,20 @@ def number_of(level: str) -> float:
     return float(level) if found is None else found[0]
 
 
+@dataclass(frozen=True, slots=True)
+class PlainRate:
+    """Failures among cases drawn from the declared distributions alone, wherever they are: the 90 % interval."""
+
+    failed: int
+    drawn: int
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lower and upper bound of the failure rate."""
+        low, high = rate_bounds(self.drawn - self.failed, self.drawn, 0.95)
+        return 1.0 - high, 1.0 - low
+
+
 @dataclass(slots=True)
 class Findings:
     """What a campaign has found: its cases in order, the boundary, and the failure rate."""
@@ -103,6 +117,7 @@ class Findings:
     results: list[CaseResult] = field(default_factory=list)
     boundary: Boundary | None = None
     rate: FailureRate | None = None
+    plain: PlainRate | None = None
     why_no_rate: str = ""
 
 
@@ -168,13 +183,16 @@ def is_decided(result: CaseResult) -> bool:
     return result.is_passed or (result.message is None and result.has_failed)
 
 
+VERDICTS = ("passed", "failed", "inconclusive", "error")
+"""Words for the outcome of a case."""
+
+
 def verdict_of(result: CaseResult) -> str:
     """Word for the outcome of a case."""
+    passed, failed, inconclusive, error = VERDICTS
     if result.message is not None:
-        return "error"
-    return str(
-        FindingVerdict.FAILED if result.has_failed else FindingVerdict.PASSED if result.is_passed else "inconclusive"
-    )
+        return error
+    return failed if result.has_failed else passed if result.is_passed else inconclusive
 
 
 def margin_of(result: CaseResult) -> float | None:
@@ -190,8 +208,10 @@ def _search_rate(space: Space, seed: int, left: int, found: Findings) -> _Batche
         found.why_no_rate = f"a failure rate needs a budget of {2 * _LEAST_FOR_RATE} cases"
         return
     proposal, size = first_proposal(len(space.axes)), max(left // _LEVELS, 50)
-    for level in range(_LEVELS // 2):
+    for level in range(left // (2 * size)):
         places, results = yield from _drawn_from(proposal, Purpose.LEVEL, size, f"level {level}", space, seed, found)
+        if found.plain is None:
+            found.plain = _plain_rate(found)
         margins = _margins(results)
         if margins is None:
             found.why_no_rate = "no expectation compares a number, such as always: ego.ttc >= 0.5 s"
@@ -208,6 +228,24 @@ def _search_rate(space: Space, seed: int, left: int, found: Findings) -> _Batche
     found.rate = failure_rate(proposal, places, np.where(failed, -1.0, 1.0))
     if not found.rate.is_known:
         found.why_no_rate = f"too few cases failed: effectively {found.rate.effective:.0f} of {left}"
+        return
+    low, high = found.plain.bounds if found.plain is not None else (0.0, 1.0)
+    if found.rate.high < low or high < found.rate.low:
+        found.why_no_rate = (
+            f"the search gives {found.rate.low:.2g} … {found.rate.high:.2g}, but cases drawn from the distributions "
+            f"alone {low:.2g} … {high:.2g}"
+        )
+        found.rate = None
+
+
+def _plain_rate(found: Findings) -> PlainRate:
+    """From the cases so far: those that fill the space, and those of the first level."""
+    plain = [
+        one
+        for drawn, one in zip(found.drawn, found.results, strict=True)
+        if drawn.purpose in (Purpose.SPACE, Purpose.LEVEL) and one.message is None
+    ]
+    return PlainRate(sum(one.has_failed for one in plain), len(plain))
 
 
 def _drawn_from(
@@ -219,7 +257,14 @@ def _drawn_from(
 
 
 def _margins(results: Sequence[CaseResult]) -> NDArray[np.float64] | None:
-    """Margins of cases; unknown ones are taken as the largest of the known, None if all are unknown."""
+    """Margins of cases; None if all are unknown.
+
+    Unknown ones are 0 if the case failed, and otherwise the largest of the known.
+    """
     margins = [margin_of(one) for one in results]
     known = [one for one in margins if one is not None]
-    return np.array([max(known) if one is None else one for one in margins]) if known else None
+    if not known:
+        return None
+    largest = max(*known, _PASSING)
+    unknown = [0.0 if one.message is None and one.has_failed else largest for one in results]
+    return np.array([other if one is None else one for one, other in zip(margins, unknown, strict=True)])

@@ -110,6 +110,9 @@ def load_campaign(
     if not space.axes:
         raise InputError(f"{path}: space has no distribution, only seeds")
     earlier = () if against is None else read_earlier(against, space)
+    for one in earlier:
+        if reader.variation.drawn_case(reader.case, {}, one.seed).seed != one.seed:
+            raise InputError(f"--against {against}: {path}: its cases have seeds, and space has none; add run: seeds")
     domain = None if odd is None else read_odd(odd)
     if domain is not None:
         Coverage(domain)  # refuses what does not fit before the first run

@@ -4,13 +4,19 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.contour import ContourSet
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
+from scipy.special import ndtr
 
 from fogsim.conditions import Finding, FindingVerdict
 from fogsim.scenario.variation.levels import parse_space
-from fogsim.testing.campaign.boundary import Boundary, _loss
-from fogsim.testing.campaign.drawing_plan import Draws, Findings, Space, batches, number_of
+from fogsim.testing.campaign import drawing_plan
+from fogsim.testing.campaign.boundary import Boundary, _loss, fit_boundary
+from fogsim.testing.campaign.drawing_plan import Draws, Findings, Purpose, Space, batches, number_of
+from fogsim.testing.campaign.failure_rate import FailureRate
+from fogsim.testing.campaign.outputs import _draw_boundary, rate_text
 from fogsim.testing.results import CaseResult
 
 FOG = "fog"
@@ -43,7 +49,8 @@ def result(values, failed: bool, margin: float | None = None) -> CaseResult:
     return CaseResult(Run(values), None, (finding,))  # type: ignore[arg-type]
 
 
-def searched(seed: int, budget: int = 200) -> Findings:
+def searched(seed: int, budget: int = 200, margin: float | None = None) -> Findings:
+    """What a campaign finds; all cases pass with a margin if there is one."""
     found = Findings()
     plan = batches(declared(), seed, budget, "sobol", found)
     batch = next(plan)
@@ -52,7 +59,8 @@ def searched(seed: int, budget: int = 200) -> Findings:
             results = []
             for one in batch:
                 fog, *others = (number_of(str(value)) for value in one.values.values())
-                results.append(result(one.values, fog < stopping_distance(*others)))
+                failed = margin is None and fog < stopping_distance(*others)
+                results.append(result(one.values, failed, margin))
             batch = plan.send(results)
     except StopIteration:
         return found
@@ -94,3 +102,44 @@ def test_batches_depend_on_seed_and_results_alone() -> None:
     first, again, other = searched(1, 64), searched(1, 64), searched(2, 64)
     assert first.drawn == again.drawn != other.drawn
     assert math.isclose(sum(one.has_failed for one in first.results[32:]) / 32, 0.5, abs_tol=0.25)
+
+
+@pytest.mark.parametrize("budget", [400, 401, 640])
+def test_without_failures_half_of_the_cases_for_the_rate_remain_for_it(budget: int) -> None:
+    found = searched(1, budget, margin=0.5)
+    assert len(found.results) == budget
+    for_rate = sum(one.purpose is Purpose.RATE for one in found.drawn)
+    assert 2 * for_rate >= budget - 200
+    assert rate_text(found) == f"no failure rate: too few cases failed: effectively 0 of {for_rate}"
+
+
+def test_a_rate_that_plain_draws_contradict_is_not_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All plain draws pass here: 0 … 0.036 of the cases fail, with 90 %."""
+    for low, high, is_given in ((0.01, 0.03, True), (0.1, 0.3, False)):
+        rate = FailureRate(0.02, low, high, 100.0, 200)
+        monkeypatch.setattr(drawing_plan, "failure_rate", lambda *_, rate=rate: rate)
+        text = rate_text(searched(1, 400, margin=0.5))
+        if is_given:
+            assert "0.01 … 0.03 (200 cases" in text
+            assert text.endswith("without that assumption 0 … 0.036 (0 of 82 cases drawn from them alone failed)")
+        else:
+            assert text.startswith(
+                "no failure rate: the search gives 0.1 … 0.3, but cases drawn from the distributions"
+            )
+
+
+def test_dashed_lines_are_where_one_outcome_is_95_percent_certain() -> None:
+    """Outcomes that also depend on noise: the latent function is known well, and each outcome is not."""
+    space = Space({name: declared().axes[name] for name in (FOG, "speed")})
+    generator = np.random.default_rng(3)
+    places = generator.random((200, 2))
+    boundary = fit_boundary(places, generator.random(200) < ndtr(3.0 - 6.0 * places[:, 0]))
+    panel = Figure().subplots()
+    middles = {name: axis.quantile(0.5) for name, axis in space.axes.items()}
+    _draw_boundary(panel, space, boundary, middles, (FOG, "speed"))
+    dashed = [line for line in panel.collections if isinstance(line, ContourSet) and not line.filled][1:]
+    assert len(dashed) == 2
+    for line, share in zip(dashed, (0.05, 0.95), strict=True):
+        corners = np.vstack([path.vertices for path in line.get_paths()])
+        on_axes = [[axis.place(v) for v in column] for axis, column in zip(space.axes.values(), corners.T, strict=True)]
+        assert boundary.failure(np.array(on_axes).T) == pytest.approx(share, abs=0.01)

@@ -129,12 +129,29 @@ def test_what_is_no_earlier_campaign(campaign: Campaign, tmp_path: Path) -> None
         ("case,purpose,fog [m],seed,verdict\n", "expected the columns case, purpose, fog \\[m\\], speed"),
         ("case,purpose,fog [m],speed [km/h],seed,verdict\n", "has no case"),
         ("case,purpose,fog [m],speed [km/h],seed,verdict\n0,space,x,1,2,passed\n", "cases.csv:2: expected a case"),
+        ("case,purpose,fog [m],speed [km/h],seed,verdict\n0,space,nan,1,2,passed\n", "cases.csv:2: expected a case"),
+        ("case,purpose,fog [m],speed [km/h],seed,verdict\n0,space,90,1,2,pass\n", "cases.csv:2: expected a case"),
+        ('case,"' + "x" * 200_000, "cases.csv:1: not a table"),
         ("", "expected the columns"),
     ]:
         if table is not None:
             (tmp_path / "cases.csv").write_text(table)
         with pytest.raises(InputError, match=message):
             load_campaign(campaign.file, against=tmp_path)
+
+
+def test_messages_of_errors_do_not_break_an_earlier_table(campaign: Campaign, tmp_path: Path) -> None:
+    header = "case,purpose,fog [m],speed [km/h],seed,verdict,message\n"
+    (tmp_path / "cases.csv").write_text(f'{header}0,space,90,60,2,error,"a\nb"\n1,space,95,60,3,error,a\x0cb\u2028c\n')
+    earlier = load_campaign(campaign.file, against=tmp_path).earlier
+    assert [(one.seed, one.verdict) for one in earlier] == [(2, "error"), (3, "error")]
+
+
+def test_seeds_of_earlier_cases_are_not_dropped(campaign: Campaign, found: Findings, tmp_path: Path) -> None:
+    write_cases(tmp_path / "cases.csv", campaign, found)
+    (tmp_path / "drawn.fog.yaml").write_text(SCENARIO.replace("  run: seeds\n", ""))
+    with pytest.raises(InputError, match="its cases have seeds, and space has none"):
+        load_campaign(tmp_path / "drawn.fog.yaml", against=tmp_path)
 
 
 def test_the_smallest_failing_case_is_near_the_medians(campaign: Campaign, found: Findings, tmp_path: Path) -> None:

@@ -199,6 +199,15 @@ def test_what_attach_cannot_do_without(libsumo: Any) -> None:
         fogsim.attach(libsumo, ego=EGO)
 
 
+def test_what_attach_is_given(libsumo: Any) -> None:
+    with fogsim.attach(libsumo, ego=EGO, visibility=np.float64(120.0), settings=SMALL) as session:
+        assert next(observed(libsumo, session, 100)).truth.visibility == pytest.approx(120.0)
+    alone = ["traffic.ego=none", "traffic.keep_lane=[]", "traffic.events=[]", "fog={visibility_m: 80}"]
+    alone += ["renderer=none", "estimators=[]", "fusion=grid_filter", "lighting=low_beam"]
+    with pytest.raises(InputError, match=r"needs an ego vehicle in it, and traffic\.ego is none"):
+        fogsim.attach(libsumo, scenario=fogsim.load_scenario("motorway_fog_bank", alone))
+
+
 def test_what_is_no_simulation() -> None:
     with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
         fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)

@@ -16,6 +16,7 @@ from fogsim.scenario import Scenario
 from fogsim.scenario.loading import clock_settings
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.loop import DriversFog
+from fogsim.simulation.run_config import RunConfig
 from fogsim.traffic.highway import (
     Fleet,
     RouteProgress,
@@ -33,11 +34,18 @@ from fogsim_envs.spaces import LAMP_MODES, ImageSize, observation_space, observe
 _COMMAND = Command(lamps=LAMP_MODES[0])
 
 
+def _frequencies(config: Mapping[str, Any]) -> tuple[float, float]:
+    """How often an environment of this configuration moves and takes an action [Hz]."""
+    return float(config["simulation_frequency"]), float(config["policy_frequency"])
+
+
 def _scenario(config: Mapping[str, Any], visibility: float, overrides: Iterable[str]) -> Scenario:
     """Scenario whose camera takes a frame at the end of each of the environment's steps."""
-    step = 1.0 / config["simulation_frequency"]
-    period = step * max(1, config["simulation_frequency"] // config["policy_frequency"])
-    scenario = highway_scenario(config, visibility, [*clock_settings(step, period, period), *overrides])
+    simulation, policy = _frequencies(config)
+    step = 1.0 / simulation
+    period = step * max(1.0, simulation // policy)
+    plain = {**config, "simulation_frequency": simulation, "policy_frequency": policy}
+    scenario = highway_scenario(plain, visibility, [*clock_settings(step, period, period), *overrides])
     if not math.isclose(scenario.clocks.camera_period_s, period):
         raise InputError(
             f"clocks.camera_period_s: there is a frame at the end of each step of the environment, {period:g} s by its "
@@ -84,6 +92,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         image_size: ImageSize = (160, 120),
         drivers: bool = True,
     ) -> None:
+        overrides = tuple(overrides)
         RecordConstructorArgs.__init__(
             self, visibility=visibility, overrides=overrides, image_size=image_size, drivers=drivers
         )
@@ -91,7 +100,8 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         if not is_highway_environment(env.unwrapped):
             raise InputError(f"FogCameraWrapper: expected an environment of highway-env, got {env!r}")
         size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
-        self._config = _scenario(highway_config(env.unwrapped), visibility, [*size, *overrides]).run_config()
+        self._visibility, self._overrides = visibility, (*size, *overrides)
+        self._frequencies, self._config = self._configured()
         self._drivers = drivers
         self._equipment = EgoEquipment(self._config)
         self._network: RoadNetwork | None = None
@@ -106,6 +116,11 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
             {"camera": own["camera"], "state": own["state"], "highway": env.observation_space}
         )
 
+    def _configured(self) -> tuple[tuple[float, float], RunConfig]:
+        """The environment's frequencies, and what rides in its vehicle by them."""
+        config = highway_config(self.env.unwrapped)
+        return _frequencies(config), _scenario(config, self._visibility, self._overrides).run_config()
+
     @checked_parameters
     def reset(
         self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
@@ -119,9 +134,14 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         options : dict or None
             Of the environment.
         """
-        observation, info = self.env.reset(seed=seed, options=options)
+        observation, info = self.env.reset(seed=None if seed is None else int(seed), options=options)
         if seed is not None:
             self._noise = np.random.default_rng(seed)
+        if _frequencies(highway_config(self.env.unwrapped)) != self._frequencies:
+            # The options have changed the environment's configuration.
+            self._frequencies, self._config = self._configured()
+            self._equipment.close()
+            self._equipment = EgoEquipment(self._config)
         environment: Any = self.env.unwrapped
         self._fleet = Fleet(environment, environment.vehicle)
         self._fleet.ego_lamps = _COMMAND.lamps

@@ -5,13 +5,17 @@ The data set is one of Minari (https://minari.farama.org), in Minari's own place
 
 import argparse
 import math
+import re
 from typing import Annotated, Any
 
 import gymnasium
 
 from fogsim.core.parameters import Range, checked_parameters
-from fogsim.errors import FogSimError, InputError, MissingDependencyError
+from fogsim.errors import FogSimError, InputError, MissingDependencyError, shown
 from fogsim_envs.baselines import BASELINES, baseline, check_baseline
+
+_DATA_SET = re.compile(r"([-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")
+"""Ids that Minari takes; it checks them only when all episodes have been driven."""
 
 
 @checked_parameters
@@ -22,6 +26,8 @@ def record_demonstrations(
 
     Returns the data set.
     """
+    if _DATA_SET.fullmatch(data_set) is None:
+        raise InputError(f"data_set: expected an id such as 'fogsim/advisory/rule-v1', got {shown(data_set)}")
     minari = _import_minari()
     if data_set in minari.list_local_datasets():
         raise InputError(f"data set {data_set!r} already exists: choose another id, or minari delete {data_set}")
@@ -65,7 +71,7 @@ def main() -> None:
     asked = parser.parse_args()
     try:
         record_demonstrations(asked.policy, asked.env, asked.episodes, asked.id or f"fogsim/advisory/{asked.policy}-v1")
-    except FogSimError as error:
+    except (FogSimError, gymnasium.error.Error) as error:
         parser.exit(2, f"error: {error}\n")
 
 

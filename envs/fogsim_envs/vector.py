@@ -7,14 +7,14 @@ there a process that is killed shows as a bare ``BrokenPipeError``, and one that
 import contextlib
 import functools
 import importlib
-import multiprocessing
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import gymnasium
-from gymnasium.vector import AsyncVectorEnv
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.vector.async_vector_env import AsyncState
 
 from fogsim.core.parameters import Range, checked_parameters
@@ -26,6 +26,8 @@ _TIMEOUT = 600.0
 
 _CLOSE_TIMEOUT = 10.0
 
+_P, _T = ParamSpec("_P"), TypeVar("_T")
+
 
 @checked_parameters
 def make_vector(
@@ -35,6 +37,7 @@ def make_vector(
     *,
     wrappers: Sequence[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]] = (),
     context: Literal["fork", "spawn", "forkserver"] | None = None,
+    autoreset_mode: AutoresetMode | Literal["NextStep", "SameStep", "Disabled"] = AutoresetMode.NEXT_STEP,
     **kwargs: Any,
 ) -> AsyncVectorEnv:
     """Make a vector environment that reports lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
@@ -44,7 +47,7 @@ def make_vector(
     limit, make = checked_timeout(timeout), functools.partial(_wrapped, id, tuple(wrappers), kwargs)
     # A GL context does not survive a fork.
     context = context or ("forkserver" if "OpenGL" in sys.modules else None)
-    return _Workers([make] * num_envs, limit, context)
+    return _Workers([make] * num_envs, limit, context, AutoresetMode(autoreset_mode))
 
 
 def _wrapped(
@@ -59,46 +62,75 @@ def _wrapped(
     return made
 
 
+def _reporting(method: Callable[Concatenate["_Workers", _P], _T]) -> Callable[Concatenate["_Workers", _P], _T]:
+    """A method that speaks to the workers; if one is lost or has failed, all are ended."""
+
+    @functools.wraps(method)
+    def reporting(self: "_Workers", *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        try:
+            return method(self, *args, **kwargs)
+        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
+            self._abandon()
+            raise SimulationError("a process that ran an environment has ended; the others were ended, too") from error
+        except BaseException:
+            # Gymnasium ends the worker of an environment that has failed, and leaves None in its place.
+            if None in self.parent_pipes:
+                self._abandon()
+            raise
+
+    return reporting
+
+
 class _Workers(AsyncVectorEnv):
     """Gymnasium's own, which by itself waits for ever for a worker that is stopped (`timeout` [s])."""
 
     def __init__(
-        self, makers: Sequence[Callable[[], gymnasium.Env[Any, Any]]], timeout: float | None, context: str | None
+        self,
+        makers: Sequence[Callable[[], gymnasium.Env[Any, Any]]],
+        timeout: float | None,
+        context: str | None,
+        autoreset_mode: AutoresetMode,
     ) -> None:
+        # Processes that begin import everything first.
+        self._timeout = None if timeout is None else max(timeout, _TIMEOUT)
+        super().__init__(makers, context=context, autoreset_mode=autoreset_mode)
         self._timeout = timeout
-        super().__init__(makers, context=context)
 
-    def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Begin an episode in each; see `AsyncVectorEnv.reset`."""
-        with self._limited():
-            self.reset_async(seed=seed, options=options)
-            return self.reset_wait(self._timeout)
+    @_reporting
+    def reset_async(self, seed: Any = None, options: dict[str, Any] | None = None) -> None:
+        """Ask each to begin an episode; see `AsyncVectorEnv.reset_async`."""
+        super().reset_async(seed=int(seed) if isinstance(seed, np.integer) else seed, options=options)
 
-    def step(self, actions: Any) -> Any:
-        """Step each; see `AsyncVectorEnv.step`."""
-        with self._limited():
-            self.step_async(actions)
-            return self.step_wait(self._timeout)
+    reset_wait = _reporting(AsyncVectorEnv.reset_wait)
+    step_async = _reporting(AsyncVectorEnv.step_async)
+    step_wait = _reporting(AsyncVectorEnv.step_wait)
+    call_async = _reporting(AsyncVectorEnv.call_async)
+    call_wait = _reporting(AsyncVectorEnv.call_wait)
 
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each; see `AsyncVectorEnv.call`."""
-        with self._limited():
-            self.call_async(name, *args, **kwargs)
-            return self.call_wait(self._timeout)
+    @_reporting
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each; see `AsyncVectorEnv.set_attr`."""
+        self._wait_for_all()
+        super().set_attr(name, values)
 
-    @contextlib.contextmanager
-    def _limited(self) -> Iterator[None]:
-        try:
-            yield
-        except multiprocessing.TimeoutError as error:
+    @_reporting
+    def _check_spaces(self) -> None:
+        self._wait_for_all()
+        super()._check_spaces()
+
+    def _wait_for_all(self) -> None:
+        """Ask each for something before a request whose answers Gymnasium awaits without a limit."""
+        self.call("render_mode")
+
+    def _poll_pipe_envs(self, timeout: float | None = None) -> bool:
+        has_answers = super()._poll_pipe_envs(self._timeout if timeout is None else timeout)
+        if timeout is None and not has_answers:
             self._abandon()
             raise SimulationError(
                 f"the environments have not answered for {self._timeout:g} s, and were ended: one of their processes "
                 "was stopped, or they need longer; the time is set by timeout=…"
-            ) from error
-        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
-            self._abandon()
-            raise SimulationError("a process that ran an environment has ended; the others were ended, too") from error
+            )
+        return has_answers
 
     def _abandon(self) -> None:
         self.close(terminate=True)

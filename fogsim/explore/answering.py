@@ -12,6 +12,7 @@ from fogsim.camera import CameraConfig
 from fogsim.core.randomness import spawn_streams
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
+from fogsim.explore.calibrating import CALIBRATING, Calibrator
 from fogsim.explore.recorded_drive import Moment, RecordedDrive
 from fogsim.recorders.templating import data_url
 from fogsim.scenario import Scenario
@@ -56,11 +57,12 @@ class Question:
     chosen: Mapping[str, float] = field(default_factory=dict)  # Values by the names of `KEYS`
     lamps: Lamp | None = None  # The ego's, in place of those that it lit in the drive
     rear_fog: bool = False  # Whether all others light their rear fog lamps
+    soon: bool = False  # Whether to leave out methods that are still being calibrated
 
 
 def question(query: Mapping[str, str]) -> Question:
     """The question in a query string; InputError for what the page does not ask."""
-    known = {"time", "frames", "lamps", "rear_fog", *KEYS}
+    known = {"time", "frames", "lamps", "rear_fog", "soon", *KEYS}
     if unknown := query.keys() - known:
         raise InputError(f"unknown {', '.join(sorted(unknown))}; known are {', '.join(sorted(known))}")
     lamps = query.get("lamps")
@@ -72,6 +74,7 @@ def question(query: Mapping[str, str]) -> Question:
         chosen={name: _number(query, name, -1e6, 1e6) for name in KEYS if name in query},
         lamps=None if lamps is None else OWN_LAMPS[lamps],
         rear_fog=query.get("rear_fog") == "on",
+        soon=query.get("soon") == "on",
     )
 
 
@@ -116,18 +119,22 @@ class Explorer:
         self._scenario, self._seed = scenario, seed
         self._command = ["fogsim", "run", name, f"--seed={seed}", *_as_options(settings)]
         self.drive = RecordedDrive(scenario.run_config(), seed)
-        self._scene = _KeptScene()
+        self._scene, self._calibrator = _KeptScene(), Calibrator()
 
     def answer(self, asked: Question, is_outdated: Callable[[], bool] = lambda: False) -> dict[str, Any] | None:
         """What a moment looks like and what follows from it, as JSON; None if the question is outdated meanwhile.
 
-        The same question always has the same answer: the estimators begin with the first of its frames.
+        The same question always has the same answer, if not `soon`: the estimators begin with the first of its frames.
         """
-        last = self.drive.reach(asked.time)
+        last = self.drive.reach(asked.time, is_outdated)
+        if last is None:
+            return None
         moments = self.drive.moments[: last + 1]
         settings = self._settings(asked)
         scenario = override(self._scenario, settings) if settings else self._scenario
         config = scenario.run_config()
+        if asked.soon:
+            config = replace(config, estimators=tuple(map(self._calibrator.without_waiting, config.estimators)))
         seen = _look(config, moments, self._equipment(config), asked, is_outdated)
         if seen is None:
             return None
@@ -148,6 +155,7 @@ class Explorer:
                 "pitch_error": scenario.camera.told.pitch_error_deg,
             },
             "estimates": [_estimate(estimate) for estimate in step.estimates],
+            "calibrating": [one.method for one in step.estimates if one.diagnostics.get("reason") == CALIBRATING],
             "belief": _belief(step),
             "advice": _advice(step, command),
             "command": shlex.join([*self._command, *_as_options(settings)]),
@@ -170,9 +178,10 @@ class Explorer:
         return equipment
 
     def close(self) -> None:
-        """End the simulation and free the renderer."""
+        """End the simulation and the calibrations, and free the renderer."""
         self.drive.close()
         self._scene.close()
+        self._calibrator.close()
 
 
 def _look(
@@ -235,7 +244,7 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {
         "method": estimate.method,
         "visibility": _finite(estimate.visibility) if estimate.valid else None,
-        "low": low,
+        "low": _finite(low),
         "high": _finite(high),
         "reason": "" if estimate.valid else str(estimate.diagnostics.get("reason", "")),
     }
@@ -245,7 +254,7 @@ def _belief(step: Step) -> dict[str, Any]:
     low, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.95))
     return {
         "visibility": _finite(step.belief.visibility),
-        "low": low,
+        "low": _finite(low),
         "high": _finite(high),
         "informed": step.belief.is_informed(),
     }

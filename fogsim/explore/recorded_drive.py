@@ -1,5 +1,6 @@
 """The drive of a scenario's ego, recorded without frames, that it can be looked at again in other fog."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fogsim.errors import InputError, SimulationError
@@ -55,10 +56,15 @@ class RecordedDrive:
             raise SimulationError("the drive has not been started or is over")
         return self._record(self._loop.advance(self._policy.decide(self._step)))
 
-    def reach(self, time: float) -> int:
-        """Number of the moment at a time [s], or of the last one if the drive ends before."""
+    def reach(self, time: float, is_outdated: Callable[[], bool]) -> int | None:
+        """Number of the moment at a time [s], or of the last one if the drive ends before; None if outdated meanwhile.
+
+        Takes `is_outdated`, whether it is not asked for any more.
+        """
         index = round(time / self._config.periods.camera_period)
         while len(self.moments) <= index and not self.is_over:
+            if is_outdated():
+                return None
             self.advance()
         return min(index, len(self.moments) - 1)
 

@@ -3,6 +3,7 @@
 import json
 import queue
 import threading
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -15,6 +16,9 @@ from fogsim.explore.answering import Explorer, Question, question
 
 ADDRESS = "127.0.0.1"
 """The loopback interface: no other computer reaches it."""
+
+_USUAL_PORT = 80
+"""Browsers leave it out of a page's address."""
 
 _PAGE = {
     "/": ("page.html", "text/html; charset=utf-8"),
@@ -44,27 +48,28 @@ class PageServer(ThreadingHTTPServer):
 
     def __init__(self, port: int = 0) -> None:
         self.jobs: queue.SimpleQueue[_Job] = queue.SimpleQueue()
-        self._newest, self._lock = 0, threading.Lock()
+        self._newest, self._lock = Counter[str](), threading.Lock()
         try:
             super().__init__((ADDRESS, port), _Handler)
         except OSError as error:
             raise InputError(
                 f"--port {port}: cannot be used ({error.strerror}); leave --port out for any that is free"
             ) from error
-        self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
+        ports = (f":{self.server_port}", *([""] if self.server_port == _USUAL_PORT else []))
+        self.hosts = {f"{name}{port}" for name in (ADDRESS, "localhost") for port in ports}
 
     @property
     def url(self) -> str:
         """Address of the page."""
         return f"http://{ADDRESS}:{self.server_port}/"
 
-    def ask(self, asked: Question) -> dict[str, Any] | None:
-        """Have a question answered; None if a newer one came meanwhile."""
+    def ask(self, asked: Question, page: str) -> dict[str, Any] | None:
+        """Have a question of a page answered; None if a newer one of the same page came meanwhile."""
         with self._lock:
-            self._newest += 1
-            number = self._newest
+            self._newest[page] += 1
+            number = self._newest[page]
         answer: Future[dict[str, Any] | None] = Future()
-        self.jobs.put((asked, lambda: number != self._newest, answer))
+        self.jobs.put((asked, lambda: number != self._newest[page], answer))
         return answer.result()
 
 
@@ -92,7 +97,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, query: str) -> None:
         try:
-            answer = self.server.ask(question(dict(parse_qsl(query))))
+            given = dict(parse_qsl(query))
+            page = given.pop("page", "")
+            answer = self.server.ask(question(given), page)
         except FogSimError as error:
             self._send_json(400, {"error": str(error)})
         else:
@@ -136,7 +143,9 @@ def _do(job: _Job, explorer: Explorer) -> None:
     asked, is_outdated, answer = job
     try:
         answer.set_result(None if is_outdated() else explorer.answer(asked, is_outdated))
-    except BaseException as error:
+    except FogSimError as error:
         answer.set_exception(error)
-        if not isinstance(error, FogSimError):
-            raise
+    except BaseException:
+        # The error, or Ctrl-C, is for this thread alone.
+        answer.set_result(None)
+        raise

@@ -111,19 +111,22 @@ def attach(
     SimulationError
         If no simulation runs there.
     """
-    fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
+    fog = [] if visibility is None else [f"fog.visibility_m={float(visibility)!r}"]
     if scenario is not None:
         # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
         clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
         scenario = override(scenario, [*clocks, *fog, *settings], others_add_vehicles=True)
-        ego = ego or scenario.traffic.ego
     elif ego is None:
         raise InputError("attach: ego is missing: which vehicle is the ego?")
     else:
         scenario = attached_scenario(ego, [*_clocks(step_length(api)), *fog, *settings])
     config = scenario.run_config()
     setup = dataclasses.replace(
-        config.traffic, ego=ego, net=None if net is None else Path(net), additional=(), config=None
+        config.traffic,
+        ego=ego or config.traffic.ego,
+        net=None if net is None else Path(net),
+        additional=(),
+        config=None,
     )
     return AttachedSession(config, AttachedTraffic(setup, api), drivers, seed)
 

@@ -4,17 +4,27 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
+from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.files.atomic import write_json, write_text
 from fogsim.core.files.output_targets import refuse_unwritable_folder
-from fogsim.core.registry.user_code import import_nothing
+from fogsim.core.parameters import paths_in
+from fogsim.core.registry import Registry
+from fogsim.core.registry.user_code import import_nothing, is_class_name, module_file
 from fogsim.errors import InputError, shown
+from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.openscenario import is_openscenario
 from fogsim.scenario.document import read_document
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
+from fogsim.scenario.runnable import Scenario
+from fogsim.scenario.section import Method
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.traffic.road.configuration import included_files, input_files, seldom_files
 
 _NAME_KEY = re.compile(r"^name:.*$", re.MULTILINE)
@@ -44,7 +54,8 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
         raise InputError(f"{folder} already exists; give another name")
     traffic = old.traffic
     needed = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
-    outside = [path for path in needed if path.is_absolute() or ".." in path.parts]
+    of_methods = [path for path in _files_of_methods(old) if (old.directory / path).is_file()]
+    outside = [path for path in (*needed, *of_methods) if path.is_absolute() or ".." in path.parts]
     further: tuple[Path, ...] = ()
     if traffic.config is not None and traffic.config not in outside:
         config = old.directory / traffic.config
@@ -52,6 +63,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
         further = seldom_files(config)
     included = included_files(old.directory / path for path in needed if path not in outside)
     needed += _in_folder(old.directory, (*included, *further), scenario_file(source))
+    needed += of_methods
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
     foreign = read_document(scenario_file(source)).data.get("scenario")
@@ -72,6 +84,33 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     return (*made, folder / _SCHEMA_FILE)
+
+
+def _files_of_methods(scenario: Scenario) -> Iterator[Path]:
+    """Modules of the user's methods in the scenario's folder, and files that methods or their parameters name."""
+    roadside = scenario.sensors.reports.roadside
+    camera = None if roadside is None else roadside.camera
+    chosen: list[tuple[Registry[Any], Method | None]] = [
+        *((ESTIMATORS, one) for one in scenario.estimators),
+        (ESTIMATORS, None if camera is None else camera.estimator),
+        (FUSIONS, scenario.fusion),
+        (ADVISERS, scenario.advice),
+        (SPEED_CHOICES, scenario.drivers.speed_choice),
+        (LIGHTING_POLICIES, scenario.lighting),
+        (CONTROLLERS, scenario.controller),
+    ]
+    for registry, method in chosen:
+        if method is None:
+            continue
+        kind, _, file = method.method.partition(":")
+        if kind in registry.files:
+            yield Path(file)
+        elif is_class_name(method.method):
+            home, module = scenario.directory.resolve(), module_file(method.method, scenario.directory)
+            top = home / kind.partition(".")[0]
+            yield from (one.relative_to(home) for one in (top.rglob("*.py") if top in module.parents else [module]))
+        else:
+            yield from paths_in(registry.find(method.method), method.parameters, Path()).values()
 
 
 def _in_folder(directory: Path, files: Iterable[Path], source: Path) -> list[Path]:

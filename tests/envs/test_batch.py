@@ -226,9 +226,15 @@ def test_options_reach_the_batch_through_stable_baselines() -> None:
     pytest.importorskip("stable_baselines3", reason="an extra")
     from fogsim_envs.batch.stable_baselines import BatchVecEnv
 
-    envs = BatchVecEnv(made(2))  # type: ignore[arg-type]
+    envs = BatchVecEnv(made(2))
     envs.set_options({"visibility": 50.0})
     with pytest.raises(InputError, match="no options"):
         envs.reset()
     envs.set_options()
     assert envs.reset().shape == (2, 22)
+    for name, wrong in (("repeat", {"repeat": 0}), ("repeat", {"repeat": 1.5}), ("SameStep", {"mode": "NextStep"})):
+        mode = wrong.pop("mode", "SameStep")
+        with pytest.raises(InputError, match=name):
+            BatchVecEnv(made(2, autoreset_mode=mode), **wrong)  # type: ignore[arg-type]  # wrong ones
+    with pytest.raises(InputError, match="FogAdvisoryBatch"):
+        BatchVecEnv(gymnasium.make_vec("CartPole-v1", 2))

@@ -1,13 +1,19 @@
 """What ``fogsim explore`` answers: pure functions of what is chosen, in the scene of the drive."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
 
+import numpy as np
 import pytest
 from early_motorway import EARLY
 
 from fogsim.errors import InputError
-from fogsim.explore.answering import Explorer, Question, question
+from fogsim.estimators.night.own_light import VISIBILITIES, OwnLight, cells_of
+from fogsim.explore.answering import Explorer, Question, _estimate, question
+from fogsim.explore.calibrating import CALIBRATING
 from fogsim.scenario import catalogue, load_scenario
+from fogsim.values import Camera, Estimate
 
 SMALL = [EARLY, "renderer=cpu", "camera.width=160", "camera.height=120", "duration_s=2"]
 IN_FOG = Question(time=0.5, chosen={"visibility": 80.0})
@@ -43,6 +49,72 @@ def test_what_the_script_does_is_seen_until_it_is_chosen_otherwise() -> None:
     ]
     explorer.close()
     assert [answer and answer["values"]["light"] for answer in lights] == [10_000.0, 100.0, 3000.0]
+
+
+def test_an_outdated_question_does_not_wait_for_the_drive() -> None:
+    explorer = begun(SMALL)
+    asked = iter((False, False, True))
+    assert explorer.answer(Question(time=2.0), lambda: next(asked)) is None
+    assert len(explorer.drive.moments) == 3
+    explorer.close()
+
+
+class Workers:
+    """Another process that makes calibrations when it is let, of light that is the same everywhere."""
+
+    def __init__(self) -> None:
+        self.begun = 0
+        self.are_done = False
+
+    def apply_async(self, make: Callable[..., Any], arguments: tuple[Camera, *tuple[Any, ...]]) -> "Workers":
+        assert make.__name__ == "own_light"
+        self.begun += 1
+        self._cells = len(cells_of(arguments[0]).box)
+        return self
+
+    def ready(self) -> bool:
+        return self.are_done
+
+    def get(self) -> OwnLight:
+        veil = np.ones((2, len(VISIBILITIES), self._cells), np.float32)
+        return OwnLight(veil, veil, veil[:, 0])
+
+    def terminate(self) -> None:
+        self.begun = 0
+
+
+def test_methods_that_are_being_calibrated_keep_no_other_waiting() -> None:
+    explorer, workers = begun([*SMALL, "estimators=[joint_road, night_road]", "light.illuminance_lx=0.1"]), Workers()
+    explorer._calibrator._pool = workers  # type: ignore[assignment]
+    soon = Question(time=0.5, frames=2, soon=True)
+    for height in (1.5, 1.6, 1.5):
+        early = explorer.answer(Question(0.5, chosen={"height": height}, soon=True))
+        assert early["calibrating"] == ["night_road"]
+        assert early["estimates"][1]["reason"] == CALIBRATING
+    assert workers.begun == 1  # one after the other
+    assert explorer.answer(soon)["calibrating"] == ["night_road"]
+    workers.are_done = True
+    assert explorer.answer(soon)["calibrating"] == []
+    assert workers.begun == 2
+    assert explorer.answer(soon)["estimates"][1]["reason"] != CALIBRATING
+    explorer.close()
+    assert workers.begun == 0
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.nightly
+def test_estimates_are_the_same_whether_waited_for_or_not() -> None:
+    explorer = begun([*SMALL, "estimators=[joint_road, night_road]", "light.illuminance_lx=0.1"])
+    soon = question({"time": "0.5", "frames": "3", "soon": "on"})
+    while (early := explorer.answer(soon))["calibrating"]:
+        pass
+    assert early == explorer.answer(Question(0.5, 3))
+    explorer.close()
+
+
+def test_what_has_no_end_is_no_number_of_the_answer() -> None:
+    for estimate in (Estimate("own", 0.0, 0.0), Estimate("own", 0.03, 0.0), Estimate.invalid("own", "")):
+        json.dumps(_estimate(estimate), allow_nan=False)
 
 
 def test_only_a_drive_with_frames_is_explored() -> None:

@@ -8,13 +8,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 from early_motorway import EARLY
 
 from fogsim.cli.explore import explore_command
 from fogsim.errors import InputError
+from fogsim.explore import server as module
+from fogsim.explore.answering import Question
 from fogsim.explore.server import PageServer
 
 Response = tuple[int, Mapping[str, str], str]
@@ -78,6 +82,38 @@ def test_what_is_not_there_and_what_is_wrong_is_said(server: PageServer) -> None
     status, _, text = get(server, "/answer?vis=80")
     assert status == 400
     assert "unknown vis" in text
+
+
+def test_questions_are_given_up_for_newer_ones_of_the_same_page(server: PageServer) -> None:
+    jobs = []
+    for page in ("one", "other", "one"):
+        threading.Thread(target=server.ask, args=(Question(), page)).start()
+        jobs.append(server.jobs.get())
+    assert [is_outdated() for _, is_outdated, _ in jobs] == [True, False, False]
+    for *_, answer in jobs:
+        answer.set_result(None)
+
+
+def test_at_the_usual_port_browsers_name_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+    monkeypatch.setattr(module, "_USUAL_PORT", port)
+    server = PageServer(port)
+    assert {"127.0.0.1", f"127.0.0.1:{port}", "localhost"} <= server.hosts
+    server.server_close()
+
+
+def test_ctrl_c_during_an_answer_is_for_the_main_thread_alone() -> None:
+    class Interrupted:
+        def answer(self, *_: object) -> None:
+            raise KeyboardInterrupt
+
+    server, answer = PageServer(), Future[dict[str, Any] | None]()
+    server.jobs.put((Question(), lambda: False, answer))
+    with pytest.raises(KeyboardInterrupt):
+        module._do(server.jobs.get(), Interrupted())  # type: ignore[arg-type]
+    assert answer.result(timeout=0) is None
+    server.server_close()
 
 
 def test_mistakes_are_told_before_the_drive() -> None:

@@ -7,6 +7,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from fogsim import InputError, catalogue, load_scenario
+from fogsim.core.registry.user_code import import_nothing
 from fogsim.errors import LeftOutWarning
 from fogsim.scenario.json_schema import json_schema, scenario_json_schema
 from fogsim.scenario.plain_yaml import parse_yaml
@@ -111,6 +112,25 @@ def test_files_that_lie_elsewhere_are_named_by_their_place(tmp_path):
     second = load_scenario(tmp_path / "second")
     assert second.traffic.routes == (tmp_path / "first" / "motorway.rou.xml",)
     assert (tmp_path / "second" / "first" / "motorway.net.xml").is_file()
+
+
+def test_files_of_methods_are_copied(tmp_path):
+    (old := tmp_path / "old").mkdir()
+    for name in ("mine.py", "pack/__init__.py", "pack/inner.py", "pack/helper.py", "other.py"):
+        (old / name).parent.mkdir(exist_ok=True)
+        (old / name).write_text("class Own: ...\n")
+    (old / "lamps.yaml").write_text("{}")
+    (old / "scenario.yaml").write_text(
+        "name: old\nduration_s: 5\nroad: {template: motorway}\nactors: {ego: {position: 200 m, speed: 100 km/h}}\n"
+        "fog: {visibility_m: 100}\nfusion: pack.inner:Own\n"
+        "estimators:\n  - mine:Own\n  - {method: night_road, parameters: {head_lamps: lamps.yaml}}\n"
+        "lighting: low_beam\n"
+    )
+    begin_scenario("new", str(old), tmp_path)
+    load_scenario(tmp_path / "new", may_import=import_nothing)
+    found = {str(path.relative_to(tmp_path / "new")) for path in (tmp_path / "new").rglob("*") if path.is_file()}
+    added = {"mine.py", "pack/__init__.py", "pack/inner.py", "pack/helper.py", "lamps.yaml"}
+    assert found == {"scenario.yaml", "fogsim.schema.json", *added}
 
 
 @pytest.fixture

@@ -1,17 +1,19 @@
 """The vector environment for Stable-Baselines3, an extra: ``BatchVecEnv(gymnasium.make_vec(…))``."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from fogsim.errors import InputError
+from fogsim.core.parameters import Range, checked_parameters
+from fogsim.errors import InputError, shown
 from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 
 
+@checked_parameters
 class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
     """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps.
 
@@ -19,7 +21,9 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
     episode's last step has what it ``earned`` without that, and the sum of its ``cost``.
     """
 
-    def __init__(self, envs: FogAdvisoryBatchEnv, repeat: int = 1) -> None:
+    def __init__(self, envs: VectorEnv[Any, Any, Any], repeat: Annotated[int, Range(1, 1000)] = 1) -> None:
+        if not isinstance(envs.unwrapped, FogAdvisoryBatchEnv):
+            raise InputError(f"envs: expected a fogsim/FogAdvisoryBatch of gymnasium.make_vec, got {shown(envs)}")
         if envs.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
             raise InputError('autoreset_mode: BatchVecEnv expects "SameStep"')
         self.envs, self._repeat, self.multiplier = envs, repeat, 0.0

@@ -11,11 +11,15 @@ const sliders = {
   pitch: {value: p => p, place: v => v, text: v => `${v.toFixed(1)}°`},
   pitch_error: {value: p => p, place: v => v, text: v => `${v > 0 ? "+" : ""}${v.toFixed(2)}°`},
 };
-let onTheWay = 0, wanted = null, asked = 0, shown = 0, later = 0, playing = false;
+const page = String(Math.random()).slice(2);  // the server gives up older questions of the same page alone
+let onTheWay = 0, wanted = null, asked = 0, shown = 0, later = 0, plays = 0, playing = false;
 
 function nice(v) { return Number(v.toPrecision(3)).toLocaleString("en"); }
 function metres(v) { return v === null || v >= 10000 ? "clear" : `${nice(v)} m`; }
-function span(found) { return found.high === null || found.high >= 10000 ? `> ${nice(found.low)}` : `${nice(found.low)} – ${nice(found.high)}`; }
+function span(found) {
+  if (found.low === null) return "";
+  return found.high === null || found.high >= 10000 ? `> ${nice(found.low)}` : `${nice(found.low)} – ${nice(found.high)}`;
+}
 function share(v) { return v === null ? 1 : Math.min(Math.max(Math.log(v / NEAREST) / Math.log(FARTHEST / NEAREST), 0), 1); }
 
 // Two at most are on their way: the newer one makes the server give up the older one.
@@ -24,51 +28,57 @@ async function ask(frames) {
   if (onTheWay === 2) return;
   onTheWay += 1;
   while (wanted !== null) {
-    const number = ++asked, query = address(wanted);
+    const number = ++asked, frames = wanted, query = `answer?${choices()}&frames=${frames}&soon=on&page=${page}`;
     wanted = null;
     const slow = setTimeout(() => { at("working").hidden = false; }, 800);
-    try {
-      const answer = await (await fetch(query)).json();
-      if (number > shown && !answer.outdated) { shown = number; show(answer); }
-    } catch { trouble("The server has ended: start fogsim explore again."); }
+    const answer = await fetch(query).then(response => response.json()).catch(() => null);
     clearTimeout(slow);
     at("working").hidden = true;
+    if (answer === null) { trouble("The server has ended: start fogsim explore again."); play(false); }
+    else if (number > shown && !answer.outdated) { shown = number; show(answer, frames); }
   }
   onTheWay -= 1;
 }
 
-function address(frames) {
-  const query = new URLSearchParams([["time", at("time").value], ["frames", frames], ...chosen]);
+function choices() {
+  const query = new URLSearchParams([["time", at("time").value], ...chosen]);
   if (at("lamps-of-ego").value) query.set("lamps", at("lamps-of-ego").value);
   if (at("rear-fog").checked) query.set("rear_fog", "on");
-  return `answer?${query}`;
+  return query;
 }
 
-// At once by one frame, and when the hand rests, by those of the last seconds, too.
-function changed() {
+function changed() { clearTimeout(later); ask(1); }
+
+// At once by one frame, and when the hand rests and all methods are calibrated, by those of the last seconds, too.
+function goOn(answer, frames) {
   clearTimeout(later);
-  ask(1);
-  if (!playing) later = setTimeout(() => ask(MOST_FRAMES), 600);
+  if (playing) return;
+  const calibrating = answer.calibrating.length > 0;
+  if (calibrating || frames === 1) later = setTimeout(() => ask(calibrating ? 1 : MOST_FRAMES), 600);
+  // A page that is loaded again goes on from here.
+  else history.replaceState(null, "", `#${choices()}`);
 }
 
 function trouble(text) { at("trouble").textContent = text; at("trouble").hidden = !text; }
 
-function show(answer) {
+function show(answer, frames) {
   trouble(answer.error ?? "");
   if (answer.error) return;
+  goOn(answer, frames);
   document.title = `${answer.scenario} · FogSim`;
   at("scenario").textContent = answer.scenario;
   at("description").textContent = at("description").title = answer.description;
   at("frame").src = answer.image;
   at("time").max = answer.duration;
-  at("time-text").textContent = `${answer.time.toFixed(1)} of ${answer.duration.toFixed(0)} s`;
+  at("time-text").textContent = at("time").ariaValueText = `${answer.time.toFixed(1)} of ${answer.duration.toFixed(0)} s`;
   for (const [name, slider] of Object.entries(sliders)) {
     const value = answer.values[name];
     if (!chosen.has(name)) at(name).value = slider.place(value);
-    at(`${name}-text`).textContent = slider.text(chosen.has(name) ? Number(chosen.get(name)) : value);
+    at(`${name}-text`).textContent = at(name).ariaValueText = slider.text(chosen.has(name) ? Number(chosen.get(name)) : value);
   }
   at("day-note").textContent = answer.values.light >= 1000 ? "not drawn by day" : "";
-  at("frames").textContent = answer.frames === 1 ? "From this frame alone." : `From the last ${answer.frames} frames.`;
+  const left = answer.calibrating.length ? `, without ${answer.calibrating.join(" and ")} (being calibrated)` : "";
+  at("frames").textContent = (answer.frames === 1 ? "From this frame alone" : `From the last ${answer.frames} frames`) + left + ".";
   at("own-fog").hidden = !chosen.has("visibility");
   const truth = answer.values.visibility;
   const rows = answer.estimates.map(e => row(e.method, e, truth, e.visibility === null ? e.reason : ""));
@@ -126,8 +136,8 @@ for (const id of ["time", "lamps-of-ego", "rear-fog"]) at(id).addEventListener("
 at("own-fog").addEventListener("click", () => { chosen.delete("visibility"); changed(); });
 at("reset").addEventListener("click", () => { chosen.clear(); at("lamps-of-ego").value = ""; at("rear-fog").checked = false; changed(); });
 at("copy").addEventListener("click", async () => {
-  await navigator.clipboard.writeText(at("command").textContent);
-  at("copy").textContent = "Copied"; setTimeout(() => { at("copy").textContent = "Copy the command"; }, 1500);
+  const done = await navigator.clipboard.writeText(at("command").textContent).then(() => "Copied", () => "Not allowed here");
+  at("copy").textContent = done; setTimeout(() => { at("copy").textContent = "Copy the command"; }, 1500);
 });
 function play(on) {
   playing = on;
@@ -137,7 +147,8 @@ function play(on) {
 
 at("play").addEventListener("click", async () => {
   play(!playing);
-  while (playing && Number(at("time").value) < Number(at("time").max)) {
+  const mine = ++plays;
+  while (playing && mine === plays && Number(at("time").value) < Number(at("time").max)) {
     const begun = performance.now();
     await ask(1);
     // As fast as in reality, where the computer is fast enough.
@@ -145,6 +156,8 @@ at("play").addEventListener("click", async () => {
     at("time").value = Number(at("time").value) + passed / 10;
     await new Promise(done => setTimeout(done, Math.max(100 * passed - (performance.now() - begun), 0)));
   }
+  // Another click may have begun to play again meanwhile.
+  if (mine !== plays) return;
   play(false);
   changed();
 });
@@ -154,5 +167,12 @@ for (const visibility of [20, 50, 100, 200, 400, 1000, 4000]) {
   mark.style.left = percent(visibility); at("axis").append(mark);
 }
 at("time").max = 86400;
-at("time").value = Number(location.hash.slice(1)) || 0;
+const begun = new URLSearchParams(location.hash.includes("=") ? location.hash.slice(1) : `time=${location.hash.slice(1)}`);
+at("time").value = Number(begun.get("time")) || 0;
+for (const [name, slider] of Object.entries(sliders)) {
+  const value = Number(begun.get(name) ?? NaN);
+  if (Number.isFinite(value)) { chosen.set(name, String(value)); at(name).value = slider.place(value); }
+}
+at("lamps-of-ego").value = begun.get("lamps") ?? "";
+at("rear-fog").checked = begun.has("rear_fog");
 changed();

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import quote
 
 from fogsim.conditions import Finding, FindingVerdict
 from fogsim.core.files.atomic import write_text
@@ -172,7 +173,7 @@ def _embedded(path: Path | None, media_type: str, folder: Path) -> str:
     if path is None or not path.is_file():
         return ""
     if path.stat().st_size > _LARGEST_EMBEDDED:
-        return os.path.relpath(path, folder)
+        return quote(os.path.relpath(path, folder))
     return data_url(path.read_bytes(), media_type)
 
 

@@ -24,7 +24,7 @@ Values = Mapping[str, str]
 """Names and their values, as text, without those that are drawn for the seed."""
 
 Fails = Callable[[Values], bool | None]
-"""Whether a case fails; None if there is no such case."""
+"""Whether a case fails; None if there is no such case, or its run went wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,8 @@ def shrink(
     first = {name: value_text(variation.varied[name].value(0)) for name in gridded}
     failing = [_values(result, gridded) for result in outcome.results if _fails(result, judgement)]
     start = min(failing, key=lambda values: sum(values[name] != first[name] for name in gridded))
-    known = {case_key(_values(result, gridded)): _fails(result, judgement) for result in outcome.results}
+    completed = [result for result in outcome.results if result.message is None]
+    known = {case_key(_values(result, gridded)): _fails(result, judgement) for result in completed}
     divisible = {name for name in gridded if variation.varied[name].is_divisible}
     return smallest_case(
         start, first, divisible, known, lambda values: _run(path, settings, values, judgement, engine, out)
@@ -117,7 +118,8 @@ def _run(
         (test,) = collect([path], settings, label)
         engine.run(test.runs, out, lambda *_: None)
         result = read_result(out, test.runs[0], [judgement.name])
-        return result is not None and _fails(result, judgement)
+        if result is not None and result.message is None:
+            return _fails(result, judgement)
     return None
 
 

@@ -107,3 +107,14 @@ def test_the_page_has_what_failed_with_plot_and_video(outcomes: list[FileOutcome
     assert "3 passed, " not in text
     assert "1 failed, 1 inconclusive, 1 error; 5 runs of 3 files in 4.0 s" in text
     assert "fogsim test &#39;with, comma/a0.fog.yaml&#39; --case run=1" in text
+
+
+def test_a_large_video_is_linked_whatever_its_folder_is_called(
+    outcomes: list[FileOutcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fogsim.testing.page._LARGEST_EMBEDDED", 3)
+    (folder := tmp_path / "run #1 100%").mkdir()
+    (folder / "video.mp4").write_bytes(b"film")
+    artefacts = {("a1", "e0", "always"): Artefacts(None, folder / "video.mp4")}
+    write_page(tmp_path / "page.html", PageContent(outcomes, artefacts, 4.0))
+    assert 'src="run%20%231%20100%25/video.mp4"' in (tmp_path / "page.html").read_text(encoding="utf-8")

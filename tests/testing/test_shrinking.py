@@ -90,3 +90,20 @@ def test_only_what_did_pass_is_reported_as_passing() -> None:
     for name, value in crossing.passes_at.items():
         moved = {**crossing.values, name: value}
         assert (float(moved["a"]) > 5.0) == (float(moved["b"]) < 5.0)
+
+
+def test_a_run_that_went_wrong_did_not_pass(file: Path, tmp_path: Path) -> None:
+    class Breaking(Pretending):
+        def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+            def watch_broken(run: StudyRun, message: str | None) -> None:
+                if run.levels["light"] == "10000":
+                    write_json(result_file(folder, run), {"status": "failed", "message": "broken", "duration_s": 0.0})
+                watch(run, message)
+
+            super().run(runs, folder, watch_broken)
+
+    engine = Breaking(lambda _, light, __, ___: light > 0.0)
+    (outcome,) = run_tests(collect([file]), tmp_path / "out", engine)
+    found = shrink(outcome, outcome.judgements[0], [], engine, tmp_path / "out" / "results")
+    assert 9000.0 < float(found.values["light"]) < 10000.0
+    assert found.passes_at == {}

@@ -23,6 +23,9 @@ from fogsim.testing.results import CaseResult, completed_result, read_result
 from fogsim.testing.session import begin_session, results_folder
 from fogsim.testing.shrinking import SmallestCase, Values, case_key, smallest_case
 
+_OUTERMOST = 0.001, 0.999
+"""Places on an axis whose values are checked before the first run."""
+
 CampaignWatch = Callable[[int, int], None]
 """Called with the numbers of completed and failed cases."""
 
@@ -109,6 +112,7 @@ def load_campaign(
     space = Space.of(reader.variation.space)
     if not space.axes:
         raise InputError(f"{path}: space has no distribution, only seeds")
+    _check_ends(reader, space)
     earlier = () if against is None else read_earlier(against, space)
     for one in earlier:
         if reader.variation.drawn_case(reader.case, {}, one.seed).seed != one.seed:
@@ -117,6 +121,16 @@ def load_campaign(
     if domain is not None:
         Coverage(domain)  # refuses what does not fit before the first run
     return Campaign(path, reader, seed, len(earlier) or budget, sequencing, earlier, domain)
+
+
+def _check_ends(reader: SpaceReader, space: Space) -> None:
+    """Refuse a parameter whose outermost values do not fit: a campaign would end when it draws one."""
+    for name, axis in space.axes.items():
+        for place in _OUTERMOST:
+            try:
+                reader.load({name: number_with_unit(axis.on_axis(place), axis.unit)}, 0)
+            except InputError as error:
+                raise InputError(f"{error}\nspace.{name} reaches it; bound it with at_least and at_most") from error
 
 
 def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignWatch = lambda _, __: None) -> Findings:

@@ -190,6 +190,9 @@ def test_mistakes(tmp_path: Path) -> None:
         "\\$other stands nowhere": SCENARIO + "  other: {uniform: [1, 2]}\n",
         "choose one with --case": SCENARIO.replace("renderer: none", "renderer: $drawn")
         + "vary: {drawn: [none, cpu]}\n",
+        "speed=-.* km/h(.|\n)*space.speed reaches it; bound it": SCENARIO.replace(
+            "uniform: [50 km/h, 120 km/h]", "normal: [50 km/h, 30 km/h]"
+        ),
         "expect is missing": re.sub("expect: .*", "", SCENARIO),
     }
     for message, text in wrong.items():

@@ -10,7 +10,7 @@ import importlib
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, Concatenate, Literal, ParamSpec, TypeVar
+from typing import Annotated, Any, Concatenate, Literal, ParamSpec, TypeVar, cast
 
 import gymnasium
 import numpy as np
@@ -26,7 +26,8 @@ _TIMEOUT = 600.0
 
 _CLOSE_TIMEOUT = 10.0
 
-_P, _T = ParamSpec("_P"), TypeVar("_T")
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 
 @checked_parameters
@@ -78,7 +79,7 @@ def _reporting(method: Callable[Concatenate["_Workers", _P], _T]) -> Callable[Co
                 self._abandon()
             raise
 
-    return reporting
+    return cast("Callable[Concatenate[_Workers, _P], _T]", reporting)
 
 
 class _Workers(AsyncVectorEnv):
@@ -116,7 +117,7 @@ class _Workers(AsyncVectorEnv):
     @_reporting
     def _check_spaces(self) -> None:
         self._wait_for_all()
-        super()._check_spaces()
+        super()._check_spaces()  # type: ignore[no-untyped-call] # Gymnasium's own
 
     def _wait_for_all(self) -> None:
         """Ask each for something before a request whose answers Gymnasium awaits without a limit."""

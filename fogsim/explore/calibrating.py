@@ -31,7 +31,7 @@ class Calibrator:
 
     def without_waiting(self, method: MethodConfig) -> MethodConfig:
         """A method that has no estimate, for `CALIBRATING`, until its calibration is there."""
-        return _Patient(*(getattr(method, one.name) for one in fields(method)), calibrator=self)
+        return _Patient(**{one.name: getattr(method, one.name) for one in fields(method)}, calibrator=self)
 
     def take(self, make: Callable[..., Any], *arguments: Any) -> Any:
         """A calibration that was made; if it was not, begin it unless another one is being made."""

@@ -235,6 +235,6 @@ def test_options_reach_the_batch_through_stable_baselines() -> None:
     for name, wrong in (("repeat", {"repeat": 0}), ("repeat", {"repeat": 1.5}), ("SameStep", {"mode": "NextStep"})):
         mode = wrong.pop("mode", "SameStep")
         with pytest.raises(InputError, match=name):
-            BatchVecEnv(made(2, autoreset_mode=mode), **wrong)  # type: ignore[arg-type]  # wrong ones
+            BatchVecEnv(made(2, autoreset_mode=mode), **wrong)
     with pytest.raises(InputError, match="FogAdvisoryBatch"):
         BatchVecEnv(gymnasium.make_vec("CartPole-v1", 2))

@@ -220,15 +220,15 @@ def test_the_wrapper_needs_a_reset() -> None:
 
 def test_the_wrapper_takes_what_python_and_numpy_give() -> None:
     plain = gymnasium.make("highway-v0", config={**FEW, "simulation_frequency": np.int64(15)})
-    env = FogCameraWrapper(plain, image_size=(64, 48), overrides=(text for text in [QUICK]))
-    again = gymnasium.make(env.spec)
+    env: Any = FogCameraWrapper(plain, image_size=(64, 48), overrides=(text for text in [QUICK]))
+    again: Any = gymnasium.make(env.spec)
     for one in (env, again):
         assert one.reset(seed=np.int64(3))[1]["truth"]["visibility_m"] == pytest.approx(100.0)
         one.close()
 
 
 def test_the_wrapper_looks_as_often_as_the_environment_acts_after_every_reset() -> None:
-    env = FogCameraWrapper(gymnasium.make("highway-v0", config=FEW), image_size=(64, 48), overrides=[QUICK])
+    env: Any = FogCameraWrapper(gymnasium.make("highway-v0", config=FEW), image_size=(64, 48), overrides=[QUICK])
     for rate in (1, 5):
         env.reset(seed=3, options={"config": {"policy_frequency": rate}})
         env.step(1)

@@ -73,7 +73,7 @@ def test_after_an_error_in_one_environment_all_are_closed() -> None:
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_episodes_follow_one_another_as_gymnasium_defines(mode: AutoresetMode) -> None:
     wrappers = [lambda env: TimeLimit(env, 2)]
-    ours = make_vector(POLE, num_envs=2, wrappers=wrappers, autoreset_mode=mode.value)
+    ours: Any = make_vector(POLE, num_envs=2, wrappers=wrappers, autoreset_mode=mode.value)
     theirs = gymnasium.make_vec(
         POLE, 2, vectorization_mode="sync", wrappers=wrappers, vector_kwargs={"autoreset_mode": mode}
     )

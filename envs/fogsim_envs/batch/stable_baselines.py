@@ -36,7 +36,8 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
         self._earned[:] = self._cost[:] = 0.0
         self._reset_seeds()
         self._reset_options()
-        return self.envs.reset(seed=first, options=options)[0]
+        observations: NDArray[np.float32] = self.envs.reset(seed=first, options=options)[0]
+        return observations
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for `step_wait`."""

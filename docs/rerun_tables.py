@@ -86,23 +86,27 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
             stamps.write(one, stamps.checkout().files(one.rests_on), None)
         stamps.write_pages()
     else:
-        return rerun(Round(stamps, Console(stderr=True)), chosen)
+        return rerun(stamps, chosen)
     return 0
 
 
-def rerun(work: Round, chosen: list[Measurement]) -> int:
+def rerun(stamps: Stamps, chosen: list[Measurement]) -> int:
     """Measure, and print what moved; the exit code."""
+    failed = []
     if not chosen:
         say("no table's code has changed since it was measured; --all measures them all the same")
-        return 0
-    for signum in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(signum, interrupted)
-    try:
-        failed = work.run(chosen)
-    except KeyboardInterrupt:
-        say("interrupted: run the same command again to resume")
-        return 130
-    say(work.report())
+    else:
+        work = Round(stamps, Console(stderr=True))
+        for signum in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(signum, interrupted)
+        try:
+            failed = work.run(chosen)
+        except KeyboardInterrupt:
+            say("interrupted: run the same command again to resume")
+            return 130
+        say(work.report())
+    stamps.carry_forward()
+    stamps.write_pages()
     if failed:
         say(f"failed: {', '.join(failed)}; the same command tries these again")
     return int(bool(failed))

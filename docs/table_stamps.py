@@ -25,8 +25,8 @@ MEASURED, BY_HAND = "measured tables", "tables by hand"
 class Stamp:
     """When tables were measured, and with which code."""
 
-    version: str  # of FogSim; the commit ends in " with changes" if files differed from it
-    commit: str
+    version: str  # of FogSim
+    commit: str  # the latest known to have that code; ends in " with changes" if files differed from it
     date: str
     machine: str  # its processor, if known
     minutes: float | None  # how long it took [min], if known
@@ -61,7 +61,7 @@ class Stamps:
 
     def write(self, one: Measurement, files: dict[str, str], minutes: float | None) -> None:
         """Stamp tables as measured now, with the code as it is in the checkout."""
-        commit = self._git("rev-parse", "--short=7", "HEAD").decode().strip()
+        commit = self._commit()
         if self._git("status", "--porcelain", "--", *files):
             commit += " with changes"
         now = datetime.now(UTC).strftime("%Y-%m-%d")
@@ -75,6 +75,23 @@ class Stamps:
         kept["files"] = {folder: " ".join(found) for folder, found in by_folder.items()}
         self._file(one).parent.mkdir(parents=True, exist_ok=True)
         self._file(one).write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    def carry_forward(self) -> None:
+        """Stamp tables that nothing would change with this commit: measured again, they would be the same."""
+        for one in self.measurements:
+            stamp = self.read(one)
+            if (
+                stamp
+                and self.checkout().changed(stamp.files) == []
+                and not self._git("status", "-s", "--", *stamp.files)
+            ):
+                text = self._file(one).read_text(encoding="utf-8")
+                self._file(one).write_text(
+                    text.replace(f'"{stamp.commit}"', f'"{self._commit()}"', 1), encoding="utf-8"
+                )
+
+    def _commit(self) -> str:
+        return self._git("rev-parse", "--short=7", "HEAD").decode().strip()
 
     def minutes(self, one: Measurement) -> float:
         """How long a measurement took last time, or about how long it takes [min]."""

@@ -208,6 +208,20 @@ def test_changed_code_is_listed_and_changed_prose_is_not(root: Path, rerun: Run)
     assert "    fogsim/road.py" in rerun("--list", "width").stdout
 
 
+def test_tables_that_a_commit_leaves_as_they_were_carry_it(root: Path, rerun: Run) -> None:
+    rerun("width", "twice")
+    stamps = [root / "docs" / "measured_at" / f"{name}.json" for name in ("width", "twice")]
+    before = [json.loads(stamp.read_text()) for stamp in stamps]
+    (root / "fogsim" / "idle.py").write_text("A = 2\n")
+    who = ("-c", "user.name=a", "-c", "user.email=a@example.com")
+    subprocess.run(["git", *who, "commit", "-qam", "idle"], cwd=root, check=True)  # noqa: S607 - whichever git there is
+    rerun("twice")
+    width, twice = (json.loads(stamp.read_text()) for stamp in stamps)
+    assert width == {**before[0], "commit": twice["commit"]}
+    assert twice["commit"] != before[0]["commit"]
+    assert rerun("--check").returncode == 0
+
+
 def test_tables_that_were_edited_are_found(root: Path, rerun: Run) -> None:
     rerun()
     change(root / "docs" / "page.md", "| any | 7.0 |", "| any | 7.2 |")

@@ -3,7 +3,7 @@
 import contextlib
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -16,6 +16,7 @@ from fogsim.core.files.readers import read_json
 from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock
 from fogsim.errors import InputError
 from fogsim.recorders.manifest import versions
+from fogsim.scenario.variation import NONE_FAILS
 from fogsim.study.execution import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
@@ -221,6 +222,9 @@ def _read_session(out: Path) -> _Session:
 
 def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutcome:
     results = tuple(one for run in test.runs if (one := found[run.key]) is not None)
+    if len(results) < len(test.runs):
+        # The first cases show no rate.
+        test = replace(test, verdict=NONE_FAILS)
     return FileOutcome(test, results, tuple(judge(test, [one for one in results if one.message is None])))
 
 

@@ -10,6 +10,7 @@ from made_up_cases import BROKEN, MadeUpEngine, complete, made_up_test
 
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
+from fogsim.scenario.variation import Verdict
 from fogsim.testing import last_failed, only_cases, run_tests
 from fogsim.testing.session import begin_session
 
@@ -134,8 +135,10 @@ def test_results_of_a_campaign_are_kept(tmp_path: Path) -> None:
 
 
 def test_the_first_failure_ends_it_if_asked(tmp_path: Path) -> None:
+    """Also where the cases that were run would show the required rate."""
     engine = MadeUpEngine({"a": complete("passed"), "b": complete("failed"), "c": complete("passed")})
-    (outcome,) = run_tests([made_up_test(["a", "b", "c"])], tmp_path, engine, first_failure_ends=True)
+    test = made_up_test(["a", "b", "c"], verdict=Verdict(pass_rate=0.01))
+    (outcome,) = run_tests([test], tmp_path, engine, first_failure_ends=True)
     assert engine.ran == ["a", "b"]
     assert len(outcome.results) == 2
     assert not outcome.is_passed

@@ -18,6 +18,7 @@ from fogsim.offline.input_paths import find_source
 from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
+from fogsim.values.result_checks import checked_estimate
 
 _ALL = "all"
 """Represents every method of the registry."""
@@ -158,7 +159,7 @@ def estimates_of(
             bench.reset()
         try:
             sightings = None if watch is None else watch.sightings(picture.time)
-            estimates = bench.estimates(picture.image, picture.time, sightings or ())
+            results = bench.results(picture.image, picture.time, sightings or ())
         except InputError as error:
             message = f"{place_of(source, picture)}: {error}"
             if not fitted:
@@ -167,7 +168,7 @@ def estimates_of(
             continue
         fitted = True
         looks = () if watch is None or sightings is None else watch.look(picture.image, picture.time, sightings)
-        yield FrameEstimates(picture, estimates, looks)
+        yield FrameEstimates(picture, bench.estimates(results), looks)
     if not fitted:
         raise InputError(f"none of the {count} images can be read" if count > 1 else "the only image cannot be read")
 
@@ -204,8 +205,8 @@ class _Bench:
     def _all(self) -> Iterable[Estimator]:
         return (one for estimators in self._estimators.values() for one in estimators)
 
-    def estimates(self, image: Pixels, time: float, signs: tuple[SignSighting, ...]) -> tuple[Estimate, ...]:
-        """Estimates of all methods from an image and the signs ahead; InputError if it is not of the camera."""
+    def results(self, image: Pixels, time: float, signs: tuple[SignSighting, ...]) -> tuple[object, ...]:
+        """What all methods return for an image and the signs ahead; InputError if it is not of the camera."""
         pixels, camera = _in_bits(image, self._camera)
         if pixels.shape[:2] != (camera.height, camera.width):
             rows, cols = pixels.shape[:2]
@@ -218,8 +219,12 @@ class _Bench:
         observation = Observation(Frame(time, pixels, camera), signs=signs)
         if self._night is not None:
             observation = replace(observation, lamps=self._night.lamps, camera_setback=self._night.setback)
-        found = (estimator.update(observation) for estimator in self._estimators[camera])
-        return tuple(self._deviations.widened(one) for one in found)
+        return tuple(estimator.update(observation) for estimator in self._estimators[camera])
+
+    def estimates(self, results: tuple[object, ...]) -> tuple[Estimate, ...]:
+        """Estimates of all methods; InputError if a user's method returned none."""
+        checked = (checked_estimate(name, one) for name, one in zip(self._methods, results, strict=True))
+        return tuple(self._deviations.widened(one) for one in checked)
 
 
 def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:

@@ -45,7 +45,7 @@ def fog_video(
     with VideoWriter(out) as writer:
         for picture in video.pictures():
             if picture.image is None:
-                damage = picture.error
+                damage = damage or picture.error
                 continue
             if air is None:
                 air = _airlight(picture.image, distance, camera, airlight, layer)

@@ -1,12 +1,13 @@
 """Images and depth maps on disk."""
 
+import contextlib
 import io
 import math
 import struct
 import tokenize
 import warnings
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +24,18 @@ from fogsim.values import Camera
 
 _DEPTH_KINDS = ("planar", "range")
 """Types of a depth map: distance along the optical axis, or along the viewing ray."""
+
+IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
+"""Suffixes of images in a folder, and of those that can be written."""
+
+_DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm")
+_COLOURED = tuple(ending for ending in IMAGE_ENDINGS if ending != ".pgm")
+_TRANSPARENT = (".png", ".tif", ".tiff", ".bmp", ".webp")
+"""Suffixes of formats that can hold 16 bits, colours and transparency."""
+
+_EXACT = ("IMWRITE_WEBP_LOSSLESS_MODE", "IMWRITE_WEBP_LOSSLESS_PRESERVE_COLOR")
+_OPTIONS: dict[str, list[int]] = {".webp": [getattr(cv2, name) for name in _EXACT if hasattr(cv2, name)]}
+"""OpenCV's options by suffix. Its WebP is lossless; older versions lack an option to keep colours that do not show."""
 
 _CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
 """Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
@@ -61,17 +74,22 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     if not data:
         raise InputError(f"{path}: the file is empty")
     orientation = _checked(path, data)
-    # OpenCV would also print its own messages about errors that are reported below.
-    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
+    image = None
+    with _quiet_opencv(), contextlib.suppress(cv2.error, MemoryError):
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (cv2.error, MemoryError):
-        image = None
-    finally:
-        cv2.utils.logging.setLogLevel(level)
     if image is None:
         raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
     return _upright(np.asarray(image), orientation)
+
+
+@contextlib.contextmanager
+def _quiet_opencv() -> Iterator[None]:
+    """Keep OpenCV from printing its own messages about errors that FogSim reports."""
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
 
 
 def _upright(image: NDArray[np.generic], orientation: int) -> NDArray[np.generic]:
@@ -170,24 +188,40 @@ def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
 def refuse_unwritable_image(
     path: Path, option: str = "", *, overwrite: bool = True, read: Iterable[Path] = (), makes_folder: bool = False
 ) -> None:
-    """Refuse a file as `refuse_unwritable` does, and one without the suffix of an image."""
+    """Refuse a file as `refuse_unwritable` does, and one whose suffix is not in `IMAGE_ENDINGS`."""
     ending = path.suffix.lower()
-    if not ending or not cv2.haveImageWriter(f"image{ending}"):
-        named = f"{option} {path}".lstrip()
-        raise InputError(f"{named}: no image can be written with the ending {ending!r}; allowed: .png, .tif, .jpg, …")
+    if ending not in IMAGE_ENDINGS:
+        named, allowed = f"{option} {path}".lstrip(), ", ".join(IMAGE_ENDINGS)
+        raise InputError(f"{named}: no image can be written with the ending {ending!r}; allowed: {allowed}")
     refuse_unwritable(path, option, overwrite=overwrite, read=read, makes_folder=makes_folder)
 
 
 def write_image(path: Path, image: Pixels) -> None:
-    """Write an image in the format of its suffix, whole or not at all; colours are in OpenCV's order."""
+    """Write an image in the format of its suffix, whole or not at all; colours are in OpenCV's order.
+
+    InputError if the format cannot hold its 16 bits, colours or transparency.
+    """
     refuse_unwritable_image(path)
-    ending = path.suffix.lower()
-    if image.dtype == np.uint16 and ending not in {".png", ".tif", ".tiff"}:
-        raise InputError(f"{path}: an image of 16 bits is written as .png or .tif, not {ending}")
-    written, data = cv2.imencode(ending, image)
-    if not written:
-        raise InputError(f"{path}: this image cannot be written as {ending}")
-    write_bytes(path, data.tobytes())
+    ending, channels = path.suffix.lower(), 1 if image.ndim == 2 else image.shape[2]
+    if channels == 4 and ending not in _TRANSPARENT and np.all(image[..., 3] == np.iinfo(image.dtype).max):
+        image, channels = image[..., :3].copy(), 3
+    for kind, applies, endings in (
+        ("of 16 bits", image.dtype == np.uint16, _DEEP),
+        ("with colours", channels > 1, _COLOURED),
+        ("with transparency", channels == 4, _TRANSPARENT),
+    ):
+        if applies and ending not in endings:
+            raise InputError(f"{path}: an image {kind} can be written as {', '.join(endings)}, not as {ending}")
+    if ending == ".ppm" and channels == 1:  # which has colours only
+        image = image.reshape(*image.shape[:2], 1).repeat(3, axis=2)
+    data = None
+    with _quiet_opencv(), contextlib.suppress(cv2.error):
+        written, encoded = cv2.imencode(ending, image, _OPTIONS.get(ending, []))
+        data = encoded.tobytes() if written else None
+    if data is None:
+        rows, cols = image.shape[:2]
+        raise InputError(f"{path}: an image of {cols} × {rows} pixels cannot be written as {ending}")
+    write_bytes(path, data)
 
 
 def range_from_planar(depth: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:

@@ -9,11 +9,9 @@ from pathlib import Path
 
 from fogsim.core.files.readers import nearest_file
 from fogsim.errors import InputError
+from fogsim.offline.image_files import IMAGE_ENDINGS
 from fogsim.offline.source import Animation, ImageFiles, Source
 from fogsim.offline.video_source import VideoFile
-
-_IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
-"""Suffixes of the images that are taken from a folder."""
 
 _VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
 """Suffixes of videos."""
@@ -75,11 +73,9 @@ def is_video(path: Path) -> bool:
 def _paths(given: str) -> list[Path]:
     path = Path(given)
     if path.is_dir():
-        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in _IMAGE_ENDINGS and one.is_file())
+        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
         if not found:
-            raise InputError(
-                f"{path}: the folder contains no image with one of the endings {', '.join(_IMAGE_ENDINGS)}"
-            )
+            raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
         return found
     if path.exists():
         return [path]

@@ -177,9 +177,8 @@ class OverlayFile:
         self._video = VideoWriter(path, _LOOKED_AT)
         self._format = _PICTURE_FORMATS.get(path.suffix.lower())
         self._picture = b""
-        # Stills all have the time 0, and a video can repeat one.
-        self._step = 1e-3 if source.temporal else source.period
-        self._time = -1.0
+        # Stills all have the time 0.
+        self._spacing, self._drawn = 0.0 if source.temporal else source.period, 0
 
     def add(self, result: FrameEstimates) -> None:
         """Add an image with its estimates.
@@ -193,9 +192,8 @@ class OverlayFile:
             return
         drawn = self._overlay.draw(result)
         if self._format is None:
-            time = result.picture.time
-            self._time = time if time > self._time else self._time + self._step
-            self._video.write(np.asarray(drawn), self._time)
+            self._video.write(np.asarray(drawn), result.picture.time + self._drawn * self._spacing)
+            self._drawn += 1
             return
         content = io.BytesIO()
         drawn.save(content, self._format)

@@ -210,7 +210,7 @@ def restore_video(
         for one in _restored_images(source, camera, wish):
             seen = one.picture.image
             if seen is None:
-                damage = one.picture.error
+                damage = damage or one.picture.error
                 continue
             as_it_was = np.concatenate([seen, seen], axis=1) if wish.beside else seen
             writer.write(as_it_was if one.image is None else one.image, one.picture.time)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.atomic import opened_alone, partial_path, publish
 from fogsim.core.files.output_targets import refuse_unwritable
-from fogsim.errors import InputError
+from fogsim.errors import FogSimError, InputError
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture
 from fogsim.recorders.video import Encoder, encoding_command, ffmpeg_program
@@ -40,9 +40,10 @@ class VideoWriter:
         self._encoder: Encoder | None = None
         self._lock = contextlib.ExitStack()
         self._leftovers: tuple[Path, ...] = ()
+        self._last = -1  # tick of the last frame
 
     def write(self, frame: Pixels, time: float) -> None:
-        """Add a frame (rows, cols, 3), red first, of the first frame's size, from a time on [s] later than the last."""
+        """Add a frame (rows, cols, 3), red first, of the first frame's size, from a time on [s], or after the last."""
         rows, cols = frame.shape[:2]
         if self._encoder is None:
             part = partial_path(self._out)
@@ -52,11 +53,14 @@ class VideoWriter:
             self._leftovers = part, lock
             # The encoder could not replace what is write-protected, and would follow a link.
             part.unlink(missing_ok=True)
-            self._encoder = Encoder(encoding_command(part, ["-f", "ivf"], self._rate_factor))
+            *options, sink = encoding_command(part, ["-f", "ivf"], self._rate_factor)
+            # By default, times are rounded to a guessed rate.
+            self._encoder = Encoder([*options, "-enc_time_base", f"1:{_TICKS}", sink])
             self._encoder.write(struct.pack("<4sHH4sHHIIQ", b"DKIF", 0, 32, b"RGBA", cols, rows, _TICKS, 1, 0))
         pixels = np.full((rows, cols, 4), 255, np.uint8)
         pixels[..., :3] = frame
-        self._encoder.write(struct.pack("<IQ", pixels.nbytes, round(time * _TICKS)) + pixels.tobytes())
+        self._last = max(round(time * _TICKS), self._last + 1)
+        self._encoder.write(struct.pack("<IQ", pixels.nbytes, self._last) + pixels.tobytes())
 
     def __enter__(self) -> Self:
         """Begin; the file is created with the first frame."""
@@ -65,16 +69,30 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the video its name, or remove it."""
+        """Give the video its name; after an error, end its encoder at once and remove it."""
         with self._lock:
             try:
-                if self._encoder is not None:
-                    self._encoder.finish()
-                    if kind is None:
-                        publish(self._out)
+                if self._encoder is not None and kind is None:
+                    _finish(self._encoder)
+                    publish(self._out)
+                elif self._encoder is not None:
+                    _kill(self._encoder)
             finally:
                 for leftover in self._leftovers:
                     leftover.unlink(missing_ok=True)
+
+
+def _finish(encoder: Encoder) -> None:
+    try:
+        encoder.finish()
+    except KeyboardInterrupt:
+        _kill(encoder)
+        raise
+
+
+def _kill(encoder: Encoder) -> None:
+    with contextlib.suppress(FogSimError):
+        encoder.finish(0.0)
 
 
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:
@@ -97,7 +115,7 @@ _STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.
 
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
-_FRAME_TIME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+)")
+_FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
 _PACKET_SIZES = (188, 192, 204)  # of MPEG transport streams: ISO/IEC 13818-1, with a time code, with error correction
 _MOST_MISSING = 0.5
@@ -196,8 +214,9 @@ class VideoFile:
     def pictures(self) -> Iterator[Picture]:
         """Read the frames with their times; where the file is damaged, ffmpeg conceals or skips what it cannot decode.
 
-        After the frames of a damaged video, or of one that ends early, a picture without image follows, whose
-        ``error`` has the number of frames that were read and ffmpeg's first message.
+        A frame of another size than the first is a picture without image. After the frames of a damaged video, or of
+        one that ends early, another follows, whose ``error`` has the number of frames that were read and ffmpeg's
+        first message.
         """
         read, end = 0, 0.0
         # A file, not a pipe, which could fill up while frames are read.
@@ -211,8 +230,8 @@ class VideoFile:
             log = _Log(messages.fileno(), self.period)
             try:
                 for image in _frames(process.stdout):
-                    time = log.time_of(read)
-                    yield Picture(read, time, image)
+                    time, size = log.frame(read)
+                    yield self._picture(read, time, image, size)
                     read, end = read + 1, time + self.period
                 failed = process.wait() != 0
             finally:
@@ -229,26 +248,34 @@ class VideoFile:
             message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
             yield Picture(read, end, None, message)
 
+    def _picture(self, index: int, time: float, image: NDArray[np.uint8], size: tuple[int, int]) -> Picture:
+        # ffmpeg scales all frames to the first's size.
+        if size == self.size:
+            return Picture(index, time, image)
+        found, first = (f"{cols} × {rows}" for cols, rows in (size, self.size))
+        return Picture(index, time, None, f"{self.path}, frame {index}: it has {found} pixels, the first frame {first}")
+
     def _ends_in_a_packet(self) -> bool:
         size = self.path.stat().st_size
         return all(size % packet for packet in _PACKET_SIZES)
 
 
 class _Log:
-    """ffmpeg's messages in a file that it writes while it decodes: times of frames, and errors."""
+    """ffmpeg's messages in a file that it writes while it decodes: times and sizes of frames, and errors."""
 
     def __init__(self, file: int, period: float) -> None:
         self._file, self._period = file, period
         self._at, self._rest = 0, b""
         self._times: list[float] = []
+        self._sizes: list[tuple[int, int]] = []
         self.errors: list[str] = []
         self.is_stream = False
 
-    def time_of(self, frame: int) -> float:
-        """Time of a frame that was written, from the first [s]; by the rate if the file has none."""
-        if len(self._times) <= frame:
+    def frame(self, index: int) -> tuple[float, tuple[int, int]]:
+        """Time of a frame that was written, from the first [s], by the rate if the file has none; columns and rows."""
+        if len(self._times) <= index:
             self.read()
-        return self._times[frame] - self._times[0]
+        return self._times[index] - self._times[0], self._sizes[index]
 
     def read(self) -> None:
         """Read what has been written since."""
@@ -259,9 +286,10 @@ class _Log:
                 self._take(line.decode(errors="replace"))
 
     def _take(self, line: str) -> None:
-        if time := _FRAME_TIME.search(line):
+        if frame := _FRAME.search(line):
             after = self._times[-1] + self._period if self._times else 0.0
-            self._times.append(after if time[1] == "NOPTS" else float(time[1]))
+            self._times.append(after if frame[1] == "NOPTS" else float(frame[1]))
+            self._sizes.append((int(frame[2]), int(frame[3])))
         elif _ERROR in line and len(self.errors) < _MOST_ERRORS:
             self.errors.append(_ADDRESS.sub("", line).replace(_ERROR, "").strip())
         elif _TRANSPORT_STREAM in line:
@@ -277,8 +305,9 @@ def _command(path: Path, *limits: str) -> list[str]:
     """Command line of a decoder that writes each frame as a PPM image, and its time among its messages."""
     allowed = ["-protocol_whitelist", "file", "-format_whitelist", _CONTAINERS, "-max_pixels", str(_MOST_PIXELS)]
     source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", "showinfo=checksum=0", *limits]
-    # Neither repeated nor dropped for a constant rate.
-    sink = ["-fps_mode", "passthrough", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
+    # Neither repeated nor dropped for a constant rate; numbered, since ffmpeg complains of times that do not increase.
+    timing = ["-fps_mode", "passthrough", "-bsf:v", "setts=ts=N"]
+    sink = [*timing, "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
     return [ffmpeg_program(), "-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info", *source, *sink]
 
 

@@ -126,14 +126,16 @@ def test_targets_are_not_compared_with_every_source(folder: Path, monkeypatch: p
 
 
 def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, command: Command) -> None:
-    cv2.imwrite(str(folder / "deep.pgm"), np.full((240, 320), 40_000, np.uint16))
+    cv2.imwrite(str(folder / "deep.png"), np.full((240, 320), 40_000, np.uint16))
+    (folder / "deep.png").rename(folder / "deep.bmp")
     line = (*WITH_CAMERA, "--method", "tarel2009", "--out")
-    done = command("restore", "deep.pgm", "fog.png", *line, "clear", cwd=folder)
+    done = command("restore", "deep.bmp", "fog.png", *line, "clear", cwd=folder)
     assert done.returncode == 2
-    assert "  deep.pgm: clear/deep.pgm: an image of 16 bits is written as .png or .tif" in done.stderr
+    allowed = "can be written as .png, .tif, .tiff, .pgm, .ppm, not as .bmp"
+    assert f"  deep.bmp: clear/deep.bmp: an image of 16 bits {allowed}\n" in done.stderr
     assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
-    done = command("restore", "deep.pgm", *line, "deep2.pgm", cwd=folder)
-    assert done.stderr == "error: deep2.pgm: an image of 16 bits is written as .png or .tif, not .pgm\n"
+    done = command("restore", "deep.bmp", *line, "deep2.bmp", cwd=folder)
+    assert done.stderr == f"error: deep2.bmp: an image of 16 bits {allowed}\n"
 
 
 def put_video(path: Path, frames: list[np.ndarray]) -> None:

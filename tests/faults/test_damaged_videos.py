@@ -79,6 +79,27 @@ def test_what_was_read_of_a_damaged_video_is_written(command: Command, videos: P
     assert not written[-1].error
 
 
+def test_frames_of_another_size_are_listed_and_left_out(command: Command, videos: Path, tmp_path: Path) -> None:
+    """A stream that was joined from two."""
+    sizes = tmp_path / "sizes.ts"
+    for size in ("80x60", "64x48"):
+        source = ["-f", "lavfi", "-i", f"testsrc=size={size}:rate=10:duration=0.5", "-c:v", "libx264", "-bf", "0"]
+        made = [ffmpeg_program(), "-loglevel", "error", *source, "-f", "mpegts", "-"]
+        with sizes.open("ab") as file:
+            file.write(subprocess.run(made, check=True, stdout=subprocess.PIPE).stdout)
+    line = (str(sizes), "--camera", str(videos / "camera.yaml"))
+    code, out, err = command("estimate", *line, "--method", "negru2013", "--json", cwd=tmp_path)
+    records = [json.loads(line) for line in out.splitlines()]
+    assert code == 2
+    assert ["error" in record for record in records] == [False] * 5 + [True] * 5
+    told = "sizes.ts, frame 5: it has 64 × 48 pixels, the first frame 80 × 60"
+    assert told in err
+    code, _, err = command("fog", *line, "--road-plane", "--visibility", "60", "--out", "out.mp4", cwd=tmp_path)
+    assert code == 2
+    assert f"{told}; out.mp4 has what could be read" in err
+    assert len(list(find_source(tmp_path / "out.mp4").pictures())) == 5
+
+
 @pytest.mark.parametrize("name", ["playlist.mp4", "concat.mp4", "sdp.mp4", "empty.mp4"])
 def test_a_file_that_names_others_or_addresses_is_no_video(
     videos: Path, monkeypatch: pytest.MonkeyPatch, name: str

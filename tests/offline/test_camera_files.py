@@ -1,6 +1,11 @@
 """Files as cameras and phones write them: stored turned, at uneven times, animated, cut off."""
 
+import os
+import signal
 import subprocess
+import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -59,13 +64,66 @@ def test_pages_are_refused(tmp_path: Path) -> None:
 def test_frames_of_a_video_keep_their_times(tmp_path: Path) -> None:
     path = tmp_path / "uneven.mp4"
     with VideoWriter(path) as writer:
-        for index, time in enumerate(TIMES):
-            writer.write(frame(index), time)
+        for index, at in enumerate(TIMES):
+            writer.write(frame(index), at)
     pictures = list(find_source(path).pictures())
     assert [one.time for one in pictures] == pytest.approx(TIMES, abs=1e-3)
     assert [round(float(one.image.mean()) / 40) for one in pictures] == [
         round(float(frame(index).mean()) / 40) for index in range(len(TIMES))
     ]
+
+
+def test_frames_that_follow_one_another_closely_are_no_damage(tmp_path: Path) -> None:
+    path, times = tmp_path / "close.mp4", (0.0, 0.1, 0.2, 0.201, 0.202, 0.3, 0.4)
+    with VideoWriter(path) as writer:
+        for index, at in enumerate(times):
+            writer.write(frame(index), at)
+    pictures = list(find_source(path).pictures())
+    assert [one.error for one in pictures] == [""] * len(times)
+    assert [one.time for one in pictures] == pytest.approx(times, abs=1e-4)
+
+
+def test_frames_at_one_time_are_read_and_written(tmp_path: Path) -> None:
+    path, copy = tmp_path / "equal.mkv", tmp_path / "copy.mp4"
+    source = ["-f", "lavfi", "-i", "testsrc=size=80x60:rate=10:duration=1", "-c:v", "mjpeg"]
+    repeated = "setts=ts='if(eq(N,3),PREV_OUTPTS,if(eq(N,6),PREV_OUTPTS-50,PTS))'"
+    subprocess.run([ffmpeg_program(), "-loglevel", "error", *source, "-bsf:v", repeated, str(path)], check=False)
+    pictures = list(find_source(path).pictures())
+    times = [one.time for one in pictures]
+    assert (len(times), times[2]) == (10, times[3])
+    with VideoWriter(copy) as writer:
+        for one in pictures:
+            assert one.image is not None, one.error
+            writer.write(one.image, one.time)
+    copied = list(find_source(copy).pictures())
+    assert [one.error for one in copied] == [""] * 10
+    assert np.all(np.diff([one.time for one in copied]) > 0.0)
+
+
+SLOW_ENCODER = "import os, pathlib, sys, time; pathlib.Path('pid').write_text(f'{os.getpid()} '); time.sleep(60)"
+
+
+@pytest.mark.timeout(30)
+@pytest.mark.parametrize("is_complete", [False, True])
+def test_an_encoder_ends_at_once_with_an_interrupted_video(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_complete: bool
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command = [sys.executable, "-c", SLOW_ENCODER]
+    monkeypatch.setattr("fogsim.offline.video_source.encoding_command", lambda part, *_: [*command, str(part)])
+    main = threading.main_thread().ident
+    assert main is not None
+    with pytest.raises(KeyboardInterrupt), VideoWriter(tmp_path / "out.mp4") as writer:  # noqa: PT012 - within or at the end
+        writer.write(frame(0), 0.0)
+        while not (text := Path("pid").read_text() if Path("pid").exists() else "").endswith(" "):
+            time.sleep(0.01)
+        if is_complete:
+            threading.Timer(0.5, signal.pthread_kill, (main, signal.SIGINT)).start()
+        else:
+            raise KeyboardInterrupt
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(text), 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["pid"]
 
 
 @pytest.mark.parametrize("ending", [".mkv", ".ts", ".mp4"])

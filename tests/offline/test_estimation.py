@@ -1,5 +1,6 @@
 """What the methods say about images and videos that were written to disk and read back."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from PIL import Image
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.offline import chosen_methods, estimate_images
-from fogsim.values import Frame, Observation
+from fogsim.values import Camera, Estimate, Frame, Observation
 
 
 def visibilities(results) -> list[float]:
@@ -134,8 +135,6 @@ class Remembering:
         self.times = []
 
     def update(self, observation):
-        from fogsim.values import Estimate
-
         self.times.append(observation.time)
         return Estimate(self.method, 0.01 * len(self.times), 0.001, diagnostics={"times": tuple(self.times)})
 
@@ -149,3 +148,22 @@ def test_only_sequences_have_a_memory(drive, monkeypatch, sequence, seen) -> Non
     assert len(times) == seen
     if sequence is not False:
         assert times == pytest.approx((0.0, 0.1, 0.2))
+
+
+FINE = Estimate(Remembering.method, 0.05, 0.01)
+
+
+@pytest.mark.parametrize("wrong", [None, 0.05, Estimate("another", 0.05, 0.01), replace(FINE, extinction=math.nan)])
+@pytest.mark.parametrize("fine", [0, 1])
+def test_a_method_that_returns_no_estimate_of_its_own_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: object, fine: int
+) -> None:
+    monkeypatch.setitem(ESTIMATORS._entries, Remembering.method, Remembering)
+    returned = iter([*[FINE] * fine, wrong])
+    monkeypatch.setattr(Remembering, "update", lambda *_: next(returned))
+    for number in range(fine + 1):
+        Image.new("RGB", (16, 12)).save(tmp_path / f"{number}.png")
+    results = estimate_images(tmp_path, Camera(16, 12, 14.0, (7.5, 5.5), 1.3), Remembering.method)
+    assert len([next(results) for _ in range(fine)]) == fine
+    with pytest.raises(InputError, match=r"^estimator 'remembering': update\(\)"):
+        next(results)

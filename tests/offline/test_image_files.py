@@ -1,0 +1,92 @@
+"""Image files of each format: what is written is read again unchanged, or refused."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.offline.image_files import IMAGE_ENDINGS, Pixels, read_image, refuse_unwritable_image, write_image
+
+ROWS, COLS = 24, 40
+LOSS = 12  # of JPEG
+LEVELS = np.linspace(0, 255, ROWS * COLS).reshape(ROWS, COLS)
+GREY = LEVELS.astype(np.uint8)
+COLOURED = np.stack([GREY, GREY // 2, 255 - GREY], axis=2)
+TRANSPARENT = np.dstack([COLOURED, GREY.T.reshape(ROWS, COLS)])
+KINDS: dict[str, Pixels] = {
+    "grey": GREY,
+    "coloured": COLOURED,
+    "transparent": TRANSPARENT,
+    **{
+        f"deep {name}": image.astype(np.uint16) * 257 - image
+        for name, image in (("grey", GREY), ("coloured", COLOURED))
+    },
+    "deep transparent": TRANSPARENT.astype(np.uint16) * 256,
+}
+DEEP = {name for name in KINDS if name.startswith("deep")}
+CLEAR = {"transparent", "deep transparent"}
+REFUSED: dict[str, set[str]] = {
+    ".png": set(),
+    ".tif": set(),
+    ".tiff": set(),
+    ".jpg": DEEP | CLEAR,
+    ".jpeg": DEEP | CLEAR,
+    ".bmp": DEEP,
+    ".webp": DEEP,
+    ".pgm": {"coloured", "deep coloured", *CLEAR},
+    ".ppm": CLEAR,
+}
+
+
+@pytest.mark.parametrize("ending", IMAGE_ENDINGS)
+def test_an_image_is_written_unchanged_or_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], ending: str
+) -> None:
+    loss = LOSS if ending in {".jpg", ".jpeg"} else 0
+    for name, image in KINDS.items():
+        path = tmp_path / f"{name}{ending}"
+        if name in REFUSED[ending]:
+            with pytest.raises(
+                InputError, match=rf"an image (of|with) .* can be written as .*\.png.*, not as {ending}"
+            ):
+                write_image(path, image)
+            assert not path.exists()
+            continue
+        write_image(path, image)
+        found = read_image(path)
+        assert found.dtype == image.dtype
+        # Some formats have colours only.
+        same = found[..., 0] if image.ndim < found.ndim else found
+        assert np.abs(same.astype(int) - image).max() <= loss, name
+    assert capfd.readouterr().err == ""
+
+
+def test_transparency_that_shows_nothing_is_left_out(tmp_path: Path) -> None:
+    for ending in (".jpg", ".ppm"):
+        write_image(tmp_path / f"opaque{ending}", np.dstack([COLOURED, np.full_like(GREY, 255)]))
+        assert np.abs(read_image(tmp_path / f"opaque{ending}").astype(int) - COLOURED).max() <= LOSS
+
+
+def test_an_image_that_is_too_wide_for_its_format_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InputError, match=r"an image of 17000 × 1 pixels cannot be written as \.webp"):
+        write_image(tmp_path / "wide.webp", np.zeros((1, 17_000), np.uint8))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("ending", [".pbm", ".pnm", ".ras", ".sr", ".gif", ".hdr", ".pfm", ".pic", ".jp2", ".avif", ""])
+def test_formats_that_change_pixels_are_not_written(tmp_path: Path, ending: str) -> None:
+    with pytest.raises(InputError, match=r"no image can be written with the ending .*; allowed: \.png, .*, \.ppm$"):
+        refuse_unwritable_image(tmp_path / f"image{ending}", "--out")
+
+
+def test_they_are_read(tmp_path: Path) -> None:
+    for ending in (".pnm", ".ras", ".sr"):
+        cv2.imwrite(str(tmp_path / f"image{ending}"), COLOURED)
+        assert np.array_equal(read_image(tmp_path / f"image{ending}"), COLOURED)
+    bits = np.where(GREY > 100, 255, 0).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "image.pbm"), bits)
+    assert np.array_equal(read_image(tmp_path / "image.pbm"), bits)
+    cv2.imwrite(str(tmp_path / "image.gif"), COLOURED)
+    assert read_image(tmp_path / "image.gif").shape[:2] == GREY.shape

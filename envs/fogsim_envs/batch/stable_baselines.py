@@ -1,19 +1,17 @@
 """The vector environment for Stable-Baselines3, an extra: ``BatchVecEnv(gymnasium.make_vec(…))``."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError, shown
 from fogsim_envs.batch.vector_env import FogAdvisoryBatchEnv
 
 
-@checked_parameters
 class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is missing
     """A `FogAdvisoryBatchEnv` as Stable-Baselines3 wants it; each action is in force for `repeat` steps.
 
@@ -21,9 +19,11 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
     episode's last step has what it ``earned`` without that, and the sum of its ``cost``.
     """
 
-    def __init__(self, envs: VectorEnv[Any, Any, Any], repeat: Annotated[int, Range(1, 1000)] = 1) -> None:
-        if not isinstance(envs.unwrapped, FogAdvisoryBatchEnv):
+    def __init__(self, envs: VectorEnv[Any, Any, Any], repeat: int = 1) -> None:
+        if not isinstance(getattr(envs, "unwrapped", None), FogAdvisoryBatchEnv):
             raise InputError(f"envs: expected a fogsim/FogAdvisoryBatch of gymnasium.make_vec, got {shown(envs)}")
+        if not (np.issubdtype(type(repeat), np.integer) and repeat >= 1):
+            raise InputError(f"repeat: expected a whole number of at least 1, got {shown(repeat)}")
         if envs.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
             raise InputError('autoreset_mode: BatchVecEnv expects "SameStep"')
         self.envs, self._repeat, self.multiplier = envs, repeat, 0.0

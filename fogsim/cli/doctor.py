@@ -72,7 +72,7 @@ def _package(name: str) -> Finding:
 def _try(subject: str, check: Callable[[], str]) -> Finding:
     try:
         return Finding(subject, True, check())
-    except (FogSimError, ImportError, OSError) as error:  # as of a library that is not there, or not whole
+    except (FogSimError, ImportError, OSError) as error:  # a library may be missing or incomplete
         return Finding(subject, False, str(error))
 
 

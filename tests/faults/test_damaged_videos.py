@@ -92,11 +92,11 @@ def test_frames_of_another_size_are_listed_and_left_out(command: Command, videos
     records = [json.loads(line) for line in out.splitlines()]
     assert code == 2
     assert ["error" in record for record in records] == [False] * 5 + [True] * 5
-    told = "sizes.ts, frame 5: it has 64 × 48 pixels, the first frame 80 × 60"
-    assert told in err
+    error = "sizes.ts, frame 5: it has 64 × 48 pixels, the first frame 80 × 60"
+    assert error in err
     code, _, err = command("fog", *line, "--road-plane", "--visibility", "60", "--out", "out.mp4", cwd=tmp_path)
     assert code == 2
-    assert f"{told}; out.mp4 has what could be read" in err
+    assert f"{error}; out.mp4 has what could be read" in err
     assert len(list(find_source(tmp_path / "out.mp4").pictures())) == 5
 
 

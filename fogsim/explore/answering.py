@@ -12,7 +12,7 @@ from fogsim.camera import CameraConfig
 from fogsim.core.randomness import spawn_streams
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
-from fogsim.explore.calibrating import CALIBRATING, Calibrator
+from fogsim.explore.calibrating import Calibrator
 from fogsim.explore.recorded_drive import Moment, RecordedDrive
 from fogsim.recorders.templating import data_url
 from fogsim.scenario import Scenario
@@ -133,6 +133,7 @@ class Explorer:
         settings = self._settings(asked)
         scenario = override(self._scenario, settings) if settings else self._scenario
         config = scenario.run_config()
+        self._calibrator.awaited.clear()
         if asked.soon:
             config = replace(config, estimators=tuple(map(self._calibrator.without_waiting, config.estimators)))
         seen = _look(config, moments, self._equipment(config), asked, is_outdated)
@@ -155,7 +156,7 @@ class Explorer:
                 "pitch_error": scenario.camera.told.pitch_error_deg,
             },
             "estimates": [_estimate(estimate) for estimate in step.estimates],
-            "calibrating": [one.method for one in step.estimates if one.diagnostics.get("reason") == CALIBRATING],
+            "calibrating": sorted(self._calibrator.awaited),
             "belief": _belief(step),
             "advice": _advice(step, command),
             "command": shlex.join([*self._command, *_as_options(settings)]),

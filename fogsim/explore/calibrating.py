@@ -28,6 +28,7 @@ class Calibrator:
     def __init__(self) -> None:
         self._pool: Pool | None = None
         self._made: dict[tuple[Any, ...], AsyncResult[Any]] = {}
+        self.awaited: set[str] = set()  # methods that had no estimate of a frame since this was cleared
 
     def without_waiting(self, method: MethodConfig) -> MethodConfig:
         """A method that has no estimate, for `CALIBRATING`, until its calibration is there."""
@@ -82,6 +83,7 @@ class _PatientEstimator:
         try:
             return cast("Estimate", self._own.update(observation))
         except _NotReadyError:
+            self._calibrator.awaited.add(self.method)
             return Estimate.invalid(self.method, CALIBRATING)
 
     def take_calibrations(self, source: Calibrations) -> None:

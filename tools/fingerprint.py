@@ -150,7 +150,8 @@ def environments() -> dict[str, Any]:
 
 def _rollout(name: str) -> list[str]:
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-        env = gymnasium.make(name)
+        # A batch of environments is registered as a batch alone.
+        env: Any = gymnasium.make(name) if gymnasium.spec(name).entry_point else gymnasium.make_vec(name, num_envs=2)
     env.action_space.seed(1)
     given = [env.reset(seed=1), *(env.step(env.action_space.sample()) for _ in range(STEPS))]
     hashes = [_hash(*_arrays(one)) for one in given]

@@ -18,7 +18,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 VERSIONS = ("3.11", "3.12", "3.13")
 SHORT = ("--seed", "1", "--set", "duration_s=3", "--set", "camera.width=160", "--set", "camera.height=120")
 TRAINS = (
-    "import gymnasium, fogsim_envs; e = gymnasium.make('fogsim/FogAdvisoryFast-v1'); "
+    "import gymnasium, fogsim_envs; e = gymnasium.make('fogsim/FogAdvisoryFast-v2'); "
     "e.reset(seed=1); e.step(e.action_space.sample()); e.close()"
 )
 

@@ -118,7 +118,7 @@ class Evaluation:
 @checked_parameters
 def evaluate(
     policy: AnyPolicy,
-    env_id: Any = "fogsim/FogAdvisory-v1",
+    env_id: Any = "fogsim/FogAdvisory-v2",
     seeds: Iterable[Seed] = range(50),
     *,
     discount: Annotated[float, Range(0.0, 1.0)] = 1.0,

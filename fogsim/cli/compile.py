@@ -44,6 +44,9 @@ _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives out of a tunnel": ("tunnel_exit_into_fog", ((_JOINT,),)),
     "drives on a clear day": ("clear_day", ((_JOINT,),)),
     "drives in a city": ("city_fog", ((),)),
+    "drives in shallow fog": ("ground_fog_under_clear_sky", ((_JOINT,),)),
+    "drives below lifted fog": ("lifted_fog", ((_JOINT,),)),
+    "drives with a camera that fails": ("camera_blackout", ((_JOINT,),)),
 }
 """Scenario, and settings of its consecutive drives, since other settings use other kernels."""
 

@@ -1,5 +1,6 @@
 """Contents of a SUMO configuration file, read without SUMO, and its options that FogSim overrides."""
 
+import functools
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -29,11 +30,13 @@ _TRUE = ("true", "1", "yes", "on", "x", "t")  # SUMO's words
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
 _ROUTES = ("route-files", "routes", "r")
-_FURTHER = (*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state")
+_FURTHER = (
+    *(*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state"),
+    *("device.fcd-replay.files", "device.fcd-replay.file", "astar.all-distances", "astar.landmark-distances"),
+)
 _SELDOM = (
     *("gui-settings-file", "g", "alternative-net-file", "N", "edgedata-files", "data-files", "m", "selection-file"),
-    *("device.fcd-replay.files", "device.fcd-replay.file", "device.ssm.filter-edges.input-file"),
-    *("astar.all-distances", "astar.landmark-distances"),
+    "device.ssm.filter-edges.input-file",
 )
 """Files that do not decide a run; SUMO does not start if some of them are missing."""
 _READ_BY = frozenset(("calibrator", "rerouter", "variableSpeedSign"))
@@ -153,7 +156,7 @@ def is_configured(config: Path, option: str) -> bool:
     return any(_values(_root(config), (option,)))
 
 
-def input_files(config: Path) -> tuple[Path, ...]:
+def configured_inputs(config: Path) -> tuple[Path, ...]:
     """Every file that a SUMO configuration makes SUMO read: network, routes, additional, weights, state."""
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
@@ -168,11 +171,17 @@ def included_files(files: Iterable[Path]) -> tuple[Path, ...]:
     found = list(files)
     given = len(found)
     for path in found:
-        reader = _FileNames(path.parent)
         if path.is_file():
-            read_elements(path, reader, _MOST_BYTES)
-        found += [name for name in dict.fromkeys(reader.found) if name not in found]
+            found += [name for name in _names_in(path, path.stat().st_mtime_ns) if name not in found]
     return tuple(found[given:])
+
+
+@functools.lru_cache
+def _names_in(path: Path, _: int) -> tuple[Path, ...]:
+    """Files that a file names for SUMO to read, read again after the file has changed."""
+    reader = _FileNames(path.parent)
+    read_elements(path, reader, _MOST_BYTES)
+    return tuple(dict.fromkeys(reader.found))
 
 
 class _FileNames:

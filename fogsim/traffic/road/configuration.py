@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from fogsim.core.files.xml_reader import read_elements, read_tree, root_tag
 from fogsim.errors import InputError
-from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, unsafe_option
+from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, read_name, unsafe_option
 
 _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),
@@ -39,8 +39,6 @@ _SELDOM = (
     "device.ssm.filter-edges.input-file",
 )
 """Files that do not decide a run; SUMO does not start if some of them are missing."""
-_READ_BY = frozenset(("calibrator", "rerouter", "variableSpeedSign"))
-"""Elements whose attribute ``file`` is one that SUMO reads."""
 _MOST_BYTES = 50_000_000  # of a file that may name others
 _OPENING = ("load-state", "scale")
 _REROUTING = "device.rerouting"
@@ -192,9 +190,9 @@ class _FileNames:
         self.found: list[Path] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        name = attributes.get("href" if tag == "include" else "file" if tag in _READ_BY else "", "")
+        name = read_name(tag, attributes)
         if name:
-            self.found.append(self._folder / expanded(name))
+            self.found.append(self._folder / name)
 
     def end(self, tag: str) -> None:
         pass

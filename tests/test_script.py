@@ -1,3 +1,5 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import yaml
@@ -129,3 +131,17 @@ def test_values_that_a_file_cannot_hold(patchy, values):
 def test_a_signal_is_no_truth_value():
     with pytest.raises(InputError, match=r"'ego\.collision' is true or false only in a run; use all_of"):
         _ = fs.signal("ego.collision") and fs.signal("time") > "3 s"
+
+
+def test_a_condition_has_no_truth_so_that_none_is_lost() -> None:
+    slow, fast = fs.signal("ego.speed") < "5 km/h", fs.signal("ego.speed") > "90 km/h"
+    lossy: list[Callable[[], object]] = [
+        lambda: slow and fast,
+        lambda: slow or fast,
+        lambda: not slow,
+        lambda: "1 km/h" < fs.signal("ego.speed") < "3 km/h",
+        *(lambda one=one: not one for one in (fs.negated(slow), fs.held(slow, "1 s"), fs.any_of(slow, fast))),
+    ]
+    for mistake in lossy:
+        with pytest.raises(InputError, match="only in a run; use all_of, any_of and negated"):
+            mistake()

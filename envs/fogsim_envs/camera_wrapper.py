@@ -111,9 +111,14 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._step: Step | None = None
         # The noise of the sensors draws on numbers of its own: the environment runs as it would without the camera.
         self._noise = np.random.default_rng()
-        own = observation_space(self._config.camera.on())
+        self._own_space = observation_space(self._config.camera.on())
+        self._describe_observation()
+
+    def _describe_observation(self) -> None:
+        """Set the space of the observation; a reset may have changed the environment's part of it."""
+        own = self._own_space
         self.observation_space = spaces.Dict(
-            {"camera": own["camera"], "state": own["state"], "highway": env.observation_space}
+            {"camera": own["camera"], "state": own["state"], "highway": self.env.observation_space}
         )
 
     def _configured(self) -> tuple[tuple[float, float], RunConfig]:
@@ -142,6 +147,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
             self._frequencies, self._config = self._configured()
             self._equipment.close()
             self._equipment = EgoEquipment(self._config)
+        self._describe_observation()
         environment: Any = self.env.unwrapped
         self._fleet = Fleet(environment, environment.vehicle)
         self._fleet.ego_lamps = _COMMAND.lamps

@@ -137,7 +137,7 @@ def _report(
     from fogsim.testing.campaign.comparison import CASES, changes_text
     from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
     from fogsim.testing.campaign.running import as_test
-    from fogsim.testing.odd.coverage_files import write_coverage
+    from fogsim.testing.odd.coverage_files import remove_coverage, write_coverage
     from fogsim.testing.shrinking import smallest_text
 
     write_cases(out / CASES, campaign, found)
@@ -152,7 +152,9 @@ def _report(
     if smallest is not None:
         lines.append(smallest_text(as_test(campaign, found), smallest, settings))
     paths = [out / CASES, out / "report.html", *([] if junit is None else [junit])]
-    if campaign.odd is not None:
+    if campaign.odd is None:
+        remove_coverage(out)
+    else:
         summary, files = write_coverage(out, campaign.odd, [one.run for one in found.results])
         lines, paths = [*lines, *summary], [*paths, *files]
     stdout.print(escape("\n".join(lines)), soft_wrap=True)

@@ -1,5 +1,6 @@
 """``fogsim explore``: a local page on which fog, light and camera of a drive are changed by hand."""
 
+import contextlib
 import os
 import webbrowser
 from typing import Annotated
@@ -25,10 +26,8 @@ def explore_command(
     from fogsim.explore.server import PageServer, serve
 
     loaded = chosen_scenario(scenario, None, None, None, settings)
-    # Before the drive, not after it.
-    server = PageServer(port)
-    explorer = Explorer(loaded, scenario, seed, settings or ())
-    try:
+    # The port before the drive, not after it.
+    with PageServer(port) as server, contextlib.closing(Explorer(loaded, scenario, seed, settings or ())) as explorer:
         with SimulationProgress(stderr, at) as progress:
             step = explorer.drive.start()
             while step.time < at - 1e-9:
@@ -43,6 +42,3 @@ def explore_command(
         if not no_browser and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             webbrowser.open(f"{server.url}#{at:g}")
         serve(server, explorer)
-    finally:
-        explorer.close()
-        server.server_close()

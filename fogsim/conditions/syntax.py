@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fogsim.errors import InputError, shown
+
 
 @dataclass(frozen=True, slots=True)
 class Reference:
@@ -60,8 +62,15 @@ class Word:
 Operand = Quantity | Word | Reference
 
 
+class _OnlyInARun:
+    __slots__ = ()
+
+    def __bool__(self) -> bool:
+        raise InputError(f"{shown(str(self))} is true or false only in a run; use all_of, any_of and negated")
+
+
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(_OnlyInARun):
     """A signal against a number, a word or another signal; `relation` is one of ``< <= > >= == != include``."""
 
     left: Reference
@@ -73,7 +82,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class Edge(_OnlyInARun):
     """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes``, or ``changes`` (no value)."""
 
     left: Reference
@@ -85,7 +94,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
-class Flag:
+class Flag(_OnlyInARun):
     """A signal that is true or false by itself, such as ``ego.collision``."""
 
     left: Reference
@@ -95,7 +104,7 @@ class Flag:
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class Held(_OnlyInARun):
     """A condition that has been true without a break for a time [s]."""
 
     part: "Condition"
@@ -107,7 +116,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class Delayed:
+class Delayed(_OnlyInARun):
     """A condition that was true a time [s] ago."""
 
     part: "Condition"
@@ -119,7 +128,7 @@ class Delayed:
 
 
 @dataclass(frozen=True, slots=True)
-class Not:
+class Not(_OnlyInARun):
     """A condition that is not true."""
 
     part: "Condition"
@@ -129,7 +138,7 @@ class Not:
 
 
 @dataclass(frozen=True, slots=True)
-class AllOf:
+class AllOf(_OnlyInARun):
     """Conditions that are all true."""
 
     parts: tuple["Condition", ...]
@@ -139,7 +148,7 @@ class AllOf:
 
 
 @dataclass(frozen=True, slots=True)
-class AnyOf:
+class AnyOf(_OnlyInARun):
     """Conditions, true if at least one is."""
 
     parts: tuple["Condition", ...]

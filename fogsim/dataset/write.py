@@ -32,7 +32,6 @@ from fogsim.recorders import versions
 from fogsim.scenario import Scenario, build, resolved
 from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.loop import ClosedLoop
-from fogsim.traffic.road.configuration import input_files
 from fogsim.units import finite_or_none
 from fogsim.values import Camera, CameraPose, Ending, Observation, Step
 
@@ -190,14 +189,14 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
 
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of each SUMO file of a scenario, by name: net, routes, additional, configuration.
+    """SHA-256 of each file that a scenario's traffic and methods read, by name.
 
     Files of the same name in different folders share an entry.
     """
     setup = build.traffic_setup(scenario)
+    # A road by template has files that no key names.
     files = [*([] if setup.net is None else [setup.net]), *setup.routes, *setup.additional]
-    if setup.config is not None:
-        files += [setup.config, *input_files(setup.config)]
+    files += build.input_files(scenario)
     digests: dict[str, str] = {}
     for file in dict.fromkeys(files):
         name, digest = _name(file, scenario.directory), _digest(file)

@@ -144,6 +144,7 @@ class Explorer:
         return {
             "scenario": scenario.name,
             "description": scenario.description,
+            "fault": self.drive.fault,
             "time": step.time,
             "duration": self.drive.moments[-1].time if self.drive.is_over else scenario.duration_s,
             "frames": frames,

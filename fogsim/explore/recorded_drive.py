@@ -1,9 +1,10 @@
 """The drive of a scenario's ego, recorded without frames, that it can be looked at again in other fog."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import FogSimError, InputError, SimulationError
 from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.simulation.run_config import NO_RENDERER, ReportsConfig, RunConfig, check_ego
@@ -33,11 +34,12 @@ class RecordedDrive:
         self._timeline, self.moments = Timeline(config.script), list[Moment]()
         self._step: Step | None = None
         self._seed = seed
+        self.fault = ""  # What has ended the drive too early
 
     @property
     def is_over(self) -> bool:
         """Whether there is nothing more to be recorded."""
-        return self._step is not None and self._step.ending is not None
+        return bool(self.fault) or (self._step is not None and self._step.ending is not None)
 
     @property
     def network(self) -> tuple[RoadNetwork, SignMap]:
@@ -56,6 +58,14 @@ class RecordedDrive:
             raise SimulationError("the drive has not been started or is over")
         return self._record(self._loop.advance(self._policy.decide(self._step)))
 
+    def go_on(self) -> None:
+        """Record the next moment; a fault ends the drive before it, and is logged."""
+        try:
+            self.advance()
+        except FogSimError as error:
+            self.fault = f"the drive ends at {self.moments[-1].time:g} s: {error}"
+            logging.getLogger("fogsim").warning("fogsim: %s", self.fault)
+
     def reach(self, time: float, is_outdated: Callable[[], bool]) -> int | None:
         """Number of the moment at a time [s], or of the last one if the drive ends before; None if outdated meanwhile.
 
@@ -65,7 +75,7 @@ class RecordedDrive:
         while len(self.moments) <= index and not self.is_over:
             if is_outdated():
                 return None
-            self.advance()
+            self.go_on()
         return min(index, len(self.moments) - 1)
 
     def _record(self, step: Step) -> Step:

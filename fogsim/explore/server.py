@@ -136,7 +136,7 @@ def serve(server: PageServer, explorer: Explorer) -> None:
             try:
                 job = server.jobs.get(block=explorer.drive.is_over)
             except queue.Empty:
-                explorer.drive.advance()
+                explorer.drive.go_on()
             else:
                 _do(job, explorer)
     finally:

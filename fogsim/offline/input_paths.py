@@ -53,16 +53,16 @@ def find_source(
     paths = [path for one in given for path in _paths(str(one))]
     if not paths:
         raise InputError("no image and no video is given")
-    if len(paths) == 1 and rate is None and (animation := Animation.open(paths[0], sequence is not False)):
-        return animation
-    if not any(is_video(path) for path in paths):
+    animation = Animation.open(paths[0], sequence is not False) if len(paths) == 1 else None
+    if animation is None and not any(is_video(path) for path in paths):
         temporal = is_sequence(paths) if sequence is None else sequence
         return ImageFiles(tuple(paths), temporal, 1.0 / (rate or _SEQUENCE_RATE))
     if len(paths) > 1:
         raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
     if rate is not None:
-        raise InputError(f"--rate is for image files; {paths[0]} is a video and has its own")
-    return VideoFile.open(paths[0], temporal=sequence is not False)
+        what = "a video" if animation is None else "an animation"
+        raise InputError(f"--rate is for image files; {paths[0]} is {what} and has its own")
+    return animation or VideoFile.open(paths[0], temporal=sequence is not False)
 
 
 def is_video(path: Path) -> bool:

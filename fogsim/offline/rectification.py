@@ -221,7 +221,10 @@ class StraightenedSource:
     def pictures(self) -> Iterator[Picture]:
         """Read and rectify the images."""
         for picture in self.source.pictures():
-            yield picture if picture.image is None else replace(picture, image=self.straightener(picture.image))
+            image, opacity = (
+                None if one is None else self.straightener(one) for one in (picture.image, picture.opacity)
+            )
+            yield replace(picture, image=image, opacity=opacity)
 
 
 def straightened(source: Source, calibration: Calibration) -> tuple[Source, Camera]:

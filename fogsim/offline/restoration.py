@@ -169,13 +169,20 @@ def _written(target: Path, one: Restored, *, is_one_of_several: bool) -> Restore
     if one.image is None:
         return one
     try:
-        # Stored with blue first.
-        write_image(target, one.image if one.image.ndim == 2 else one.image[..., ::-1].copy())
+        write_image(target, _as_stored(one.image, one.picture.opacity))
     except InputError as error:
         if not is_one_of_several:
             raise
         return replace(one, image=None, reason=str(error))
     return one
+
+
+def _as_stored(image: Pixels, opacity: Pixels | None) -> Pixels:
+    """An image with blue first, and its opacity, if any; two side by side have the same."""
+    stored = image if image.ndim == 2 else image[..., ::-1].copy()
+    if opacity is None:
+        return stored
+    return np.dstack([stored, np.tile(opacity, image.shape[1] // opacity.shape[1])])
 
 
 def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:

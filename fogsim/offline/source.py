@@ -26,12 +26,15 @@ class Picture:
         Pixel values, red first; None if it cannot be read.
     error : str
         Why it cannot be read or used, otherwise empty.
+    opacity : (rows, cols) uint8 or uint16, or None
+        Opacity of a file whose pixels are not all opaque.
     """
 
     name: str | int
     time: float
     image: Pixels | None
     error: str = ""
+    opacity: Pixels | None = None
 
 
 class Source(Protocol):
@@ -103,7 +106,8 @@ class ImageFiles:
         for index, path in enumerate(self.paths):
             time = index * self.period if self.temporal else 0.0
             try:
-                yield Picture(str(path), time, _red_first(read_image(path)))
+                stored = read_image(path)
+                yield Picture(str(path), time, _red_first(stored), opacity=_opacity(stored))
             except InputError as error:
                 yield Picture(str(path), time, None, str(error))
 
@@ -115,6 +119,12 @@ def _red_first(stored: Pixels) -> Pixels:
     if stored.shape[2] == 1:
         return stored[:, :, 0].copy()
     return stored[:, :, 2::-1].copy(order="C")
+
+
+def _opacity(stored: Pixels) -> Pixels | None:
+    if stored.ndim == 2 or stored.shape[2] < 4 or np.all(stored[:, :, 3] == np.iinfo(stored.dtype).max):
+        return None
+    return stored[:, :, 3].copy()
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from fogsim.core.files.atomic import opened_alone, partial_path, publish
 from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.errors import FogSimError, InputError
 from fogsim.offline.image_files import Pixels
-from fogsim.offline.source import Picture
+from fogsim.offline.source import Picture, Source
 from fogsim.recorders.video import Encoder, encoding_command, ffmpeg_program
 from fogsim.values import Camera
 
@@ -95,6 +95,12 @@ def _kill(encoder: Encoder) -> None:
         encoder.finish(0.0)
 
 
+def left_out(source: Source) -> tuple[str, ...]:
+    """What a video that is made of a source's frames lacks."""
+    has_sound = isinstance(source, VideoFile) and source.has_sound
+    return (f"the sound of {source.paths[0]}",) if has_sound else ()
+
+
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:
     """Raise InputError unless `out` is a writable ``.mp4`` and fits the camera; `kind` is for messages."""
     if out.suffix.lower() != ".mp4":
@@ -114,6 +120,7 @@ _STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.
 """When a file begins and, if it is later, its first video [s]."""
 
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
+_SOUND = re.compile(r"Stream #.*: Audio:")
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
@@ -148,6 +155,8 @@ class VideoFile:
         Time between two frames [s].
     duration : float
         Its length from the first frame by its header [s]; 0 if unknown.
+    has_sound : bool
+        Whether it has sound, which is not read.
     """
 
     path: Path
@@ -155,6 +164,7 @@ class VideoFile:
     size: tuple[int, int]
     period: float
     duration: float
+    has_sound: bool = False
 
     @classmethod
     def open(cls, path: Path, temporal: bool = True) -> "VideoFile":
@@ -193,7 +203,9 @@ class VideoFile:
             seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
             if starts := _STARTS.search(header_text):
                 seconds -= max(float(starts[2]) - float(starts[1]), 0.0)
-        return cls(path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds)
+        return cls(
+            path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds, _SOUND.search(header_text) is not None
+        )
 
     @property
     def count(self) -> int:

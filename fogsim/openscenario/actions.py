@@ -111,7 +111,7 @@ class Actions(LateralActions):
         """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.need("SpeedActionTarget")
         to = target.need("AbsoluteTargetSpeed", "RelativeTargetSpeed")
-        speed = {**self._target(to), **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
+        speed = {**self._target(to, actor), **(self._pace(dynamics, actor, effect) if dynamics else {"shape": "step"})}
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, final = f"{self.vehicles[actor].called}.speed", speed["to_kmh"] / KMH_PER_MPS
             effect.ends.append(f"{own} > {final - NEAR:.9g} m/s and {own} < {final + NEAR:.9g} m/s")
@@ -130,7 +130,7 @@ class Actions(LateralActions):
         action.word("followingMode", ("position", "follow"))
         profile: list[tuple[float, float]] = []
         for entry in entries:
-            speed, time = entry.number("speed"), entry.number("time", -1.0)
+            speed, time = self._possible(entry, "speed", actor), entry.number("time", -1.0)
             last, before = profile[-1] if profile else (0.0, speed)
             if time < 0.0:
                 way = "acceleration" if speed > before else "deceleration"
@@ -141,23 +141,34 @@ class Actions(LateralActions):
         effect.lasts = max(effect.lasts, profile[-1][0])
         effect.add(actor, speed={"profile": [[time, speed * KMH_PER_MPS] for time, speed in profile]})
 
-    def _target(self, to: Node) -> dict[str, Any]:
-        value = to.number("value")
+    def _possible(self, node: Node, key: str, actor: str) -> float:
+        """A speed to which a vehicle can come [m/s]; any other is refused."""
+        value, top = node.number(key), self.vehicles[actor].top_speed
+        if value < 0.0:
+            node.refuse(f"{key}: expected 0 or more, got {value:g}: vehicles do not drive backwards")
+        if value > top:
+            node.refuse(f"{key}: {actor} drives at most {top:g} m/s (Performance@maxSpeed), got {value:g}")
+        return max(value, 0.0)
+
+    def _target(self, to: Node, actor: str) -> dict[str, Any]:
         if to.tag == "AbsoluteTargetSpeed":
-            if value < 0.0:
-                to.refuse(f"value: expected 0 or more, got {value:g}: vehicles do not drive backwards")
-            return {"to_kmh": max(value, 0.0) * KMH_PER_MPS}
+            return {"to_kmh": self._possible(to, "value", actor) * KMH_PER_MPS}
+        value = to.number("value")
         how = to.word("speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
         follows = {"continuous": True} if to.flag("continuous", "false") else {}
         return {"like": self.vehicles.of(to).named, **share, **follows}
 
-    def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
+    def _pace(self, dynamics: Node, actor: str, effect: Effect) -> dict[str, Any]:
         shape, by, value = self.dynamics(dynamics) or ("step", "", 0.0)
         if by == "distance":
             raise NodeError(dynamics, "dynamicsDimension: speeds change by time or rate")
         if by == "time":
             effect.lasts = max(effect.lasts, value)
+        vehicle = self.vehicles[actor]
+        if by == "rate" and value > max(vehicle.acceleration, vehicle.deceleration):
+            able = f"{actor} speeds up by {vehicle.acceleration:g} m/s² at most and brakes by {vehicle.deceleration:g}"
+            dynamics.refuse(f"value: {able} (Performance), got {value:g}")
         # A rate is the greatest, and FogSim's the mean one.
         pace = {"time": {"over_s": value}, "rate": {"rate_mps2": value / STEEPEST.get(shape, 1.0)}}.get(by, {})
         return {"shape": SHAPES[shape], **pace}
@@ -185,13 +196,15 @@ class Actions(LateralActions):
         is_kept, other, own = action.flag("continuous"), self.vehicles.of(action), self.vehicles[actor]
         further = 0.0 if is_between_bumpers else own.front + other.rear
         effect.is_endless |= is_kept
+        limits = action.one("DynamicConstraints")
+        if limits is not None:
+            limits.remark(HARMLESS[limits.tag], is_whole=True)
         if not is_kept:
             if effect.is_at_start:
                 raise ValueError("continuous: in Init a distance with DynamicConstraints is kept; write true")
-            if (limits := action.one("DynamicConstraints")) is None:
+            if limits is None:
                 message = "without DynamicConstraints it is there at once, as in Init; write these, or continuous=true"
                 raise ValueError(f"continuous: while a vehicle drives, it comes to a distance in time; {message}")
-            limits.remark(HARMLESS[limits.tag], is_whole=True)
             pair = f"{own.called}, {other.called}"
             signal, wanted, near, unit = f"gap({pair})", distance - further, _AT_THE_GAP, "m"
             if headway:

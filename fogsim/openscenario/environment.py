@@ -18,8 +18,12 @@ from fogsim.values.traffic import BOX, PEDESTRIAN
 # SUMO's class of each vehicle category that is read
 CLASSES = {"car": "passenger", "van": "delivery", "truck": "truck", "bus": "bus"}
 CLASSES |= {"motorbike": "motorcycle", "bicycle": "bicycle", "train": "rail", "tram": "tram"}
+# How hard SUMO's drivers of each category speed up and brake where nothing else is said [m/s²]
+HABITS = {"car": (2.6, 4.5), "van": (2.6, 4.5), "truck": (1.3, 4.0), "bus": (1.2, 4.0)}
+HABITS |= {"motorbike": (6.0, 10.0), "bicycle": (1.2, 3.0), "train": (0.25, 1.3), "tram": (1.0, 3.0)}
 _ASIDE = 0.1  # Distance between the middles of axle and body that is none [m]
-_RUNNER = 10.0  # Top speed of persons and obstacles, and their acceleration [m/s, m/s²]
+_FASTEST, _QUICKEST = 138.0, 50.0  # Top speeds and accelerations that a file may give [m/s, m/s²]
+_RUNNER = 10.0  # Acceleration of persons and obstacles [m/s²]
 _THINGS: tuple[str, ...] = ("none", "obstacle", "barrier", "railing", "soundBarrier", "trafficIsland")
 _THINGS += ("pole", "streetLamp", "tree", "vegetation", "building")
 _CATEGORIES = {  # Attribute, its words, and the usual one
@@ -43,7 +47,7 @@ class Vehicle:
     width: float
     height: float
     front: float  # From its reference point, the middle of the rear axle, to the front bumper [m]
-    top_speed: float = _RUNNER
+    top_speed: float = _FASTEST
     acceleration: float = _RUNNER
     deceleration: float = _RUNNER
     body: str = ""
@@ -121,7 +125,7 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> Vehicles:
 
 
 def _vehicle(name: str, node: Node) -> Vehicle:
-    """A vehicle, a person, or an obstacle, which FogSim draws as a box; both are no faster than a runner."""
+    """A vehicle, a person, or an obstacle, which FogSim draws as a box."""
     category = node.word(*_CATEGORIES.get(node.tag, _CATEGORIES["MiscObject"]))
     if node.tag != "Vehicle":
         # Wheelchairs and animals have no figure.
@@ -130,7 +134,7 @@ def _vehicle(name: str, node: Node) -> Vehicle:
         if any(one.tag != "TrailerRef" or one.get("entityRef") for one in trailer.all()):
             trailer.refuse("vehicles have no trailers; describe the whole as one vehicle")
     performance, size = node.need("Performance"), _size(node)
-    limits = {"Speed": 138.0, "Acceleration": 50.0, "Deceleration": 50.0}
+    limits = {"Speed": _FASTEST, "Acceleration": _QUICKEST, "Deceleration": _QUICKEST}
     top, up, down = (min(max(performance.number(f"max{key}"), 0.1), most) for key, most in limits.items())
     return Vehicle(name, node, category, *size, top, up, down)
 

@@ -186,7 +186,7 @@ class LateralActions:
     def _lanes(self, to: Node, actor: str, begins: Spot) -> dict[str, Any]:
         if to.tag.startswith("Absolute"):
             return self._absolute_lane(to, begins, self.positions.ways.get(actor, (begins.lane.edge,)))
-        other, name, lanes = self.vehicles.of(to).named, to.get("entityRef"), int(to.number("value"))
+        other, name, lanes = self.vehicles.of(to).named, to.get("entityRef"), to.whole("value")
         if lanes > 0 and self._has_one_lane(self.spots.get(name)):
             return self._oncoming(to, lanes)
         return {"lanes": lanes} if name == actor else {"to_lane_of": other, "lanes": lanes}

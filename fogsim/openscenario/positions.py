@@ -159,7 +159,7 @@ class Positions:
     def relative_lane_position(self, node: Node) -> Spot | Point:
         """The lane by an entity's number and `dLane`, along the road's line (`ds`), or ahead of it (`dsLane`)."""
         spot = self._place_of(node)
-        other = self.lanes.beside(spot, int(sense(spot) * node.number("dLane")))
+        other = self.lanes.beside(spot, int(sense(spot)) * node.whole("dLane"))
         if "dsLane" in node.attributes:
             return self._shifted(self.lanes.along(other, node.number("dsLane")), node)
         return self._shifted(self.lanes.farther(other, node.number("ds")), node)

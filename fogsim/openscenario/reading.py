@@ -14,8 +14,9 @@ from fogsim.core.files.generated_files import write_generated
 from fogsim.core.files.readers import find_map
 from fogsim.errors import InputError
 from fogsim.openscenario.actions import Actions
-from fogsim.openscenario.environment import CLASSES, Vehicle, fog_block, read_vehicles
+from fogsim.openscenario.environment import CLASSES, HABITS, Vehicle, fog_block, read_vehicles
 from fogsim.openscenario.initial import Beginning
+from fogsim.openscenario.lateral import MOTION
 from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
@@ -84,7 +85,10 @@ def read_openscenario(
         # Vehicles drive on the oncoming lane, which this network does not lead to.
         return read_openscenario(path, values, with_oncoming=True)
     read = _scenario(storyboard, story, begin)
-    files = write_generated("openscenario", {"road.net.xml": net, "road.rou.xml": _vehicles_text(begin)})
+    ego = positions.vehicles.ego
+    ordered = (begin.effect, *(one.effect for one in story.entries.values()))
+    driven = "" if any(MOTION & one.do.get(ego, {}).keys() for one in ordered) else ego
+    files = write_generated("openscenario", {"road.net.xml": net, "road.rou.xml": _vehicles_text(begin, driven)})
     read.data["traffic"] |= {
         "net": str(files / "road.net.xml"),
         "routes": [str(files / "road.rou.xml")],
@@ -195,8 +199,11 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
     return {"duration_s": _LONGEST, "end_when": "happened(stop)"}
 
 
-def _vehicles_text(begin: Beginning) -> str:
-    """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
+def _vehicles_text(begin: Beginning, driven: str) -> str:
+    """Text of the route file: every vehicle is present from the start, with its initial position and speed.
+
+    The one that is `driven` is driven by its driver throughout.
+    """
     routed = {*begin.effect.routes, *begin.positions.rerouted}
     lines, ways = ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>"], begin.positions.ways
     for name, vehicle in begin.positions.vehicles.items():
@@ -213,7 +220,9 @@ def _vehicles_text(begin: Beginning) -> str:
                 # Exactly where the file has it, however near to the next vehicle.
                 "insertionChecks": "none",
             }
-        own = _type(vehicle, begin.aims.get(name, speed), front.lane.limit if front else math.inf)
+        # What a vehicle can do is no habit of its driver.
+        habit = HABITS[vehicle.category] if name == driven else (math.inf, math.inf)
+        own = _type(vehicle, begin.aims.get(name, speed), front.lane.limit if front else math.inf, *habit)
         own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [
@@ -226,8 +235,11 @@ def _vehicles_text(begin: Beginning) -> str:
     return "\n".join([*lines, "</routes>", ""])
 
 
-def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
-    """Attributes of a separate type; its driver's desired speed is the initial one."""
+def _type(vehicle: Vehicle, speed: float, limit: float, most: float, hardest: float) -> dict[str, object]:
+    """Attributes of a separate type, whose driver's desired speed is the initial one.
+
+    Its driver speeds up and brakes by `most` and `hardest` at most [m/s²].
+    """
     return {
         # Persons and obstacles are on lanes of vehicles as well as on footways.
         "vClass": "ignoring" if vehicle.body else CLASSES[vehicle.category],
@@ -235,8 +247,8 @@ def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
         "width": f"{vehicle.width:g}",
         "height": f"{vehicle.height:g}",
         "maxSpeed": f"{vehicle.top_speed:g}",
-        "accel": f"{vehicle.acceleration:g}",
-        "decel": f"{vehicle.deceleration:g}",
+        "accel": f"{min(vehicle.acceleration, most):g}",
+        "decel": f"{min(vehicle.deceleration, hardest):g}",
         "emergencyDecel": f"{vehicle.deceleration:g}",
         "speedFactor": f"{speed / limit if speed > _STANDS and math.isfinite(limit) else 1.0:.6f}",
         "speedDev": "0",

@@ -170,6 +170,13 @@ class Node:
         self.refuse(f"expected a number for {key}, got {shown(text or 'nothing')}", is_whole=False)
         return 0.0
 
+    def whole(self, key: str) -> int:
+        """Whole number of an attribute; any other becomes a finding."""
+        value = self.number(key)
+        if not value.is_integer():
+            self.refuse(f"{key}: expected a whole number, got {value:g}", is_whole=False)
+        return int(value)
+
     def word(self, key: str, allowed: tuple[str, ...], default: str = "") -> str:
         """Word of an attribute; one that is not allowed becomes a finding."""
         text = self.get(key) or default
@@ -195,8 +202,11 @@ class Node:
         return found
 
     def one(self, *tags: str) -> "Node | None":
-        """First child element with one of these tags."""
-        return next(iter(self.all(*tags)), None)
+        """The child element with one of these tags, or the first of all; a second one becomes a finding."""
+        found = self.all(*tags)
+        if tags and len(found) > 1:
+            found[1].refuse(f"expected one {' or '.join(tags)} in {self.label}, got {len(found)}")
+        return next(iter(found), None)
 
     def need(self, *tags: str) -> "Node":
         """First child element with one of these tags; NodeError without one."""
@@ -208,8 +218,7 @@ class Node:
 
     def some(self, *tags: str) -> list["Node"]:
         """Child elements with one of these tags; NodeError without one."""
-        self.need(*tags)
-        return self.all(*tags)
+        return self.all(*tags) or [self.need(*tags)]
 
     def within(self, *path: str) -> "Node | None":
         """Element at the end of a path of tags."""

@@ -1,6 +1,7 @@
 """From a scenario to what runs are made of; here the units of scenario files become SI and radians, once."""
 
 from fogsim.scenario.parts.clocks import periods
+from fogsim.scenario.parts.inputs import input_files
 from fogsim.scenario.parts.methods import (
     advice_config,
     check_frames,
@@ -19,6 +20,7 @@ __all__ = [
     "advice_config",
     "camera_config",
     "check_frames",
+    "input_files",
     "method",
     "own_methods",
     "periods",

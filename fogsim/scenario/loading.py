@@ -290,7 +290,7 @@ def clock_settings(step: float, camera: float, decision: float) -> list[str]:
         Those times [s].
     """
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
-    return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
+    return [f"clocks.{key}_s={float(time)!r}" for key, time in times.items()]
 
 
 def _checked(

@@ -11,9 +11,8 @@ from typing import Any
 from fogsim.advice import ADVISERS, CONTROLLERS
 from fogsim.core.files.atomic import write_json, write_text
 from fogsim.core.files.output_targets import refuse_unwritable_folder
-from fogsim.core.parameters import paths_in
 from fogsim.core.registry import Registry
-from fogsim.core.registry.user_code import import_nothing, is_class_name, module_file
+from fogsim.core.registry.user_code import import_nothing, is_class_name, source_files
 from fogsim.errors import InputError, shown
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
@@ -22,10 +21,11 @@ from fogsim.openscenario import is_openscenario
 from fogsim.scenario.document import read_document
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
+from fogsim.scenario.parts.inputs import named_files
 from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.section import Method
 from fogsim.traffic import SPEED_CHOICES
-from fogsim.traffic.road.configuration import included_files, input_files, seldom_files
+from fogsim.traffic.road.configuration import configured_inputs, included_files, seldom_files
 
 _NAME_KEY = re.compile(r"^name:.*$", re.MULTILINE)
 
@@ -54,12 +54,12 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
         raise InputError(f"{folder} already exists; give another name")
     traffic = old.traffic
     needed = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
-    of_methods = [path for path in _files_of_methods(old) if (old.directory / path).is_file()]
+    of_methods = [*_files_of_methods(old), *named_files(old)]
     outside = [path for path in (*needed, *of_methods) if path.is_absolute() or ".." in path.parts]
     further: tuple[Path, ...] = ()
     if traffic.config is not None and traffic.config not in outside:
         config = old.directory / traffic.config
-        needed += _in_folder(old.directory, input_files(config), config)
+        needed += _in_folder(old.directory, configured_inputs(config), config)
         further = seldom_files(config)
     included = included_files(old.directory / path for path in needed if path not in outside)
     needed += _in_folder(old.directory, (*included, *further), scenario_file(source))
@@ -73,7 +73,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     made = [folder / SCENARIO_FILE]
     folder.mkdir(parents=True)
     try:
-        for path in needed:
+        for path in dict.fromkeys(needed):
             if path not in outside:
                 (folder / path).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(old.directory / path, folder / path)
@@ -87,7 +87,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
 
 
 def _files_of_methods(scenario: Scenario) -> Iterator[Path]:
-    """Modules of the user's methods in the scenario's folder, and files that methods or their parameters name."""
+    """Modules of the user's methods in the scenario's folder and those that they import, and files that are methods."""
     roadside = scenario.sensors.reports.roadside
     camera = None if roadside is None else roadside.camera
     chosen: list[tuple[Registry[Any], Method | None]] = [
@@ -106,11 +106,11 @@ def _files_of_methods(scenario: Scenario) -> Iterator[Path]:
         if kind in registry.files:
             yield Path(file)
         elif is_class_name(method.method):
-            home, module = scenario.directory.resolve(), module_file(method.method, scenario.directory)
-            top = home / kind.partition(".")[0]
-            yield from (one.relative_to(home) for one in (top.rglob("*.py") if top in module.parents else [module]))
-        else:
-            yield from paths_in(registry.find(method.method), method.parameters, Path()).values()
+            home, package = scenario.directory.resolve(), scenario.directory.resolve() / kind.partition(".")[0]
+            sources = source_files(method.method, home)
+            if any(package in source.parents for source in sources):
+                sources += package.rglob("*.py")
+            yield from (one.relative_to(home) for one in sources)
 
 
 def _in_folder(directory: Path, files: Iterable[Path], source: Path) -> list[Path]:

@@ -30,7 +30,6 @@ from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
 from fogsim.study.table import column_mistake
-from fogsim.traffic.road.configuration import input_files
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
@@ -191,31 +190,8 @@ def _label(levels: Mapping[str, str]) -> str:
 
 def file_digests(scenario: Scenario) -> dict[str, str]:
     """Digest of each file that traffic and methods of a scenario read, by name; InputError if SUMO's are missing."""
-    traffic, folder = scenario.traffic, scenario.directory
-    named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
-    files = [folder / path for path in named]
-    if traffic.config is not None:
-        files += input_files(folder / traffic.config)
-    for path in files:
-        if not path.is_file():
-            source = folder / traffic.config if traffic.config is not None else scenario.name
-            raise InputError(f"{source} names {path}, which is not there")
-    names = dict.fromkeys(name for text in _free_texts(deciding(scenario)) for name in (text, *text.split(",")))
-    files += [folder / name for name in names if os.path.isfile(folder / name)]  # noqa: PTH113 - False for any text
-    return {os.path.relpath(path, folder): _digest(path, path.stat().st_mtime_ns) for path in dict.fromkeys(files)}
-
-
-def _free_texts(data: object) -> Iterator[str]:
-    """Texts in parameters of methods and in options of SUMO, which may name files."""
-    if isinstance(data, dict):
-        for key, value in data.items():
-            if key in ("parameters", "sumo_options") and isinstance(value, dict):
-                yield from (one for one in value.values() if isinstance(one, str))
-            else:
-                yield from _free_texts(value)
-    elif isinstance(data, list):
-        for one in data:
-            yield from _free_texts(one)
+    files = build.input_files(scenario)
+    return {os.path.relpath(path, scenario.directory): _digest(path, path.stat().st_mtime_ns) for path in files}
 
 
 @functools.lru_cache

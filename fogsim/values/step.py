@@ -31,6 +31,7 @@ class Reason(StrEnum):
     LEFT = "the vehicle left the road before"
     NEVER_HELD = "its condition never held"
     NO_LANE = "there was no such lane"
+    NOT_AHEAD = "the vehicle to follow was not ahead"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,7 @@ class Unplayed:
     @property
     def is_final(self) -> bool:
         """True if a longer run would not have played all of it either."""
-        return any(event.reason in (Reason.LEFT, Reason.NO_LANE) for event in self.events)
+        return any(event.reason in (Reason.LEFT, Reason.NO_LANE, Reason.NOT_AHEAD) for event in self.events)
 
 
 NOTHING_UNPLAYED = Unplayed()

@@ -2,10 +2,12 @@
 
 import csv
 import functools
+import itertools
 import json
 import os
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,8 @@ from early_motorway import EARLY
 from PIL import Image
 
 import fogsim
+from fogsim import offline
+from fogsim.offline import FrameEstimates, estimates_of
 from tests.helpers.camera_files import camera_yaml
 from tests.helpers.command import Command
 
@@ -107,6 +111,22 @@ def test_a_sequence_is_summed_up(estimate) -> None:
     assert "joint_road" in Path("v.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("as_json", [False, True])
+def test_what_was_done_before_ctrl_c_is_summed_up(estimate, monkeypatch: pytest.MonkeyPatch, as_json: bool) -> None:
+    def interrupted(*given: object) -> Iterator[FrameEstimates]:
+        yield from itertools.islice(estimates_of(*given), 2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(offline, "estimates_of", interrupted)
+    options = ["--json"] if as_json else []
+    code, out, err = estimate("drive", "--camera", "camera.yaml", "--overlay", "o.mp4", "--plot", "v.svg", *options)
+    assert code == 130
+    assert "interrupted after 2 of 3 images; no plot and no overlay is written" in err
+    lines = out.splitlines()
+    assert len(lines) == 2 if as_json else re.search(r"valid +2 of 2 frames", lines[-1])
+    assert not {"o.mp4", "v.svg"} & {path.name for path in Path().iterdir()}
+
+
 def test_csv_has_a_heading_and_a_row_for_each_image(estimate) -> None:
     code, out, _ = estimate("drive", "--camera", "camera.yaml", "--csv")
     assert code == 0
@@ -170,6 +190,7 @@ def test_mistakes_end_with_exit_code_2(estimate, folder: Path) -> None:
         *(((*guess, *option), f"{option[0]} does not go with --guess-camera") for option in NOT_FOR_A_GUESS),
         (("drive", "--camera", "camera.yaml", "--track-offset", "3"), "--track-offset goes with --track"),
         (("drive", "--camera", "camera.yaml", "--json", "--csv"), "give one of them"),
+        (("drive/0.png", "--camera", "camera.yaml", "--rate", "5"), "--rate is for a sequence or an overlay; these"),
         (("drive", "--camera", "camera.yaml", "--stills", "--plot", "v.png"), "--plot draws over time"),
         (("drive", "--camera", "camera.yaml", "--plot", "v.bmp"), "--plot must end in .png, .svg or .pdf"),
         (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "already exists"),

@@ -1,5 +1,6 @@
 """``fogsim restore``."""
 
+import subprocess
 import weakref
 from collections.abc import Generator
 from pathlib import Path
@@ -17,7 +18,7 @@ from fogsim.offline.input_paths import find_source
 from fogsim.offline.restoration import RestorationWish, Restored, restore_files
 from fogsim.offline.source import Picture
 from fogsim.offline.video_source import VideoFile
-from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.recorders.video import Encoder, encoder_command, ffmpeg_program
 from tests.helpers.camera_files import camera_yaml
 from tests.helpers.command import Command
 
@@ -136,6 +137,28 @@ def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, com
     assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
     done = command("restore", "deep.bmp", *line, "deep2.bmp", cwd=folder)
     assert done.stderr == f"error: deep2.bmp: an image of 16 bits {allowed}\n"
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_opacity_is_kept(folder: Path, foggy: np.ndarray, command: Command, beside: bool) -> None:
+    opacity = np.tile(np.arange(320).astype(np.uint8), (240, 1))
+    cv2.imwrite(str(folder / "half.png"), np.dstack([foggy, opacity]))
+    line = ("half.png", *FOG, *(["--beside"] if beside else []), "--out")
+    assert command("restore", *line, "out.png", cwd=folder).returncode == 0
+    out = cv2.imread(str(folder / "out.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(out[..., 3], np.tile(opacity, 1 + beside))
+    done = command("restore", *line, "out.jpg", cwd=folder)
+    assert done.returncode == 2
+    assert "an image with transparency can be written as .png" in done.stderr
+
+
+def test_sound_is_left_out_with_a_word(folder: Path, command: Command) -> None:
+    sources = ["-f", "lavfi", "-i", "testsrc=size=320x240:rate=5", "-f", "lavfi", "-i", "sine", "-t", "0.4"]
+    subprocess.run([ffmpeg_program(), "-loglevel", "error", *sources, str(folder / "heard.mp4")], check=True)
+    for name, *options in (("restore",), ("fog", "--road-plane")):
+        done = command(name, "heard.mp4", *FOG, *options, "--out", f"{name}.mp4", cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr.endswith("left out: the sound of heard.mp4\n")
 
 
 def put_video(path: Path, frames: list[np.ndarray]) -> None:

@@ -235,3 +235,19 @@ def test_the_wrapper_looks_as_often_as_the_environment_acts_after_every_reset() 
         assert env._step.time == pytest.approx(1.0 / rate)
         assert env._config.periods.camera_period == pytest.approx(1.0 / rate)
     env.close()
+
+
+@pytest.mark.parametrize("number", [np.int64, np.float64, np.float32])
+def test_frequencies_may_be_numpys(number: Callable[[int], Any]) -> None:
+    with contextlib.closing(
+        gymnasium.make(ID, config={**FEW, "simulation_frequency": number(15)}, image_size=(64, 48))
+    ):
+        pass
+
+
+def test_the_space_is_that_of_an_observation_that_a_reset_changes() -> None:
+    plain = gymnasium.make("highway-v0", config=FEW)
+    with contextlib.closing(FogCameraWrapper(plain, image_size=(64, 48), overrides=[QUICK])) as env:
+        for kind in ("TimeToCollision", "Kinematics"):
+            observation, _ = env.reset(seed=1, options={"config": {"observation": {"type": kind}}})
+            assert env.observation_space.contains(observation)

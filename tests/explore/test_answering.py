@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from early_motorway import EARLY
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, SimulationError
 from fogsim.estimators.night.own_light import VISIBILITIES, OwnLight, cells_of
 from fogsim.explore.answering import Explorer, Question, _estimate, question
 from fogsim.explore.calibrating import CALIBRATING
@@ -110,6 +112,19 @@ def test_estimates_are_the_same_whether_waited_for_or_not() -> None:
         pass
     assert early == explorer.answer(Question(0.5, 3))
     explorer.close()
+
+
+def test_a_fault_ends_the_drive_and_the_moments_before_it_are_still_answered(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    explorer = begun(SMALL)
+    before = explorer.answer(IN_FOG)
+    monkeypatch.setattr(explorer.drive._loop, "advance", MagicMock(side_effect=SimulationError("SUMO is lost")))
+    later = explorer.answer(replace(IN_FOG, time=1.5))
+    explorer.close()
+    assert before is not None
+    assert later == {**before, "fault": "the drive ends at 0.5 s: SUMO is lost", "duration": 0.5}
+    assert [record.getMessage() for record in caplog.records] == ["fogsim: the drive ends at 0.5 s: SUMO is lost"]
 
 
 def test_what_has_no_end_is_no_number_of_the_answer() -> None:

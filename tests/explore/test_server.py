@@ -123,6 +123,9 @@ def test_mistakes_are_told_before_the_drive() -> None:
         port = other.getsockname()[1]
         with pytest.raises(InputError, match=rf"--port {port}: cannot be used \(Address already in use\); leave"):
             explore_command("motorway_fog_bank", port=port)
+    with pytest.raises(InputError, match="renderer: none draws no frames"):
+        explore_command("motorway_fog_bank", port=port, settings=["renderer=none", "estimators=[]"])
+    socket.create_server(("127.0.0.1", port)).close()
     with pytest.raises(InputError, match=r"--at 60: the run ends after 0\.2 s \(time\)"):
         explore_command("motorway_fog_bank", at=60.0, settings=[EARLY, "duration_s=0.2"])
 

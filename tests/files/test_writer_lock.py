@@ -1,10 +1,14 @@
+import errno
+import fcntl
 import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
+from fogsim.core.files.atomic import whole_file
 from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock, WritingProcess
 from fogsim.errors import InputError
 
@@ -14,6 +18,19 @@ def test_one_holds_it_and_the_next_is_told_who(tmp_path: Path) -> None:
         WriterLock(tmp_path)
     assert list(tmp_path.iterdir()) == []
     with WriterLock(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_written_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    monkeypatch.setattr(fcntl, "flock", MagicMock(side_effect=OSError(number, os.strerror(number))))
+    with WriterLock(tmp_path), whole_file(tmp_path / "file") as file:
+        file.write(b"all")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("file", b"all")]
+    monkeypatch.setattr(fcntl, "flock", MagicMock(side_effect=OSError(errno.EIO, "a fault")))
+    with pytest.raises(OSError, match="a fault"), WriterLock(tmp_path):
         pass
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
@@ -138,7 +138,8 @@ def test_a_distance_is_kept(tmp_path: Path, free: str, gap: float) -> None:
     )
     begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
     file = write(tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Next": event("keep", keeps, after(1.0))}, stop=after(25))
-    steps = run(file)
+    with pytest.warns(LeftOutWarning, match="DynamicConstraints: FogSim's law of following has limits of its own"):
+        steps = run(file)
     ego, other = motion_at(steps, 24.0, "Ego"), motion_at(steps, 24.0, "Next")
     assert ego[0] - 4.6 - other[0] == pytest.approx(gap, abs=0.3)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, UnplayedWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
@@ -127,3 +127,24 @@ def test_the_entities_of_a_selection_all_act(tmp_path: Path) -> None:
     file.write_text(text.replace("</Entities>", chosen.format(kind)), encoding="utf-8")
     with pytest.raises(InputError, match="expected EntityRef inside, got 'ByType'"):
         read_openscenario(file)
+
+
+def test_a_distance_to_a_vehicle_that_is_not_ahead_is_reported_as_not_kept(tmp_path: Path) -> None:
+    action = distance('timeGap="2" freespace="true"', "").replace(
+        '"Ego" continuous="false"', '"Next" continuous="true"'
+    )
+    begin = {"Ego": f"{lane(90)}\n{speed(10)}", "Next": f"{lane(60)}\n{speed(10)}"}
+    file = write(
+        tmp_path, {"Ego": CAR, "Next": CAR}, begin, {"Ego": event("near", action, after(1.0))}, stop=after(2.0)
+    )
+    with pytest.warns(UnplayedWarning, match="not played: near .*: the vehicle to follow was not ahead"):
+        steps = run(file)
+    assert "near" not in begun(steps)
+
+
+def test_an_ego_that_no_one_orders_is_driven_by_habit_and_not_as_hard_as_it_can_be(tmp_path: Path) -> None:
+    strong = CAR.replace('maxDeceleration="9" maxAcceleration="4"', 'maxDeceleration="10" maxAcceleration="9"')
+    for story, habit in ({}, ("2.6", "4.5")), ({"Ego": event("fast", speed(14), after(1.0))}, ("9", "10")):
+        file = write(tmp_path, {"Ego": strong}, {"Ego": f"{lane(20)}\n{speed(10)}"}, story)
+        text = Path(read_openscenario(file).data["traffic"]["routes"][0]).read_text(encoding="utf-8")
+        assert f'accel="{habit[0]}" decel="{habit[1]}" emergencyDecel="10"' in text

@@ -1,6 +1,7 @@
 """Stories: changes of lane by distance and onto the oncoming lane, delays, repeated events, and the end of the road."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,8 @@ from fogsim.scenario.loading import load_scenario
 from fogsim.values import Ending
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, CASES, QUIET, TWO_LANES, after, begun, changes_lane, event, group, lane, linear, motion_at, on, over, run,
-    speed, speed_of, state, write,
+    CAR, CASES, QUIET, TWO_LANES, after, begun, changes_lane, event, group, lane, linear, motion_at, on, over,
+    profile, run, speed, speed_of, state, write,
 )  # fmt: skip
 
 
@@ -333,3 +334,29 @@ def test_truth_values_are_those_of_xml(tmp_path: Path, written: str, is_kept: bo
     else:
         done = read_openscenario(file).data["timeline"][-1]["do"]["Lead"]["speed"]
         assert done.get("continuous", False) is is_kept
+
+
+def test_what_a_vehicle_cannot_do_and_what_is_written_twice_is_refused(tmp_path: Path) -> None:
+    slow = CAR.replace('maxSpeed="60"', 'maxSpeed="20"')
+    events = {
+        "over": speed(30, linear(3)),
+        "hard": speed(5, linear(9.5, "rate")),
+        "profile": profile((0.0, 10), (3.0, 21)),
+        "half": changes_lane(1, "time", 2.0)
+        .replace("Absolute", "Relative")
+        .replace('value="1"', 'entityRef="Ego" value="1.5"'),
+        "twice": speed(12).replace("<SpeedActionTarget>", "<SpeedActionTarget/><SpeedActionTarget>"),
+    }
+    story = {"Next": "".join(event(name, action, after(1.0)) for name, action in events.items())}
+    begin = {"Ego": f"{lane(90)}\n{speed(25)}", "Next": f"{lane(60)}\n{speed(10)}"}
+    with pytest.raises(InputError) as refused:
+        read_openscenario(write(tmp_path, {"Ego": slow, "Next": slow}, begin, story))
+    for end in (
+        r"Private\[Ego\].*value: Ego drives at most 20 m/s \(Performance@maxSpeed\), got 25",
+        r"Event\[over\].*value: Next drives at most 20 m/s \(Performance@maxSpeed\), got 30",
+        r"Event\[hard\].*value: Next speeds up by 4 m/s² at most and brakes by 9 \(Performance\), got 9\.5",
+        r"Event\[profile\].*speed: Next drives at most 20 m/s \(Performance@maxSpeed\), got 21",
+        r"Event\[half\].*value: expected a whole number, got 1\.5",
+        r"Event\[twice\].*/SpeedActionTarget: expected one SpeedActionTarget in SpeedAction, got 2",
+    ):
+        assert re.search(f"small.xosc:1: .*{end}$", str(refused.value), re.MULTILINE), end

@@ -119,17 +119,24 @@ def test_files_of_methods_are_copied(tmp_path):
     for name in ("mine.py", "pack/__init__.py", "pack/inner.py", "pack/helper.py", "other.py"):
         (old / name).parent.mkdir(exist_ok=True)
         (old / name).write_text("class Own: ...\n")
-    (old / "lamps.yaml").write_text("{}")
+    (old / "mine.py").write_text("import sibling\nclass Own: ...\n")
+    (old / "sibling.py").write_text("import cousin\n")
+    (old / "cousin.py").touch()
+    (old / "lamps.yaml").write_text("{low_beam: beam.csv}")
+    (old / "beam.csv").write_text("0,0,1\n")
+    (old / "weights.npz").touch()
     (old / "scenario.yaml").write_text(
         "name: old\nduration_s: 5\nroad: {template: motorway}\nactors: {ego: {position: 200 m, speed: 100 km/h}}\n"
         "fog: {visibility_m: 100}\nfusion: pack.inner:Own\n"
-        "estimators:\n  - mine:Own\n  - {method: night_road, parameters: {head_lamps: lamps.yaml}}\n"
+        "estimators:\n  - {method: mine:Own, parameters: {weights: weights.npz}}\n"
+        "  - {method: night_road, parameters: {head_lamps: lamps.yaml}}\n"
         "lighting: low_beam\n"
     )
     begin_scenario("new", str(old), tmp_path)
     load_scenario(tmp_path / "new", may_import=import_nothing)
     found = {str(path.relative_to(tmp_path / "new")) for path in (tmp_path / "new").rglob("*") if path.is_file()}
     added = {"mine.py", "pack/__init__.py", "pack/inner.py", "pack/helper.py", "lamps.yaml"}
+    added |= {"sibling.py", "cousin.py", "beam.csv", "weights.npz"}
     assert found == {"scenario.yaml", "fogsim.schema.json", *added}
 
 
@@ -172,7 +179,7 @@ def test_files_that_files_of_a_configuration_name_are_copied_or_refused(tmp_path
     for name in ("view.xml", "a.add.xml", "more/b.add.xml", "more/v.xml", "more/c.xml"):
         assert (tmp_path / "new" / name).read_text() == (old / name).read_text()
     (old / "more" / "v.xml").unlink()
-    with pytest.raises(InputError, match=r"'more/v\.xml' is no file in the scenario's folder"):
+    with pytest.raises(InputError, match=r"b\.add\.xml:1: there is no file 'v\.xml' in "):
         begin_scenario("third", str(old), tmp_path)
 
 

@@ -1,18 +1,20 @@
 """Study files: their grid, and what is refused with file, line and key."""
 
+import shutil
 from pathlib import Path
 from unittest.mock import MagicMock
 
 import pytest
 
+from fogsim.dataset.write import input_digests
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
-from fogsim.scenario import loading
+from fogsim.scenario import loading, scenario_from_config
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import catalogue
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
-from fogsim.study.plan import equal_cells, shipped_studies, study_file
+from fogsim.study.plan import equal_cells, file_digests, shipped_studies, study_file
 from fogsim.study.table import FIXED_COLUMNS, check_factors, column_mistake
 
 STUDY = """
@@ -159,6 +161,35 @@ def test_a_file_that_the_configuration_names_is_missed_before_anything_is_run(tm
         InputError, match=r"a\.sumocfg: traffic\.config: .*loops\.add\.xml: cannot be read: No such file"
     ):
         load_study(written(tmp_path, text))
+
+
+def test_every_file_that_a_run_depends_on_is_part_of_its_identity(tmp_path: Path) -> None:
+    grid = Path(__file__).resolve().parents[1] / "data" / "grid"
+    for file in grid.glob("grid.*"):
+        shutil.copy(file, tmp_path)
+    config = tmp_path / "grid.sumocfg"
+    more = '<additional-files value="a.add.xml"/></input>'
+    config.write_text(config.read_text(encoding="utf-8").replace("</input>", more), encoding="utf-8")
+    vss = '<variableSpeedSign id="v" lanes="A0B0_0" file="v.xml"/>'
+    for name, content in (
+        ("a.add.xml", '<additional><include href="b.add.xml"/></additional>'),
+        ("b.add.xml", f"<additional>{vss}</additional>"),
+        ("v.xml", '<vss><step time="0" speed="9"/></vss>'),
+        ("lamps.yaml", "{low_beam: beam.csv}"),
+        ("beam.csv", "0,0,1"),
+    ):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    method = "estimators=[{method: night_road, parameters: {head_lamps: lamps.yaml}}]"
+    scenario = scenario_from_config(config, "veh18", ["fog.visibility_m=120", method])
+    for digests in (file_digests, input_digests):
+        before = digests(scenario)
+        for name in before:
+            content = (tmp_path / name).read_text(encoding="utf-8")
+            (tmp_path / name).write_text(content + "\n", encoding="utf-8")
+            assert {key for key, value in digests(scenario).items() if value != before[key]} == {name}
+            (tmp_path / name).write_text(content, encoding="utf-8")
+        wanted = {"grid.sumocfg", "grid.net.xml", "grid.trips.xml", "a.add.xml", "b.add.xml", "v.xml"}
+        assert before.keys() == {*wanted, "lamps.yaml", "beam.csv"}
 
 
 def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:

@@ -59,7 +59,9 @@ def test_vehicles_that_sumo_leaves_out_are_reported(tmp_path: Path) -> None:
 
 def test_a_mistake_that_sumo_finds_on_the_way_is_told_as_it_is(tmp_path: Path) -> None:
     config = configuration(tmp_path, vehicle("ego", 0.0, "we1 we2") + vehicle("lost", 1.0, "we2 we1"))
-    with pytest.raises(SimulationError, match=r"^SUMO cannot go on: Vehicle 'lost' has no valid route\..*'we1'\.?$"):
+    with pytest.raises(
+        SimulationError, match=r"xml:\d+: SUMO cannot go on: Vehicle 'lost' has no valid route\..*'we1'\.?$"
+    ):
         list(fogsim.run(loaded(config)))
 
 
@@ -134,3 +136,25 @@ def test_a_lane_of_no_length_before_a_light_is_read_and_driven_on(tmp_path: Path
     steps = list(fogsim.run(loaded(config, "ego", *drawn)))
     assert steps[-1].ending is Ending.ARRIVED
     assert steps[-1].traffic.position[0, 0] > 130.0
+
+
+def test_what_sumo_cannot_load_is_named_with_file_and_line(tmp_path: Path) -> None:
+    additional = tmp_path / "a.add.xml"
+    for mistake, option, place, cause in (
+        ('<poly id="x" shape="a,b 3,4"/>', "", "a.add.xml:2", "Attribute 'shape' in definition of poly 'x'"),
+        ('<flow id="f" begin="0" number="5" route="no"/>', "", "a.add.xml:2", "The route 'no' for flow 'f'"),
+        ("", '<foo value="3"/>', "mine.sumocfg:1", "No option with the name 'foo' exists"),
+    ):
+        additional.write_text(f"<additional>\n{mistake}\n</additional>", encoding="utf-8")
+        rows = f"<routes>{CAR}{vehicle('ego', 0.0, WAY)}</routes>"
+        config = configured(tmp_path, DATA / "a.net.xml", rows, option, additional=additional)
+        with pytest.raises(SimulationError, match=rf"^{tmp_path}/{place}: SUMO cannot load the scenario: {cause}"):
+            next(fogsim.run(loaded(config)))
+
+
+def test_a_missing_file_that_ends_sumo_is_refused_before(tmp_path: Path) -> None:
+    sign = '<additional>\n<variableSpeedSign id="v" lanes="we1_0" file="v.xml"/></additional>'
+    (tmp_path / "a.add.xml").write_text(sign, encoding="utf-8")
+    options = f'<additional-files value="{tmp_path}/a.add.xml"/>'
+    with pytest.raises(InputError, match=r"a\.add\.xml:2: there is no file 'v\.xml' in "):
+        loaded(configuration(tmp_path, vehicle("ego", 0.0, WAY), options=options))

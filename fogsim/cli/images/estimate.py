@@ -6,11 +6,11 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, stderr
+from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, print_error, print_remarks, stderr
 from fogsim.cli.progress import counting_bar, progress_bar
 from fogsim.errors import InputError, printable
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from fogsim.offline import Calibration, CameraGuess, FrameEstimates, NightDrive, SignWatch, Source
+    from fogsim.offline.calibration_deviations import CalibrationDeviations
     from fogsim.offline.clip_summary import Clip
     from fogsim.values import Camera
 
@@ -120,6 +121,8 @@ def estimate_command(
     drive = _night_drive(night, lamps, setback, head_lamps, halos)
     methods = chosen_methods(_methods(method, drive, mapped=signs is not None))
     source = find_source(images, sequence=sequence, rate=rate)
+    if overlay is None and not source.temporal:
+        _refuse_given({"--rate": rate}, "is for a sequence or an overlay; these are stills, unless --sequence is given")
     outputs = _Outputs(as_json, as_csv, overlay, plot, overwrite)
     _check_plot(outputs, source)
     calibration = _calibration(source, camera, guessing)
@@ -226,13 +229,58 @@ def _estimate(
     mapped: tuple[Path | None, Path | None, float],
     night: "NightDrive | None",
 ) -> None:
-    from fogsim.offline import OverlayFile, estimates_of, straightened
+    from fogsim.offline import straightened
     from fogsim.offline.clip_summary import Clip
+    from fogsim.offline.video_source import left_out
 
-    unusable = list[str]()
     source, camera = straightened(images, calibration)
     watch = _watch(mapped, source, camera)
     clip, rows = Clip(methods), _Rows(source, methods, outputs)
+    is_interrupted = False
+    try:
+        _each(source, camera, methods, outputs, rows, clip, watch, night, calibration.deviations)
+    except KeyboardInterrupt:
+        is_interrupted = True
+    if rows.are_summed_up and rows.count:
+        for line in clip.lines():
+            _say(printable(line, in_one_line=True))
+    if watch is not None:
+        _show_signs(watch, quiet=outputs.as_json or outputs.as_csv)
+    if is_interrupted:
+        _end_early(rows, source, outputs)
+    if outputs.plot is not None:
+        _write_plot(clip, outputs.plot, source)
+    if outputs.overlay is not None:
+        stderr.print(f"overlay: {escape(outputs.overlay)}", soft_wrap=True)
+        print_remarks("left out", left_out(images))
+    if rows.unusable:
+        print_error(f"{len(rows.unusable)} of the images could not be used:")
+        for reason in rows.unusable:
+            stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
+        raise typer.Exit(BAD_INPUT)
+
+
+def _end_early(rows: "_Rows", source: "Source", outputs: _Outputs) -> NoReturn:
+    lacking = [f"no {name}" for name, file in (("plot", outputs.plot), ("overlay", outputs.overlay)) if file]
+    end = f"; {' and '.join(lacking)} is written" if lacking else ""
+    stderr.print(f"interrupted after {rows.count} of {source.count} images{end}", soft_wrap=True)
+    raise typer.Exit(INTERRUPTED)
+
+
+def _each(
+    source: "Source",
+    camera: "Camera",
+    methods: tuple[str, ...],
+    outputs: _Outputs,
+    rows: "_Rows",
+    clip: "Clip",
+    watch: "SignWatch | None",
+    night: "NightDrive | None",
+    deviations: "CalibrationDeviations",
+) -> None:
+    """Estimate on image after image, show and sum up the results, and write the overlay."""
+    from fogsim.offline import OverlayFile, estimates_of
+
     with contextlib.ExitStack() as stack:
         drawn = outputs.overlay and stack.enter_context(
             OverlayFile(outputs.overlay, source, camera, methods, overwrite=outputs.overwrite)
@@ -240,27 +288,12 @@ def _estimate(
         progress = stack.enter_context(progress_bar(stderr))
         task = progress.add_task(source.description, total=source.count)
         rows.begin()
-        for result in estimates_of(source, camera, methods, watch, night, calibration.deviations):
+        for result in estimates_of(source, camera, methods, watch, night, deviations):
             rows.show(result)
             clip.add(result)
             if drawn:
                 drawn.add(result)
-            unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)
-    if rows.are_summed_up:
-        for line in clip.lines():
-            _say(printable(line, in_one_line=True))
-    if watch is not None:
-        _show_signs(watch, quiet=outputs.as_json or outputs.as_csv)
-    if outputs.plot is not None:
-        _write_plot(clip, outputs.plot, source)
-    if outputs.overlay is not None:
-        stderr.print(f"overlay: {escape(outputs.overlay)}", soft_wrap=True)
-    if unusable:
-        print_error(f"{len(unusable)} of the images could not be used:")
-        for reason in unusable:
-            stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
-        raise typer.Exit(BAD_INPUT)
 
 
 def _check_plot(outputs: _Outputs, source: "Source") -> None:
@@ -312,6 +345,7 @@ class _Rows:
     def __init__(self, source: "Source", methods: tuple[str, ...], outputs: _Outputs) -> None:
         self._source, self._methods, self._outputs = source, methods, outputs
         self.are_summed_up = source.temporal and not (outputs.as_json or outputs.as_csv)
+        self.count, self.unusable = 0, list[str]()
 
     def begin(self) -> None:
         from fogsim.offline import csv_line, table_heading
@@ -322,7 +356,9 @@ class _Rows:
             _say(table_heading(self._source, self._methods))
 
     def show(self, result: "FrameEstimates") -> None:
+        self.count += 1
         if result.picture.error:
+            self.unusable.append(result.picture.error)
             print_remarks("passed over", (result.picture.error,))
         for line in self._lines(result):
             _say(printable(line, in_one_line=True))

@@ -163,7 +163,7 @@ def _fog_road(
     from fogsim.offline.fog_image import fog_file
     from fogsim.offline.fog_video import fog_video
     from fogsim.offline.input_paths import is_video
-    from fogsim.offline.video_source import VideoFile
+    from fogsim.offline.video_source import VideoFile, left_out
 
     if not is_video(image):
         return fog_file(image, road, visibility, road.calibration.camera, out, light, layer=layer, overwrite=overwrite)
@@ -177,4 +177,5 @@ def _fog_road(
         progress.advance(task)
         for _ in frames:
             progress.advance(task)
+    print_remarks("left out", left_out(video))
     return airlight

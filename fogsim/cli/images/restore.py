@@ -47,6 +47,7 @@ def restore_command(
     from fogsim.offline import find_source, load_calibration, straightened
     from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
     from fogsim.offline.source import ImageFiles
+    from fogsim.offline.video_source import left_out
     from fogsim.vision.restoration import MOST_GAIN
 
     light = None if airlight is None else pixel_values(airlight)
@@ -76,6 +77,7 @@ def restore_command(
         if is_files:
             _report_missing(lacking)
     _print_counts(out, wish, counts, last)
+    print_remarks("left out", left_out(given))
     if lacking and is_files:
         raise typer.Exit(BAD_INPUT)
     if lacking:

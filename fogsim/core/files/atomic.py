@@ -26,6 +26,9 @@ _LEAST_RESERVE = 2**18
 _MOST_LINKS = 40
 """Links that Linux follows in one path."""
 
+_WITHOUT_LOCKS = errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL
+"""Errors of file systems without locks."""
+
 
 def final_path(path: Path) -> Path:
     """The file that a path stands for, with links followed even to a file that does not exist yet."""
@@ -111,17 +114,25 @@ def opened_alone(part: Path) -> Iterator[BinaryIO]:
     part.touch()
     with part.open("r+b") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file.fileno())
         except BlockingIOError:
             raise _other_writer(part) from None
-        except OSError:
-            # This file system has no locks.
-            pass
         # Its writer may have published it since it was opened.
         if not (part.exists() and os.path.samestat(part.stat(), os.fstat(file.fileno()))):
             raise _other_writer(part)
         file.truncate()
         yield file
+
+
+def lock(descriptor: int) -> None:
+    """Lock an open file, unless its file system has no locks; BlockingIOError if another process holds the lock."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        if error.errno not in _WITHOUT_LOCKS:
+            raise
 
 
 def _other_writer(part: Path) -> InputError:

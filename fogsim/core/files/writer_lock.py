@@ -1,7 +1,6 @@
 """One directory, one writer: the lock and the process that holds it."""
 
 import dataclasses
-import fcntl
 import json
 import os
 import platform
@@ -10,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from fogsim.core.files.atomic import naming
+from fogsim.core.files.atomic import lock, naming
 from fogsim.errors import InputError
 
 
@@ -73,7 +72,7 @@ LOCK_NAME = ".fogsim.lock"
 class WriterLock:
     """A directory's lock, which the operating system releases when its process ends.
 
-    InputError names the process that holds it.
+    InputError names the process that holds it. A file system without locks keeps no second writer away.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -108,7 +107,7 @@ def _locked(folder: Path, path: Path) -> int:
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(descriptor)
             # The previous writer may have removed its lock file after this one was opened: it would lock nothing.
             if _is(path, descriptor):
                 return descriptor

@@ -203,7 +203,7 @@ def load_announced(point: metadata.EntryPoint) -> Any:
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:
     """Version of a user's method: of its package, or a digest of its sources; None for FogSim's methods."""
     if is_class_name(name):
-        return digest_of(*_sources(_match(name)["module"], module_file(name, folder), (folder or Path.cwd()).resolve()))
+        return digest_of(*source_files(name, folder))
     point = announced(group).get(name)
     return None if point is None or point.dist is None else f"{point.dist.name} {point.dist.version}"
 
@@ -213,13 +213,14 @@ def digest_of(*files: Path) -> str:
     return f"sha256:{hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()[:16]}"
 
 
-def _sources(module: str, file: Path, home: Path) -> list[Path]:
-    """File of a module, then all files of its folder that it imports, directly or not."""
-    sources = list(dict.fromkeys([file, *_files_of(module, home)]))
+def source_files(name: str, folder: Path | None) -> list[Path]:
+    """File of the module in ``module:Class``, then all files of the folder that it imports, directly or not."""
+    home = (folder or Path.cwd()).resolve()
+    sources = list(dict.fromkeys([module_file(name, folder), *_files_of(_match(name)["module"], home)]))
     for source in sources:  # grows on the way
-        for level, name in _imported_names(source, source.stat().st_mtime_ns):
+        for level, imported in _imported_names(source, source.stat().st_mtime_ns):
             start = source.parents[level - 1] if 0 < level <= len(source.parents) else home
-            sources += [one for one in _files_of(name, start) if one not in sources]
+            sources += [one for one in _files_of(imported, start) if one not in sources]
     return sources
 
 

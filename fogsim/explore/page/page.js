@@ -62,7 +62,7 @@ function goOn(answer, frames) {
 function trouble(text) { at("trouble").textContent = text; at("trouble").hidden = !text; }
 
 function show(answer, frames) {
-  trouble(answer.error ?? "");
+  trouble(answer.error ?? answer.fault);
   if (answer.error) return;
   goOn(answer, frames);
   document.title = `${answer.scenario} · FogSim`;

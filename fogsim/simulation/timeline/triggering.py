@@ -75,9 +75,14 @@ class Timeline:
 
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
         """What has begun, or is over, of what was due."""
-        failed = {begun.name for begun, actions in due.parts if any(action in refused for action in actions)}
+        failed = {
+            begun.name: Reason.NOT_AHEAD if isinstance(action, Follow) else Reason.NO_LANE
+            for begun, actions in due.parts
+            for action in actions
+            if action in refused
+        }
         for entry in self._entries:
-            entry.was_refused |= entry.name in failed
+            entry.refusal = failed.get(entry.name, entry.refusal)
         self._ends = [end for end in self._ends if end.name not in failed]
         return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
 
@@ -96,7 +101,7 @@ class _Entry:
 
     def __init__(self, config: ScriptEntry) -> None:
         self.config, self.name = config, config.name
-        self.was_refused = False
+        self.refusal: Reason | None = None
         self._watch = Watch(config.when)
         self._held = False
         self._has_held = self._has_begun = False
@@ -131,8 +136,8 @@ class _Entry:
 
     def why_not(self, seen: Collection[str], step: TrafficStep) -> Reason | None:
         """Why it has not begun; None if it has."""
-        if self.was_refused:
-            return Reason.NO_LANE
+        if self.refusal is not None:
+            return self.refusal
         if self._has_begun:
             return None
         if not self._has_held or not self.is_due(step.time):

@@ -117,8 +117,13 @@ class Findings:
     results: list[CaseResult] = field(default_factory=list)
     boundary: Boundary | None = None
     rate: FailureRate | None = None
-    plain: PlainRate | None = None
+    plain: PlainRate = field(default_factory=lambda: PlainRate(0, 0))
     why_no_rate: str = ""
+
+    @property
+    def rate_interval(self) -> tuple[float, float]:
+        """90 % interval of the failure rate: a kind of failure that the search has missed only adds to its rate."""
+        return (0.0 if self.rate is None else self.rate.low), self.plain.bounds[1]
 
 
 def batches(
@@ -210,7 +215,7 @@ def _search_rate(space: Space, seed: int, left: int, found: Findings) -> _Batche
     proposal, size = first_proposal(len(space.axes)), max(left // _LEVELS, 50)
     for level in range(left // (2 * size)):
         places, results = yield from _drawn_from(proposal, Purpose.LEVEL, size, f"level {level}", space, seed, found)
-        if found.plain is None:
+        if level == 0:
             found.plain = _plain_rate(found)
         margins = _margins(results)
         if margins is None:
@@ -229,7 +234,7 @@ def _search_rate(space: Space, seed: int, left: int, found: Findings) -> _Batche
     if not found.rate.is_known:
         found.why_no_rate = f"too few cases failed: effectively {found.rate.effective:.0f} of {left}"
         return
-    low, high = found.plain.bounds if found.plain is not None else (0.0, 1.0)
+    low, high = found.plain.bounds
     if found.rate.high < low or high < found.rate.low:
         found.why_no_rate = (
             f"the search gives {found.rate.low:.2g} … {found.rate.high:.2g}, but cases drawn from the distributions "

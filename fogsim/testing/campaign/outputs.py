@@ -106,15 +106,11 @@ def rate_text(found: Findings) -> str:
     """Failure rate with its interval, or why there is none."""
     if found.rate is None or not found.rate.is_known:
         return f"no failure rate: {found.why_no_rate}"
-    rate = found.rate
-    interval = f"{rate.rate:.2g}, 90 % interval {rate.low:.2g} … {rate.high:.2g}"
-    effective = f"{rate.runs} cases, effectively {rate.effective:.0f} failures"
-    said = f"failure rate under the declared distributions: {interval} ({effective})"
-    if found.plain is None:
-        return said
-    low, high = found.plain.bounds
-    plain = f"{low:.2g} … {high:.2g} ({found.plain.failed} of {found.plain.drawn} cases drawn from them alone failed)"
-    return f"{said}, if the search has found every kind of failure; without that assumption {plain}"
+    rate, (low, high) = found.rate, found.rate_interval
+    searched = f"{rate.rate:.2g} ({rate.low:.2g} … {rate.high:.2g}) if the search has found every kind of failure"
+    cases = f"{rate.runs} cases, effectively {rate.effective:.0f} failures"
+    said = f"failure rate under the declared distributions, 90 % interval: {low:.2g} … {high:.2g}; {searched} ({cases}"
+    return f"{said}; {found.plain.failed} of {found.plain.drawn} drawn from the distributions alone failed)"
 
 
 def counts_text(found: Findings) -> str:

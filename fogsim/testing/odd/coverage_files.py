@@ -11,7 +11,14 @@ from fogsim.testing.odd.openodd_library import CoveredItem, Document, covered_it
 from fogsim.testing.results import read_coverage
 from fogsim.testing.session import results_folder
 
-_CASES = "coverage"
+_CASES, _WHOLE = "coverage", ("coverage.json", "coverage.html")
+
+
+def remove_coverage(out: Path) -> None:
+    """Remove from a directory the coverage that an earlier campaign wrote there."""
+    shutil.rmtree(out / _CASES, ignore_errors=True)
+    for name in _WHOLE:
+        (out / name).unlink(missing_ok=True)
 
 
 def write_coverage(out: Path, odd: OddFile, runs: Sequence[StudyRun]) -> tuple[list[str], list[Path]]:
@@ -21,7 +28,7 @@ def write_coverage(out: Path, odd: OddFile, runs: Sequence[StudyRun]) -> tuple[l
     coverage file of openodd-py and its measured values as an OpenODD current operational domain.
     """
     folder, merging = out / _CASES, list[Document]()
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_coverage(out)
     folder.mkdir()
     for run in runs:
         document = read_coverage(results_folder(out), run)
@@ -34,8 +41,6 @@ def write_coverage(out: Path, odd: OddFile, runs: Sequence[StudyRun]) -> tuple[l
         write_json(folder / f"{stem}_coverage.json", slim)
         merging.append(slim)
     if not merging:
-        for name in ("coverage.json", "coverage.html"):
-            (out / name).unlink(missing_ok=True)
         return [f"ODD {odd.name}: no coverage, all runs ended with errors"], []
     report = merged(merging)
     write_json(out / "coverage.json", report.to_dict())

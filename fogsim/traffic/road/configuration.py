@@ -1,5 +1,6 @@
 """Contents of a SUMO configuration file, read without SUMO, and its options that FogSim overrides."""
 
+import functools
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -9,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from fogsim.core.files.xml_reader import read_elements, read_tree, root_tag
 from fogsim.errors import InputError
-from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, unsafe_option
+from fogsim.traffic.road.unsafe_outputs import check_outputs, expanded, read_name, unsafe_option
 
 _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),
@@ -29,15 +30,15 @@ _TRUE = ("true", "1", "yes", "on", "x", "t")  # SUMO's words
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
 _ROUTES = ("route-files", "routes", "r")
-_FURTHER = (*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state")
+_FURTHER = (
+    *(*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state"),
+    *("device.fcd-replay.files", "device.fcd-replay.file", "astar.all-distances", "astar.landmark-distances"),
+)
 _SELDOM = (
     *("gui-settings-file", "g", "alternative-net-file", "N", "edgedata-files", "data-files", "m", "selection-file"),
-    *("device.fcd-replay.files", "device.fcd-replay.file", "device.ssm.filter-edges.input-file"),
-    *("astar.all-distances", "astar.landmark-distances"),
+    "device.ssm.filter-edges.input-file",
 )
 """Files that do not decide a run; SUMO does not start if some of them are missing."""
-_READ_BY = frozenset(("calibrator", "rerouter", "variableSpeedSign"))
-"""Elements whose attribute ``file`` is one that SUMO reads."""
 _MOST_BYTES = 50_000_000  # of a file that may name others
 _OPENING = ("load-state", "scale")
 _REROUTING = "device.rerouting"
@@ -153,7 +154,7 @@ def is_configured(config: Path, option: str) -> bool:
     return any(_values(_root(config), (option,)))
 
 
-def input_files(config: Path) -> tuple[Path, ...]:
+def configured_inputs(config: Path) -> tuple[Path, ...]:
     """Every file that a SUMO configuration makes SUMO read: network, routes, additional, weights, state."""
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
@@ -168,11 +169,17 @@ def included_files(files: Iterable[Path]) -> tuple[Path, ...]:
     found = list(files)
     given = len(found)
     for path in found:
-        reader = _FileNames(path.parent)
         if path.is_file():
-            read_elements(path, reader, _MOST_BYTES)
-        found += [name for name in dict.fromkeys(reader.found) if name not in found]
+            found += [name for name in _names_in(path, path.stat().st_mtime_ns) if name not in found]
     return tuple(found[given:])
+
+
+@functools.lru_cache
+def _names_in(path: Path, _: int) -> tuple[Path, ...]:
+    """Files that a file names for SUMO to read, read again after the file has changed."""
+    reader = _FileNames(path.parent)
+    read_elements(path, reader, _MOST_BYTES)
+    return tuple(dict.fromkeys(reader.found))
 
 
 class _FileNames:
@@ -183,9 +190,9 @@ class _FileNames:
         self.found: list[Path] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        name = attributes.get("href" if tag == "include" else "file" if tag in _READ_BY else "", "")
+        name = read_name(tag, attributes)
         if name:
-            self.found.append(self._folder / expanded(name))
+            self.found.append(self._folder / name)
 
     def end(self, tag: str) -> None:
         pass

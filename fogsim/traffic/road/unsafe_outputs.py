@@ -2,12 +2,12 @@
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 
 from fogsim.core.files.xml_reader import XmlFile, open_unpacked
-from fogsim.errors import shown
+from fogsim.errors import InputError, shown
 
 _WRITING = frozenset(
     (
@@ -27,8 +27,10 @@ _ADDRESS = re.compile(r"(?:\[[^\]]*\][^:]*|[^:]{2,}):\s*[+-]?\d+")
 _NO_ADDRESS = "SUMO's outputs go into files, not to a network address"
 _VARIABLE = re.compile(r"\$\{(.+?)\}")
 _ADDRESS_END = re.compile(rb":\s*[+-]?\d+\s*[\"']")
-_INDIRECT = (b"${", b"&#", b"include", b"<!DOCTYPE", b"\0")
-"""Bytes without which an address stands in a file as it is, and no other file is included."""
+_READ_BY = frozenset(("calibrator", "rerouter", "variableSpeedSign"))
+"""Elements whose attribute ``file`` is one that SUMO reads."""
+_INDIRECT = (b"${", b"&#", b"include", b"<!DOCTYPE", b"\0", *(tag.encode() for tag in _READ_BY))
+"""Bytes without which an address stands in a file as it is, and no other file is read."""
 _PLAIN = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*<(?!\?xml[^>]*encoding\s*=\s*(?![\"'](?:utf-8|us-ascii|iso-8859-1)[\"']))", re.IGNORECASE
 )
@@ -59,27 +61,38 @@ def unsafe_option(name: str, value: str) -> str | None:
     return _NO_ADDRESS if name.rpartition(".")[2] not in _NOT_FILES and _is_address(value) else None
 
 
+def read_name(tag: str, attributes: Mapping[str, str]) -> str:
+    """Name of the file that an element makes SUMO read, "" if it names none."""
+    return expanded(attributes.get("href" if tag == "include" else "file" if tag in _READ_BY else "", ""))
+
+
 def check_outputs(paths: Iterable[Path]) -> None:
-    """Raise InputError if a SUMO file, or one that it includes, sends an output to a network address."""
+    """Raise InputError if a SUMO file, or one that it names, sends an output to an address or names a missing file.
+
+    SUMO ends the process if some of those are missing.
+    """
     waiting, seen = [path.resolve() for path in paths], set[Path]()
     while waiting:
         path = waiting.pop()
         if path not in seen and path.is_file():
             seen.add(path)
-            waiting += _checked_file(path, path.stat().st_mtime_ns, path.stat().st_size)
+            for name, line in _checked_file(path, path.stat().st_mtime_ns, path.stat().st_size).items():
+                if not name.is_file():
+                    raise InputError(f"{path}:{line}: there is no file {shown(name.name)} in {name.parent}")
+                waiting.append(name)
 
 
 @lru_cache(maxsize=256)
-def _checked_file(path: Path, changed: int, size: int) -> tuple[Path, ...]:  # noqa: ARG001 - a changed file is read again
-    """Files that a checked file includes; `changed` [ns] and `size` [bytes] are its own."""
-    reader = _OutputReader(path)
+def _checked_file(path: Path, changed: int, size: int) -> dict[Path, int]:  # noqa: ARG001 - a changed file is read again
+    """Files that a checked file names, and on which lines; `changed` [ns] and `size` [bytes] are its own."""
+    reader = _OutputReader(path, file := XmlFile(path))
     if _needs_reading(path):
-        XmlFile(path).read_all(reader, _MOST, _MOST)
-    return tuple(reader.included)
+        file.read_all(reader, _MOST, _MOST)
+    return reader.read
 
 
 def _needs_reading(path: Path) -> bool:
-    """Whether a file may name an address or include another: a quick look at its bytes spares the reading of most."""
+    """Whether a file may name an address or another file: a quick look at its bytes spares the reading of most."""
     with open_unpacked(path) as file:
         text = file.read(_CHUNK)
         if _PLAIN.match(text) is None:
@@ -93,13 +106,13 @@ def _needs_reading(path: Path) -> bool:
 
 
 class _OutputReader:
-    """Reads names of outputs and of included files."""
+    """Reads names of outputs and of files that SUMO reads."""
 
     is_done = False
 
-    def __init__(self, path: Path) -> None:
-        self._folder = path.parent
-        self.included: list[Path] = []
+    def __init__(self, path: Path, file: XmlFile) -> None:
+        self._folder, self._file = path.parent, file
+        self.read: dict[Path, int] = {}
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         names = [attributes[key] for key in _OUTPUTS if key in attributes]
@@ -108,8 +121,9 @@ class _OutputReader:
         for name in names:
             if _is_address(name):
                 raise ValueError(f"{_NO_ADDRESS}, got {shown(name)}")
-        if tag.endswith("include"):
-            self.included.append((self._folder / expanded(attributes.get("href", ""))).resolve())
+        name = read_name(tag, attributes)
+        if name:
+            self.read.setdefault((self._folder / name).resolve(), self._file.line)
 
     def end(self, tag: str) -> None:
         pass

@@ -11,6 +11,7 @@ from types import ModuleType
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
 from fogsim.traffic.sumo.link import Api, translated_errors
+from fogsim.traffic.sumo.load_errors import located
 from fogsim.traffic.sumo.output_folder import OutputFolder
 
 
@@ -38,6 +39,7 @@ class LibsumoLink:
     def __init__(self, outputs: OutputFolder | None = None) -> None:
         self._outputs = outputs
         self._sumo: ModuleType | None = None
+        self._arguments: Sequence[str] = ()
 
     def begin(self, arguments: Sequence[str]) -> Api:
         """Start SUMO here, or load it again; see `SumoLink.begin`."""
@@ -50,6 +52,7 @@ class LibsumoLink:
             )
         if self._outputs is not None:
             arguments = [*arguments, *self._outputs.open()]
+        self._arguments = arguments
         with _captured_stderr() as words:
             try:
                 if self._sumo is None:
@@ -69,10 +72,10 @@ class LibsumoLink:
         # What ends SUMO is either there, or in libsumo's error alone.
         if all(line.startswith("Warning") for line in lines):
             lines.insert(0, str(failure))
-        message = " ".join(lines)
+        message = located("SUMO cannot load the scenario", " ".join(lines), arguments)
         if self._outputs is not None:
             message = self._outputs.shorten(message)
-        raise SimulationError(f"SUMO cannot load the scenario: {message}")
+        raise SimulationError(message)
 
     def _check_outputs(self) -> None:
         if self._outputs is None:
@@ -96,7 +99,7 @@ class LibsumoLink:
             if not self._sumo.isLoaded():
                 raise
             # SUMO reads vehicles while it runs, and finds mistakes in them only then.
-            raise SimulationError(f"SUMO cannot go on: {error}") from error
+            raise SimulationError(located("SUMO cannot go on", str(error), self._arguments)) from error
 
     def end(self) -> None:
         """End the simulation; see `SumoLink.end`."""

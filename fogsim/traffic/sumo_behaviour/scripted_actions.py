@@ -16,7 +16,18 @@ from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
 from fogsim.values import Lamp
 from fogsim.values.light import lamp_names
-from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TakeRoute, TrafficAction, Walk
+from fogsim.values.script import (
+    ChangeLane,
+    Depart,
+    Enter,
+    Follow,
+    FollowPath,
+    Leave,
+    SetSignal,
+    TakeRoute,
+    TrafficAction,
+    Walk,
+)
 
 _NO_LANE_CHANGES = 0
 
@@ -169,7 +180,8 @@ class ScriptedActions:
     ) -> tuple[TrafficAction, ...]:
         """Begin actions.
 
-        Returns those that could not begin: the vehicle has left, or has no such lane. Takes `time` [s].
+        Returns those that could not begin: the vehicle has left, has no such lane, or is not behind the one that it is
+        to follow. Takes `time` [s].
         """
         refused, motion = list[TrafficAction](), self._motion(time, present)
         for action in actions:
@@ -183,7 +195,7 @@ class ScriptedActions:
                 self._paths.begin(action, time, present)
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
-            elif action.vehicle not in present or not self._has_lane(action):
+            elif action.vehicle not in present or not self._is_possible(action, motion):
                 refused.append(action)
             elif isinstance(action, TakeRoute):
                 refused += [] if self._take_route(action) else [action]
@@ -215,7 +227,10 @@ class ScriptedActions:
             vehicle.setRoute(action.vehicle, [*found, *edges[1:]])
         return bool(found)
 
-    def _has_lane(self, action: TrafficAction) -> bool:
+    def _is_possible(self, action: TrafficAction, motion: Motion) -> bool:
+        """Whether there is the lane to change to, or the one to follow is ahead."""
+        if isinstance(action, Follow):
+            return action.leader in motion.present and motion.gap(action.vehicle, action.leader) is not None
         if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
             return True
         if action.vehicle in self._paths.vehicles and not action.lanes:

@@ -120,8 +120,8 @@ def test_a_rate_that_plain_draws_contradict_is_not_given(monkeypatch: pytest.Mon
         monkeypatch.setattr(drawing_plan, "failure_rate", lambda *_, rate=rate: rate)
         text = rate_text(searched(1, 400, margin=0.5))
         if is_given:
-            assert "0.01 … 0.03 (200 cases" in text
-            assert text.endswith("without that assumption 0 … 0.036 (0 of 82 cases drawn from them alone failed)")
+            assert "90 % interval: 0.01 … 0.036; 0.02 (0.01 … 0.03) if the search has found every kind" in text
+            assert text.endswith("0 of 82 drawn from the distributions alone failed)")
         else:
             assert text.startswith(
                 "no failure rate: the search gives 0.1 … 0.3, but cases drawn from the distributions"

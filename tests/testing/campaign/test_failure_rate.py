@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
+from fogsim.testing.campaign.drawing_plan import Findings, PlainRate
 from fogsim.testing.campaign.failure_rate import FailureRate, failure_rate, first_proposal, next_proposal
 
 RATE, RUNS, LEVEL = 1e-4, 2000, 250
@@ -39,6 +40,28 @@ def test_a_rate_of_one_in_ten_thousand(shape: str) -> None:
     assert len(known) >= 90, "elsewhere no rate is given"
     assert np.mean([RATE / 2 < one.rate < 2 * RATE for one in known]) >= 0.95
     assert np.mean([one.low <= RATE <= one.high for one in known]) >= 0.9
+
+
+def test_the_interval_holds_where_a_second_kind_of_failure_is_missed() -> None:
+    """No margin leads to the second kind, whose rate is three times that of the first."""
+    across = np.array([0.6, -1.0, -0.4, 1.0])
+    across -= (across @ DIRECTION) * DIRECTION
+    aside = norm.isf(3.0 * RATE) * np.linalg.norm(across)
+    generator, truth = np.random.default_rng(0), 4.0 * RATE - 3.0 * RATE**2
+
+    def margin(places):
+        return np.where(places @ across > aside, -1.0, np.maximum(MARGINS["plane"](places), -1.0))
+
+    searched, stated = [], []
+    for seed in range(40):
+        rate, plain = estimated(margin, seed), margin(generator.standard_normal((250, 4)))
+        found = Findings(rate=rate, plain=PlainRate(int((plain <= 0.0).sum()), len(plain)))
+        if rate.is_known:
+            searched.append(rate.low <= truth <= rate.high)
+            stated.append(found.rate_interval[0] <= truth <= found.rate_interval[1])
+    assert len(stated) >= 15
+    assert np.mean(searched) <= 0.2
+    assert np.mean(stated) >= 0.9
 
 
 def test_without_failures_there_is_no_rate() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from drawn_scenario import SCENARIO as DRAWN
 
+from fogsim.cli.campaign import _report
 from fogsim.conditions import SIGNALS, Finding, FindingVerdict
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import FogSimError, MissingDependencyError
@@ -143,6 +144,10 @@ def test_results_without_this_coverage_do_not_count(tmp_path: Path) -> None:
     summary, _ = write_coverage(tmp_path / "out", with_odd.odd, [one.run for one in second.results])
     assert summary == ["ODD fog: no coverage, all runs ended with errors"]
     assert not (tmp_path / "out" / "coverage.json").exists()
+    for name in ("coverage.json", "coverage.html", "coverage/case_00000_cod.csv"):
+        (tmp_path / "out" / name).write_text("an earlier campaign's")
+    _report(plain, first, None, (), tmp_path / "out", None)
+    assert not list((tmp_path / "out").glob("coverage*"))
 
 
 def test_without_the_extra_a_campaign_with_an_odd_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

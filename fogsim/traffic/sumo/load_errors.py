@@ -1,0 +1,77 @@
+"""Where in a scenario's files SUMO has found a fault, which it names by ids alone."""
+
+import contextlib
+import itertools
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from fogsim.core.files.xml_reader import XmlFile
+from fogsim.errors import InputError
+from fogsim.traffic.road.configuration import configured_inputs, included_files
+
+_FILES = ("--net-file", "--route-files", "--additional-files")
+_QUOTED = re.compile("['\"\u201c]([^'\"\u201c\u201d]+)['\"\u201d]")
+_PLACE = re.compile(r"\s*In file '(.*)'\s*At line/column (\d+)/\d+\.?")
+_NUMBERED = re.compile(r"\.\d+$")
+_PARTS = re.compile(r"[\s,]+")
+_MOST_BYTES = 50_000_000  # of a file that is searched
+
+
+def located(what: str, message: str, arguments: Sequence[str]) -> str:
+    """What SUMO cannot do and its message, after the file and line of the first fault in it, if these can be found.
+
+    `arguments` are those of SUMO's command line.
+    """
+    message = " ".join(message.removeprefix("Error: ").split())
+    place = _PLACE.search(message)
+    if place is not None:
+        return f"{place[1]}:{place[2]}: {what}: {message[: place.start()]}{message[place.end() :]}"
+    first = message.partition(" Error: ")[0]
+    ids = dict.fromkeys(_NUMBERED.sub("", one) for one in _QUOTED.findall(first))
+    # The network has most ids, and the fewest faults.
+    most, where = max((_most_alike(path, ids) for path in reversed(_files(arguments))), default=(0, ""), key=_number)
+    return f"{where}: {what}: {message}" if most else f"{what}: {message}"
+
+
+def _number(found: tuple[int, str]) -> int:
+    return found[0]
+
+
+def _files(arguments: Sequence[str]) -> list[Path]:
+    values = dict(itertools.pairwise(arguments))
+    config = values.get("--configuration-file")
+    named = [Path(name) for option in _FILES for name in values.get(option, "").split(",") if name]
+    with contextlib.suppress(InputError):
+        named += [] if config is None else [*configured_inputs(Path(config)), Path(config)]
+        named += included_files(named)
+    return [path for path in named if path.is_file()]
+
+
+def _most_alike(path: Path, ids: Iterable[str]) -> tuple[int, str]:
+    """Number of ids that the attributes of a file's first element with most of them hold, and its file and line."""
+    file = XmlFile(path)
+    reader = _Reader(file, ids)
+    try:
+        file.read(reader, _MOST_BYTES)
+    except InputError:
+        return 0, ""
+    return reader.most, f"{path}:{reader.line}"
+
+
+class _Reader:
+    is_done = False
+
+    def __init__(self, file: XmlFile, ids: Iterable[str]) -> None:
+        self._file, self._ids = file, frozenset(ids)
+        self.most = self.line = 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        held = {tag} | {part for value in attributes.values() for part in (value, *_PARTS.split(value))}
+        # Of two, the one that is called so.
+        alike = 2 * len(held & self._ids) + (attributes.get("id") in self._ids)
+        if alike > self.most:
+            self.most, self.line = alike, self._file.line
+
+    def end(self, _: str) -> None:
+        pass

@@ -207,7 +207,7 @@ def test_a_command_refuses_its_target_before_it_works(folder: Path, monkeypatch:
         raise AssertionError("the work has begun")
 
     for name in (
-        "fogsim.simulation.loop.ClosedLoop",
+        "fogsim.simulation.loop.ClosedLoop.__init__",
         "fogsim.study.pool.ProcessPool.run",
         "fogsim.offline.guess.guess_camera",
     ):

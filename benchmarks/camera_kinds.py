@@ -13,28 +13,20 @@ Of the frames in fog: `valid`, `median/p95` of |V_est − V| / V [%], `hold` (90
 an upper end: below 1000 m, in views that are no lane anywhere. No constant is chosen on the frames of pool 1.
 
     python benchmarks/camera_kinds.py [--images 4] [--pool 1] [--methods joint_road …] [--kinds film …] [--docs]
-    python benchmarks/camera_kinds.py --show FOLDER
-    python benchmarks/camera_kinds.py --photographs FOLDER --measured FILE.csv --camera CAMERA.yaml
-
-The second form reads photographs of the user: the CSV has the columns `file` and `visibility_m` (inf: clear).
 """
 
-import csv
 import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from harness import parse_options, progress, publish
 from numpy.typing import NDArray
 from photograph_pictures import photograph
-from PIL import Image
 
 from fogsim.estimators import make
-from fogsim.offline import load_calibration
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.rectification import RoadPlane
 from fogsim.units import extinction_from_visibility
@@ -292,7 +284,7 @@ class Frame:
     visibility: float
 
 
-def frames(kind: Kind, name: str, images: int, pool: int = POOL) -> Iterator[Frame]:
+def frames(kind: Kind, name: str, images: int, pool: int) -> Iterator[Frame]:
     """Every photograph of a kind in every fog."""
     numbers = (n for n in itertools.count(FIRST) if photograph(pool, n).is_sunny is kind.sunny)
     for number in itertools.islice(numbers, images):
@@ -350,23 +342,6 @@ def estimates(method: str, some: list[Frame], most: float) -> list[Found]:
     return [Found(make(method, one.camera).update(Observation(one.image)), one.visibility, most) for one in some]
 
 
-def photographs(folder: Path, measured: Path, camera: Path) -> Iterator[Frame]:
-    """The user's own photographs."""
-    calibration = load_calibration(camera)
-    with measured.open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            image = np.asarray(Image.open(folder / row["file"]).convert("RGB"))
-            yield Frame(np.ascontiguousarray(image), calibration.camera, float(row["visibility_m"]))
-
-
-def show(folder: Path) -> None:
-    """Write a sheet of each kind, to be looked at."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, kind in KINDS.items():
-        sheet = np.hstack([one.image for one in frames(kind, name, 1)])
-        Image.fromarray(sheet).save(folder / f"{name.replace(' ', '_')}.png")
-
-
 def main() -> None:
     """Measure and print."""
     given = parse_options(
@@ -376,21 +351,11 @@ def main() -> None:
         images=(4, "photographs of each kind"),
         methods=(["joint_road"], "estimators"),
         kinds=(list(KINDS), "which kinds", KINDS),
-        show=(Path, "folder to write pictures into, without measuring"),
-        photographs=(Path, "folder of the user's own photographs"),
-        measured=(Path, "CSV of their measured visibility"),
-        camera=(Path, "their camera"),
     )
-    if given.show:
-        show(given.show)
-        return
-    if given.photographs:
-        sets = {"photographs": list(photographs(given.photographs, given.measured, given.camera))}
-    else:
-        sets = {name: list(frames(KINDS[name], name, given.images, given.pool)) for name in given.kinds}
     rows, whole = [], dict[str, list[Found]]()
-    for name, some in progress(sets.items(), "kinds"):
-        most = CLEAR if name not in KINDS or KINDS[name].lane else math.inf
+    for name in progress(given.kinds, "kinds"):
+        some = list(frames(KINDS[name], name, given.images, given.pool))
+        most = CLEAR if KINDS[name].lane else math.inf
         for method in given.methods:
             found = estimates(method, some, most)
             whole.setdefault(method, []).extend(found)

@@ -9,7 +9,6 @@ import math
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -22,7 +21,6 @@ from windscreen import hash_noise, rays
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.fog_image import BRIGHTEST_ABOVE_ROAD, airlight_of, fog_image
 from fogsim.offline.rectification import RoadPlane
-from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Response
 
 Floats = NDArray[np.float64]
@@ -55,7 +53,6 @@ class Photograph:
     told: Camera
     is_sunny: bool
     light: Floats
-    developing: dict[str, Any]
 
     def fogged(self, visibilities: tuple[float, ...]) -> list[Image]:
         """Lay even fog on it, as `fogsim fog --road-plane` does."""
@@ -63,14 +60,6 @@ class Photograph:
         air = airlight_of(self.image, distance, BRIGHTEST_ABOVE_ROAD)
         laid = [fog_image(self.image, distance, one, self.taken_by, air) for one in visibilities]
         return [one.astype(np.uint8, copy=False) for one in laid]
-
-    def taken_in_fog(self, visibilities: tuple[float, ...]) -> list[Image]:
-        """Lay the fog on the light, before the camera makes a picture of it, whose tone curve methods are not given."""
-        distance = RoadPlane(Calibration(self.taken_by)).distance()
-        above = self.light[np.isinf(distance)]
-        air = np.median(above[np.argsort(above.sum(axis=1))[-len(above) // 5 :]], axis=0)
-        clear = [np.exp(-extinction_from_visibility(one) * distance)[..., None] for one in visibilities]
-        return [_developed(self.light * one + air * (1.0 - one), self.developing) for one in clear]
 
 
 def photograph(pool: int, number: int) -> Photograph:
@@ -87,8 +76,7 @@ def photograph(pool: int, number: int) -> Photograph:
     light[~road] = _sky(-down[~road], (right / forward * np.ones_like(down))[~road], rng)
     light[road], is_sunny = _ground(ahead, across, sine, rng)
     mean = light.reshape(camera.height, OVER, camera.width, OVER, 3).mean(axis=(1, 3))
-    developing = dict(rng.bit_generator.state)
-    return Photograph(_developed(mean, developing), camera, told, is_sunny, mean, developing)
+    return Photograph(_developed(mean, rng), camera, told, is_sunny, mean)
 
 
 def _noise(ahead: Floats, across: Floats, sides: tuple[float, float], rng: np.random.Generator) -> Floats:
@@ -195,10 +183,8 @@ def _sky(up: Floats, aside: Floats, rng: np.random.Generator) -> Floats:
     return light
 
 
-def _developed(light: Floats, state: dict[str, Any]) -> Image:
-    """What a camera makes of light, always the same by a state of chance: exposure, gains, tone curve, noise, JPEG."""
-    rng = np.random.default_rng()
-    rng.bit_generator.state = state
+def _developed(light: Floats, rng: np.random.Generator) -> Image:
+    """What a camera makes of light: exposure, gains, tone curve, noise, JPEG."""
     exposed = light * float(rng.uniform(0.55, 0.95)) * (1.0 + rng.normal(0.0, 0.04, 3))
     # A road in the sun is brighter than the sky: exposed so that not more than a thousandth burns out.
     exposed /= max(float(np.quantile(exposed, 0.999)), 1.0)

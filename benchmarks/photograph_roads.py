@@ -12,22 +12,14 @@ ln(V_est / V) in %, `coverage` the share of 90 % intervals of k that hold the tr
 an estimate.
 
     python benchmarks/photograph_roads.py [--json] [--docs] [--pool 1] [--images 60] [--methods joint_road …]
-        [--laid-on light] [--show FOLDER]
-
-With `--laid-on light` the fog is laid on the light, and the photograph is taken of the foggy road: the tone curve,
-which methods assume to be sRGB, then bends the fog as well. `--show FOLDER` writes the first pictures, clear and
-in fog of 150 m, to be looked at.
 """
 
 import math
 import statistics
 from collections.abc import Iterator
-from pathlib import Path
 
-import numpy as np
 from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile
 from photograph_pictures import photograph
-from PIL import Image
 
 from fogsim.estimators import make
 from fogsim.units import extinction_from_visibility
@@ -36,16 +28,14 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 
 VISIBILITIES = (60.0, 80.0, 100.0, 150.0, 200.0, 300.0, 500.0)
 ENDLESS = 999.0  # error [%] of clear air that is seen where there is fog
-SHOWN, SHOWN_FOG = 12, 150.0
 
 
-def measure(pool: int, images: int, methods: list[str], laid_on: str) -> list[Row]:
+def measure(pool: int, images: int, methods: list[str]) -> list[Row]:
     """An estimate a row."""
     rows = []
     for number in progress(range(images), "photographs"):
         taken = photograph(pool, number)
-        lay = taken.taken_in_fog if laid_on == "light" else taken.fogged
-        for visibility, image in zip(VISIBILITIES, lay(VISIBILITIES), strict=True):
+        for visibility, image in zip(VISIBILITIES, taken.fogged(VISIBILITIES), strict=True):
             truth = extinction_from_visibility(visibility)
             for method in methods:
                 found = make(method, taken.told).update(Observation(image))
@@ -91,15 +81,6 @@ def docs_table(found: list[Row]) -> list[str]:
     return lines_of(("V_met, m", "median/p95, %", "bias, %", "90 % intervals hold", "valid"), rows)
 
 
-def show(folder: Path, pool: int) -> None:
-    """Write pictures to be looked at."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for number in range(SHOWN):
-        taken = photograph(pool, number)
-        both = np.hstack([taken.image, *taken.fogged((SHOWN_FOG,))])
-        Image.fromarray(both).save(folder / f"pool{pool}_{number:02}.png")
-
-
 def main() -> None:
     """Measure and print."""
     given = parse_options(
@@ -108,13 +89,8 @@ def main() -> None:
         pool=1,
         images=(60, "photographs"),
         methods=(["joint_road"], "names of estimators"),
-        laid_on=("picture", "where the fog is laid", ("picture", "light")),
-        show=(Path, "folder to write pictures into, without measuring"),
     )
-    if given.show:
-        show(given.show, given.pool)
-        return
-    found = list(records(measure(given.pool, given.images, given.methods, given.laid_on), given.pool))
+    found = list(records(measure(given.pool, given.images, given.methods), given.pool))
     publish(given, found, docs=docs_table)
 
 

@@ -14,15 +14,10 @@ either kind, which other work on the machine disturbs least. ``ms_state`` is the
 The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share. The town needs SUMO's
 netgenerate and netconvert (eclipse-sumo); without them only the motorway is measured.
 
-    python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
-        [--visibility 100] [--profile]
-
-``--blind`` leaves perception and speed choice out; ``--profile`` shows where the time of the whole steps goes.
+    python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10]
 """
 
-import cProfile
 import dataclasses
-import pstats
 import statistics
 import tempfile
 import time
@@ -35,8 +30,7 @@ from traffic_town import has_programs, town_configuration
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
 from fogsim.scenario.loading import clock_settings, scenario_from_config
-from fogsim.traffic import DriverSetup, TrafficSetup
-from fogsim.traffic.drivers.speed_choice import Unaffected
+from fogsim.traffic import TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.units import extinction_from_visibility
@@ -44,6 +38,7 @@ from fogsim.values import Command, FogField
 
 LENGTH, OCCUPIED, LANES, WIDTH = 15_000.0, 10_000.0, 3, 3.75
 LIMIT = 36.0
+VISIBILITY = 100.0
 STEP = 0.1
 STEPS = 20
 """Steps in a block: two seconds, in which drivers choose a speed twice."""
@@ -114,27 +109,16 @@ def timed(call: Callable[[], object]) -> float:
 CONFIGURATIONS = {"motorway": configuration, "town": town_configuration}
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Task:
-    """What is measured: a network, for a time [s], in a visibility [m], with drivers who see through it or not."""
-
-    network: str
-    seconds: float
-    visibility: float
-    blind: bool
-
-
-def measure(task: Task, vehicles: int, profile: cProfile.Profile | None) -> dict[str, float]:
-    """One record."""
+def measure(network: str, vehicles: int, seconds: float) -> dict[str, float]:
+    """One record, measured for a time [s]."""
     link = LibsumoLink()
     blocks: list[Block] = []
-    until = time.perf_counter() + task.seconds
-    fog = FogField(extinction_from_visibility(task.visibility), (3000.0, 3000.0, 3000.0))
+    until = time.perf_counter() + seconds
+    fog = FogField(extinction_from_visibility(VISIBILITY), (3000.0, 3000.0, 3000.0))
     with tempfile.TemporaryDirectory() as name:
-        config = CONFIGURATIONS[task.network](Path(name), vehicles)
-        traffic = SumoTraffic(setup(config, task.blind), link)
-        if not task.blind:
-            traffic.enter_fog(FieldAccess(fog))
+        config = CONFIGURATIONS[network](Path(name), vehicles)
+        traffic = SumoTraffic(setup(config), link)
+        traffic.enter_fog(FieldAccess(fog))
         for number in range(ROUNDS):
             if number and time.perf_counter() > until:
                 break
@@ -142,27 +126,24 @@ def measure(task: Task, vehicles: int, profile: cProfile.Profile | None) -> dict
             for _ in range(100):
                 traffic.advance(Command())
                 traffic.observe()
-            blocks += [block(traffic, link, profile) for _ in range(BLOCKS)]
+            blocks += [block(traffic, link) for _ in range(BLOCKS)]
         snapshot = traffic.observe()
         traffic.close()
     return {**summary(blocks), "vehicles_read": 0 if snapshot is None else len(snapshot.state.ids)}
 
 
-def setup(config: Path, blind: bool) -> TrafficSetup:
+def setup(config: Path) -> TrafficSetup:
     """The simulation."""
     clocks = clock_settings(STEP, STEP, STEP)
-    usual = build.traffic_setup(scenario_from_config(config, "ego", [*clocks, "fog.visibility_m=100"]))
-    usual = dataclasses.replace(usual, reading_radius=1000.0)
-    if not blind:
-        return usual
-    return dataclasses.replace(usual, sight=None, drivers=DriverSetup(Unaffected()))
+    usual = build.traffic_setup(scenario_from_config(config, "ego", [*clocks, f"fog.visibility_m={VISIBILITY}"]))
+    return dataclasses.replace(usual, reading_radius=1000.0)
 
 
 Block = tuple[float, float, float]
 """Milliseconds that a bare SUMO step, a whole step, and the reading in it take on average."""
 
 
-def block(traffic: SumoTraffic, link: LibsumoLink, profile: cProfile.Profile | None) -> Block:
+def block(traffic: SumoTraffic, link: LibsumoLink) -> Block:
     """A block of bare and one of whole steps."""
     command = Command()
     bare = sum(timed(link.step) for _ in range(STEPS))
@@ -170,13 +151,9 @@ def block(traffic: SumoTraffic, link: LibsumoLink, profile: cProfile.Profile | N
     traffic.advance(command)
     traffic.observe()
     moving = reading = 0.0
-    if profile is not None:
-        profile.enable()
     for _ in range(STEPS):
         moving += timed(lambda: traffic.advance(command))
         reading += timed(traffic.observe)
-    if profile is not None:
-        profile.disable()
     return bare / STEPS, (moving + reading) / STEPS, reading / STEPS
 
 
@@ -202,21 +179,12 @@ def main() -> None:
         __doc__,
         vehicles=([20, 100, 500, 2000], "vehicles"),
         network=(list(CONFIGURATIONS) if has_programs() else ["motorway"], "which", CONFIGURATIONS),
-        visibility=(100.0, "V_met [m]"),
-        profile=(False, "tell where the time goes, and no ratio to be trusted"),
         seconds=(10.0, "time to measure for each number"),
-        blind=(False, "leave perception and speed choice out"),
     )
     if "town" in given.network and not has_programs():
         given.error("--network town needs SUMO's netgenerate and netconvert: pip install eclipse-sumo")
-    profile = cProfile.Profile() if given.profile else None
-    records = []
-    for network in given.network:
-        task = Task(network, given.seconds, given.visibility, given.blind)
-        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in given.vehicles]
-    publish(given, records)
-    if profile is not None and not given.json:
-        pstats.Stats(profile).sort_stats("tottime").print_stats(40)
+    cases = [(network, vehicles) for network in given.network for vehicles in given.vehicles]
+    publish(given, [{"network": one, "vehicles": n, **measure(one, n, given.seconds)} for one, n in cases])
 
 
 if __name__ == "__main__":

@@ -26,73 +26,24 @@ def __getattr__(name: str) -> Any:
 # A reward_threshold lies halfway between FogSim's rule, which goes by the belief alone, and the oracle, which knows the
 # fog: docs/reference/environments.md has the returns.
 
-gymnasium.register(
-    id="fogsim/FogAdvisory-v0",
-    entry_point="fogsim_envs.advisory:FogAdvisoryEnv",
-)
-
-gymnasium.register(
-    id="fogsim/FogHighway-v0",
-    entry_point="fogsim_envs.highway:FogHighwayEnv",
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisory-v1",
-    entry_point="fogsim_envs.task:FogAdvisoryV1Env",
-    max_episode_steps=600,
-    reward_threshold=25.0,
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisoryFast-v1",
-    entry_point="fogsim_envs.task:FogAdvisoryFastEnv",
-    max_episode_steps=520,
-    reward_threshold=21.0,
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisoryBatch-v1",
-    vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchEnv",
-    reward_threshold=21.0,
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisory-v2",
-    entry_point="fogsim_envs.task:FogAdvisoryV2Env",
-    max_episode_steps=600,
-    reward_threshold=29.1,
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisoryFast-v2",
-    entry_point="fogsim_envs.task:FogAdvisoryFastV2Env",
-    max_episode_steps=520,
-    reward_threshold=26.0,
-)
-
-gymnasium.register(
-    id="fogsim/FogAdvisoryBatch-v2",
-    vector_entry_point="fogsim_envs.batch:FogAdvisoryBatchV2Env",
-    reward_threshold=26.0,
-)
-
-gymnasium.register(
-    id="fogsim/FogDrive-v2",
-    entry_point="fogsim_envs.task:FogDriveV2Env",
-    max_episode_steps=600,
-    reward_threshold=29.1,
-)
-
-gymnasium.register(
-    id="fogsim/FogHighway-v1",
-    entry_point="fogsim_envs.task.highway:FogHighwayV1Env",
-    max_episode_steps=375,
-    reward_threshold=33.6,
-)
-
-gymnasium.register(
-    id="fogsim/FogDrive-v1",
-    entry_point="fogsim_envs.task:FogDriveEnv",
-    max_episode_steps=600,
-    reward_threshold=25.0,
-)
+for _name, _entry, _steps, _threshold in (
+    ("FogAdvisory-v0", "fogsim_envs.advisory:FogAdvisoryEnv", None, None),
+    ("FogHighway-v0", "fogsim_envs.highway:FogHighwayEnv", None, None),
+    ("FogAdvisory-v1", "fogsim_envs.task:FogAdvisoryV1Env", 600, 25.0),
+    ("FogAdvisoryFast-v1", "fogsim_envs.task:FogAdvisoryFastEnv", 520, 21.0),
+    ("FogAdvisoryBatch-v1", "fogsim_envs.batch:FogAdvisoryBatchEnv", None, 21.0),
+    ("FogAdvisory-v2", "fogsim_envs.task:FogAdvisoryV2Env", 600, 29.1),
+    ("FogAdvisoryFast-v2", "fogsim_envs.task:FogAdvisoryFastV2Env", 520, 26.0),
+    ("FogAdvisoryBatch-v2", "fogsim_envs.batch:FogAdvisoryBatchV2Env", None, 26.0),
+    ("FogDrive-v2", "fogsim_envs.task:FogDriveV2Env", 600, 29.1),
+    ("FogHighway-v1", "fogsim_envs.task.highway:FogHighwayV1Env", 375, 33.6),
+    ("FogDrive-v1", "fogsim_envs.task:FogDriveEnv", 600, 25.0),
+):
+    _is_vector = "Batch" in _name
+    gymnasium.register(
+        id=f"fogsim/{_name}",
+        entry_point=None if _is_vector else _entry,
+        vector_entry_point=_entry if _is_vector else None,
+        max_episode_steps=_steps,
+        reward_threshold=_threshold,
+    )

@@ -34,7 +34,7 @@ class Policy(Protocol):
         """Forget earlier episodes."""
 
 
-class Unremembering:
+class _Unremembering:
     """A policy that remembers nothing, in an action space of advice and lamps."""
 
     def __init__(self, action_space: spaces.Space[Any]) -> None:
@@ -50,7 +50,7 @@ class Unremembering:
         return np.asarray(np.ravel_multi_index(tuple(action), ACTION_LEVELS)) if is_flat else action
 
 
-class NoAdvice(Unremembering):
+class NoAdvice(_Unremembering):
     """Advise nothing, with dipped head lamps: what happens when drivers are left alone."""
 
     def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
@@ -58,7 +58,7 @@ class NoAdvice(Unremembering):
         return self.action(math.inf, LAMP_MODES[0])
 
 
-class FixedSpeed(Unremembering):
+class FixedSpeed(_Unremembering):
     """Advise one speed always (`speed` [m/s])."""
 
     def __init__(self, action_space: spaces.Space[Any], speed: float = 50.0 / KMH_PER_MPS) -> None:
@@ -70,7 +70,7 @@ class FixedSpeed(Unremembering):
         return self.action(self._speed, LAMP_MODES[0])
 
 
-class BuiltInRule(Unremembering):
+class _BuiltInRule(_Unremembering):
     """What the scenario's own adviser and lighting policy say, by the belief in the loop."""
 
     def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
@@ -78,7 +78,7 @@ class BuiltInRule(Unremembering):
         return self.action(info["built_in_advice_mps"], Lamp(info["built_in_lamps"]))
 
 
-class Oracle(Unremembering):
+class _Oracle(_Unremembering):
     """Knows the sight ahead, and takes the speed at which each metre costs least by the reward's weights.
 
     It knows nothing of what others will do, so it is no upper bound.
@@ -109,7 +109,7 @@ class Oracle(Unremembering):
         return self._weights.time * limit / speed + self._weights.overdriving * max(0.0, 1.0 - sight / needed)
 
 
-class RandomActions:
+class _RandomActions:
     """Any action, as likely as any other."""
 
     def __init__(self, action_space: spaces.Space[Any]) -> None:
@@ -127,7 +127,7 @@ class RandomActions:
 
 BASELINES: Registry[Callable[..., Policy]] = Registry(
     "baseline",
-    {"none": NoAdvice, "fixed": FixedSpeed, "rule": BuiltInRule, "oracle": Oracle, "random": RandomActions},
+    {"none": NoAdvice, "fixed": FixedSpeed, "rule": _BuiltInRule, "oracle": _Oracle, "random": _RandomActions},
 )
 """Baselines by name."""
 

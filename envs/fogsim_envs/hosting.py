@@ -108,7 +108,7 @@ def begin_traffic(
 ) -> tuple[TrafficSimulation, TrafficStep]:
     """Start a scenario without an ego, here or in a child process if another simulation runs here (`timeout` [s])."""
     begun: TrafficSimulation
-    if isinstance(simulation, HostedTraffic):
+    if isinstance(simulation, _HostedTraffic):
         simulation.change(scenario)
         begun = simulation
     else:
@@ -118,7 +118,7 @@ def begin_traffic(
     try:
         return begun, begun.start(seed)[0]
     except SimulationRunningError:
-        begun = HostedTraffic(scenario, timeout)
+        begun = _HostedTraffic(scenario, timeout)
         return begun, begun.start(seed)[0]
     except BaseException:
         begun.close()
@@ -214,7 +214,7 @@ class HostedLoop(_Host):
         return cast("Step", self._ask("advance", command))
 
 
-class HostedTraffic(_Host):
+class _HostedTraffic(_Host):
     """Traffic without an ego in a child process; see `_Host` for parameters."""
 
     def start(self, seed: int) -> tuple[TrafficStep, float]:

@@ -24,7 +24,7 @@ RENDER_MODES = ("human", "rgb_array")
 _INSTEAD = "take 'rgb_array', or start it under xvfb-run"
 
 
-def has_display() -> bool:
+def _has_display() -> bool:
     """Whether a window can be opened here, or a driver of SDL is requested, such as ``SDL_VIDEODRIVER=dummy``."""
     if sys.platform in {"win32", "darwin"}:
         return True
@@ -33,7 +33,7 @@ def has_display() -> bool:
 
 def render_modes() -> list[str]:
     """Modes that work on this computer as it is."""
-    return [mode for mode in RENDER_MODES if mode != "human" or has_display()]
+    return [mode for mode in RENDER_MODES if mode != "human" or _has_display()]
 
 
 class StepRenderer:
@@ -42,7 +42,7 @@ class StepRenderer:
     def __init__(self, mode: str | None, title: str, make_panel: Callable[[], FramePanel] = FramePanel) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise UnknownNameError("render_mode", mode, RENDER_MODES)
-        if mode == "human" and not has_display():
+        if mode == "human" and not _has_display():
             raise InputError(
                 "render_mode: 'human' opens a window, and there is no display here (none of DISPLAY, WAYLAND_DISPLAY "
                 f"and SDL_VIDEODRIVER is set); {_INSTEAD}"

@@ -81,7 +81,7 @@ def pedal_acceleration(pedal: float) -> float:
     return pedal * (_LARGEST_ACCELERATION if pedal > 0.0 else _HARDEST_BRAKING)
 
 
-class TrainedAgent:
+class _TrainedAgent:
     """A network that drives: ``onnx:policy.onnx`` has its weights, and the spaces as the shapes of input and output.
 
     It is given `AGENT_STATE`, entries of ``state`` of ``fogsim/FogDrive-v1``, and gives the first entry of its
@@ -123,7 +123,7 @@ class TrainedAgent:
         return Control(pedal_acceleration(min(max(found.item(), -1.0), 1.0)))
 
 
-def trained_agent(name: str, path: Path, time_limit: float | None = None) -> Callable[[], TrainedAgent]:
+def trained_agent(name: str, path: Path, time_limit: float | None = None) -> Callable[[], _TrainedAgent]:
     """Factory of the agent whose network is in a file; InputError if it cannot be one."""
     network = read_network(path)
     inputs = network.session.get_inputs()
@@ -131,4 +131,4 @@ def trained_agent(name: str, path: Path, time_limit: float | None = None) -> Cal
     if len(shape) != 2 or shape[1] != len(AGENT_STATE) or (isinstance(shape[0], int) and shape[0] != 1):
         raise network.wrong_input(_INPUT)
     network.check_output(np.zeros((1, len(AGENT_STATE)), np.float32), "a state of zeros", _OUTPUT, {(1, 1), (1,)})
-    return functools.partial(TrainedAgent, name, network, time_limit)
+    return functools.partial(_TrainedAgent, name, network, time_limit)

@@ -42,7 +42,7 @@ class Exposure(NamedTuple):
 
 
 @kernel
-def develop(
+def _develop(
     luminance: NDArray[np.float32],
     exposure: Exposure,
     response: NDArray[np.uint8] | NDArray[np.uint16],
@@ -125,7 +125,7 @@ def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) 
 
 
 @kernel
-def luminance_samples(image: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
+def _luminance_samples(image: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
     """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block.
 
     Takes `image` (rows, cols, 3) [cd/m²], `out` [cd/m²].
@@ -192,7 +192,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
 
     def expose_rows(_: int, top: int, bottom: int) -> None:
         begin, end = 3 * columns * top, 3 * columns * bottom
-        develop(light, exposure, table, begin, end, values)
+        _develop(light, exposure, table, begin, end, values)
 
     Bands().work(expose_rows, rows, columns)
     return out
@@ -247,7 +247,7 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
     rows, cols = radiance.shape[:2]
     stride = max(1, round(math.sqrt(rows * cols / _SAMPLES)))
     samples = np.empty((rows // stride, cols // stride), np.float32)
-    luminance_samples(np.ascontiguousarray(radiance, dtype=np.float32), stride, samples)
+    _luminance_samples(np.ascontiguousarray(radiance, dtype=np.float32), stride, samples)
     if metering is Metering.HIGHLIGHTS:
         place = int(_HIGHLIGHT_SHARE * (samples.size - 1))
         return float(np.partition(samples.ravel(), place)[place])

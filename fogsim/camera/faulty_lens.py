@@ -121,7 +121,7 @@ STEP = 4
 """Rows and columns of the blocks of the image that share one value of a drop's light [px]; the pupil is far wider."""
 
 
-class DirtyGlass:
+class _DirtyGlass:
     """Dirt takes light from the road and sends some of the light around into the camera: L' = L T + (1 − T) ρ L̄.
 
     T is what blots leave (Gu et al. 2009, eq. 3), L̄ the mean of the picture, which stands for the light around.
@@ -138,7 +138,7 @@ class DirtyGlass:
         return behind
 
 
-class WetGlass:
+class _WetGlass:
     """Drops show the whole scene upside down and out of focus; the film of water between them blurs the picture.
 
     A drop is a wide-angle lens of some millimetres' focal length (Garg and Nayar 2003; You et al. 2016, Adherent
@@ -246,7 +246,7 @@ class _Glass(Protocol):
         """Luminance behind the glass (rows, cols, 3) [cd/m²]."""
 
 
-class SunGlare:
+class _SunGlare:
     """A small source of light that nothing hides, and the veil that the windscreen makes of it."""
 
     def __init__(self, camera: Camera, glare: Glare) -> None:
@@ -304,9 +304,9 @@ def _glass_with(fault: RunningFault, camera: Camera) -> _Glass:
     rng.bit_generator.state = fault.rng.bit_generator.state
     match fault.kind:
         case DirtyLens() as dirt:
-            return DirtyGlass(camera, dirt, rng)
+            return _DirtyGlass(camera, dirt, rng)
         case WetLens() as water:
-            return WetGlass(camera, water, rng)
+            return _WetGlass(camera, water, rng)
         case Glare() as glare:
-            return SunGlare(camera, glare)
+            return _SunGlare(camera, glare)
     raise TypeError(f"{fault.kind} is nothing on the glass")

@@ -22,7 +22,7 @@ class Places(NamedTuple):
 
 
 @kernel
-def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
+def _count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
     """Count the values above a limit, by row and in all. A sum of integers, so that compilers emit vector instructions.
 
     Takes `lines` (rows, 3 · cols), `counts` (rows,) int32.
@@ -45,7 +45,7 @@ def _scattered(line: NDArray[np.float32], at: int, limit: np.float32, share: np.
 
 
 @kernel
-def share_among_cells(
+def _share_among_cells(
     lines: NDArray[np.float32],
     counts: NDArray[np.int32],
     limit: np.float32,
@@ -76,7 +76,7 @@ def share_among_cells(
 
 
 @kernel
-def coarsen_grid(
+def _coarsen_grid(
     fine: NDArray[np.float32],
     rows: Places,
     columns: Places,
@@ -105,7 +105,9 @@ def coarsen_grid(
 
 
 @kernel
-def blur_grid(grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]) -> None:
+def _blur_grid(
+    grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]
+) -> None:
     """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost.
 
     Takes `grid`, `out` (rows, 3 · cols), `taps` (2 n + 1,).
@@ -152,7 +154,7 @@ def _spread_across(
 
 
 @kernel
-def interpolate_columns(
+def _interpolate_columns(
     grid: NDArray[np.float32],
     columns: Places,
     wide: NDArray[np.float32],
@@ -171,7 +173,7 @@ def interpolate_columns(
 
 
 @kernel
-def add_interpolated_rows(
+def _add_interpolated_rows(
     lines: NDArray[np.float32],
     wide: NDArray[np.float32],
     rows: Places,
@@ -192,7 +194,7 @@ def add_interpolated_rows(
 
 
 @kernel
-def spread_core(
+def _spread_core(
     lines: NDArray[np.float32],
     counts: NDArray[np.int32],
     limit: np.float32,
@@ -290,10 +292,10 @@ class LensGlare:
         """
         lines = np.ascontiguousarray(radiance, dtype=np.float32).reshape(radiance.shape[0], -1)
         counts, limit = np.empty(lines.shape[0], np.int32), np.float32(BRIGHT * saturation)
-        if self._share == 0 or count_bright(lines, limit, counts) == 0:
+        if self._share == 0 or _count_bright(lines, limit, counts) == 0:
             return radiance
         out = self._with_tail(lines, counts, limit) if self._levels else lines.copy()
-        spread_core(lines, counts, limit, self._share, self._taps, self._core, out)
+        _spread_core(lines, counts, limit, self._share, self._taps, self._core, out)
         return out.reshape(radiance.shape)
 
     def _with_tail(
@@ -304,9 +306,9 @@ class LensGlare:
         below = np.zeros_like(grids[-1])
         for number in range(len(grids) - 1, -1, -1):
             level = self._levels[number]
-            blur_grid(grids[number], level.taps, level.gain, below)
+            _blur_grid(grids[number], level.taps, level.gain, below)
             wide = np.empty((below.shape[0], 3 * level.columns.at.size), np.float32)
-            interpolate_columns(below, level.columns, wide)
+            _interpolate_columns(below, level.columns, wide)
             if number > 0:
                 below = self._added(np.zeros_like(grids[number - 1]), wide, level)
         return self._added(lines, wide, self._levels[0])
@@ -317,16 +319,16 @@ class LensGlare:
         """Scattered light in each level's grid, from fine to coarse."""
         grids = [np.zeros(level.shape, np.float32) for level in self._levels]
         rows, columns = self._levels[0].rows, self._levels[0].columns
-        share_among_cells(lines, counts, limit, self._share, rows, columns, grids[0])
+        _share_among_cells(lines, counts, limit, self._share, rows, columns, grids[0])
         for level, (fine, coarse) in zip(self._levels[1:], itertools.pairwise(grids), strict=True):
-            coarsen_grid(fine, level.rows, level.columns, coarse)
+            _coarsen_grid(fine, level.rows, level.columns, coarse)
         return grids
 
     def _added(self, lines: NDArray[np.float32], wide: NDArray[np.float32], level: _Level) -> NDArray[np.float32]:
         out = np.empty_like(lines)
 
         def add(_: int, begin: int, end: int) -> None:
-            add_interpolated_rows(lines, wide, level.rows, begin, end, out)
+            _add_interpolated_rows(lines, wide, level.rows, begin, end, out)
 
         self._bands.work(add, lines.shape[0], lines.shape[1] // 3)
         return out

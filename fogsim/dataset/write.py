@@ -43,7 +43,7 @@ _CATEGORIES = [
 """COCO categories: ids are those of the semantic masks."""
 
 
-def frame_record(step: Step) -> dict[str, Any]:
+def _frame_record(step: Step) -> dict[str, Any]:
     """Entry of one frame: the ground truth and the vehicle's inputs; infinite visibility is null."""
     truth, observation = step.truth, step.observation
     return {
@@ -362,7 +362,7 @@ def _write_frame(directory: DatasetDirectory, number: int, step: Step, run_numbe
     }
     about = {"width": image.shape[1], "height": image.shape[0], "run": run_number, "seed": seed + run_number}
     objects = object_records(step, instance, through)
-    directory.write(number, layers, {"image": {**about, **frame_record(step)}, "annotations": objects})
+    directory.write(number, layers, {"image": {**about, **_frame_record(step)}, "annotations": objects})
 
 
 def _write_annotations(directory: DatasetDirectory, scenario: Scenario, frames: int, seed: int, every: int) -> int:

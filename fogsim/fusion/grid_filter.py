@@ -31,7 +31,7 @@ _NEARER, _FARTHER = 0.35, 0.2
 of its distance [-]. What seems to be fog beyond a crest recedes."""
 
 
-class Announcements:
+class _Announcements:
     """Follows what estimates say of denser fog ahead.
 
     A bank stands, or comes nearer as one drives; what one picture takes for fog and the next does not, or elsewhere, is
@@ -169,7 +169,7 @@ class GridFilter:
         self._drift, self._leap_scale = drift, leap_scale
         self._relative_floor, self._outlier_share = relative_floor, outlier_share
         self._correlation_time, self._unseen_deviation = correlation_time, unseen_deviation
-        self._announcements = Announcements(announcement_time)
+        self._announcements = _Announcements(announcement_time)
         self._leap_rates = leap_rate, max(leap_rate, announced_leap_rate)
         self._log_extinction = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
         self._log_extinction.flags.writeable = False

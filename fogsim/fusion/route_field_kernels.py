@@ -50,7 +50,7 @@ def condition(mean: Floats, covariance: Floats, toward: Floats, moved: float, na
 
 
 @kernel
-def spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
+def _spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
     """Covariance of all cells with a linear function of them, and its variance.
 
     Takes `covariance` (n, n), `gradient` (n,).
@@ -105,7 +105,7 @@ def linearised(mean: Floats, covariance: Floats, weights: Floats) -> tuple[float
     Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
     value, gradient = mean_extinction(mean, weights)
-    shared, variance = spread_with(covariance, gradient)
+    shared, variance = _spread_with(covariance, gradient)
     differing = -variance
     for i in range(mean.size):
         differing += gradient[i] * covariance[i, i]
@@ -169,7 +169,7 @@ def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> F
 def roll(mean: Floats, covariance: Floats, weights: Floats, level: float, rest: float) -> None:
     """Leave the hindmost cell and enter the next one ahead, in place (`mean`, `covariance` (n, n), `weights` (n,))."""
     count = mean.size
-    shared, variance = spread_with(covariance, weights)
+    shared, variance = _spread_with(covariance, weights)
     value = level
     for i in range(count):
         value += weights[i] * (mean[i] - level)

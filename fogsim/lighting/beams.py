@@ -14,9 +14,6 @@ from fogsim.values import Beam, HeadLamp, Lamp
 from fogsim.values.light import Side, burning
 from fogsim.values.luminous_intensity import checked_beam, luminous_intensity
 
-ECE_LEVEL = 0.40
-"""Intensity below the cut-off of the ECE-style beam relative to the US median low beam [-]: 0.3 … 0.45."""
-
 FRONT_FOG_PEAK = 4000.0
 """Largest intensity of the front fog lamp [cd]; class F3 may have up to 8600 … 12000 cd."""
 
@@ -31,26 +28,6 @@ def low_beam() -> Beam:
 def high_beam() -> Beam:
     """Median high beam of US cars of 2001, one lamp (UMTRI-2001-19, table 6)."""
     return _packaged("umtri_high_beam.csv")
-
-
-@cache
-def ece_low_beam() -> Beam:
-    """Low beam with a European cut-off, for traffic that keeps to the right: sharp, 0.57° down, rising to the right.
-
-    Below the cut-off it is the US median low beam times `ECE_LEVEL`; above, the stray light that zone III of UNECE
-    R112 allows. The level is inferred from gallen2014's eq. (12), not measured.
-    """
-    right = np.radians(np.unique(np.concatenate((np.arange(-45.0, 46.0, 5.0), np.arange(-10.0, 10.01, 0.5)))))
-    up = np.radians(
-        np.concatenate((np.arange(-5.0, -1.0, 0.5), np.arange(-1.0, 1.2, 0.05), np.arange(1.25, 7.1, 0.25)))
-    )
-    below = luminous_intensity(low_beam(), right, up[:, None])
-    tilt = np.minimum(np.maximum(right, 0.0) * math.tan(math.radians(15.0)), math.radians(1.0))
-    over_edge = np.degrees(up[:, None] - (math.radians(-0.57) + tilt))
-    stray = np.minimum(below, 400.0 * np.exp(-np.maximum(over_edge, 0.0) / 0.8) + 80.0)
-    # A lens blurs the cut-off over some tenths of a degree.
-    lit = 1.0 / (1.0 + np.exp(over_edge / 0.08))
-    return checked_beam(Beam(right, up, lit * ECE_LEVEL * below + (1.0 - lit) * np.minimum(stray, 625.0)))
 
 
 @cache

@@ -88,7 +88,7 @@ class TrafficEmissions(TrafficMetric):
         }
 
 
-class SpeedsByNumber:
+class _SpeedsByNumber:
     """Time and way of each vehicle, or in each lane, by its number."""
 
     def __init__(self) -> None:
@@ -129,8 +129,8 @@ class TrafficFlow(TrafficMetric):
     _lost: float = 0.0
     _free_time: float = 0.0
     _free_way: float = 0.0
-    _vehicles: SpeedsByNumber = field(default_factory=SpeedsByNumber)
-    _lanes: SpeedsByNumber = field(default_factory=SpeedsByNumber)
+    _vehicles: _SpeedsByNumber = field(default_factory=_SpeedsByNumber)
+    _lanes: _SpeedsByNumber = field(default_factory=_SpeedsByNumber)
     _lane_names: tuple[str, ...] = ()
 
     def add(self, span: TrafficSpan) -> None:

@@ -27,7 +27,7 @@ AHEAD = 200.0
 
 
 @dataclass(slots=True)
-class AheadCurves:
+class _AheadCurves:
     """Visibility at a place `AHEAD` of the ego over time [m]: true (None in clear air), and believed."""
 
     # time, truth, low, belief, high: time [s]; `low` and `high` are the ends of the 90 % interval. Empty where nothing
@@ -70,7 +70,7 @@ class Curves:
     estimates: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     collisions: list[float] = field(default_factory=list)  # Instants of collisions [s]
     warning: list[DriverWarning | None] = field(default_factory=list)  # What the driver was warned of, one entry a step
-    ahead: AheadCurves = field(default_factory=AheadCurves)  # What was believed of a place ahead
+    ahead: _AheadCurves = field(default_factory=_AheadCurves)  # What was believed of a place ahead
 
     def add(self, step: Step, derived: Derived) -> None:
         """Take in one step."""
@@ -354,7 +354,7 @@ def _draw_visibility(axis: Axes, curves: Curves) -> None:
     scale_visibility(axis)
 
 
-def _draw_ahead(axis: Axes, curves: AheadCurves) -> None:
+def _draw_ahead(axis: Axes, curves: _AheadCurves) -> None:
     low, high = (np.clip(plottable(values), *_ends()) for values in (curves.low, curves.high))
     axis.fill_between(curves.time, low, high, color=BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
     believed = np.clip(plottable(curves.belief), *_ends())

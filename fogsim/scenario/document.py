@@ -77,10 +77,10 @@ def _displaced(block: str, key: str, parent: Mapping[Any, Any]) -> list[Any]:
     siblings = [
         sibling
         for (where, name), siblings in _TAKES_THE_PLACE_OF.items()
-        if where == block and (name == key or same_quantity(name, key))
+        if where == block and (name == key or _same_quantity(name, key))
         for sibling in siblings
     ]
-    return [other for other in parent if any(other == one or same_quantity(str(other), one) for one in siblings)]
+    return [other for other in parent if any(other == one or _same_quantity(str(other), one) for one in siblings)]
 
 
 def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) -> None:
@@ -92,14 +92,14 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
             block[key] = {}
         block = block[place]
     if isinstance(block, dict):
-        for other in [key for key in block if key != path[-1] and same_quantity(str(key), path[-1])]:
+        for other in [key for key in block if key != path[-1] and _same_quantity(str(key), path[-1])]:
             del block[other]
         block[path[-1]] = value
     else:
         block[_place(block, path[-1], path, text)] = value
 
 
-def same_quantity(key: str, other: str) -> bool:
+def _same_quantity(key: str, other: str) -> bool:
     """Whether two keys differ only by a unit suffix on one of them: ``speed`` and ``speed_kmh``."""
     shorter, longer = sorted((key, other), key=len)
     stem, _, suffix = longer.rpartition("_")

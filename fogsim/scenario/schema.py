@@ -98,7 +98,7 @@ _DUSK, _NIGHT = 100.0, 0.1
 """Horizontal illuminance below which methods for the night are of use, and those for the day are not [lx]."""
 
 
-def estimators_by_light(read: Mapping[str, Any]) -> tuple[Method, ...]:
+def _estimators_by_light(read: Mapping[str, Any]) -> tuple[Method, ...]:
     """Estimators for the light that there may be in a run, by what was read of a scenario."""
     light, timeline = read.get("light", Light()), read.get("timeline", ())
     darkest, brightest = light_range(timeline, light.illuminance_lx)
@@ -185,7 +185,7 @@ class ScenarioFile(Section):
     """The other sensors, and the faults of all."""
 
     estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
-        default_factory=estimators_by_light, validate_default=True
+        default_factory=_estimators_by_light, validate_default=True
     )
     """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`. By
     default those for the light: by night, below 0.1 lx in the whole run, `[night_road]`; where dusk may fall, below 100

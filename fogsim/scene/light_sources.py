@@ -42,7 +42,7 @@ luminous area as the eye sees it [m²], its intensity along its axis [cd], and i
 """
 
 
-class LampTable(NamedTuple):
+class _LampTable(NamedTuple):
     """Lamps of all bodies in their unit boxes."""
 
     place: NDArray[np.float64]  # (n, 3): Middles
@@ -64,7 +64,7 @@ class LampTable(NamedTuple):
     fall_off: float  # How fast that falls beyond the axes' ends [1/rad]
 
 
-class LampCarriers(NamedTuple):
+class _LampCarriers(NamedTuple):
     """Vehicles with lamps."""
 
     position: NDArray[np.float64]  # (v, 3): Middles of the front bumpers [m]
@@ -85,7 +85,7 @@ def _before(axis: NDArray[np.float64], value: float) -> tuple[int, float]:
 
 
 @kernel
-def _share_toward(lamps: LampTable, lamp: int, forward: float, left: float, up: float) -> float:
+def _share_toward(lamps: _LampTable, lamp: int, forward: float, left: float, up: float) -> float:
     """Share of its axial intensity that a lamp shines in a direction in the vehicle's axes."""
     ahead = forward * lamps.forwards[lamp]
     azimuth, elevation = math.atan2(abs(left), ahead), math.atan2(abs(up), math.hypot(ahead, left))
@@ -100,9 +100,9 @@ def _share_toward(lamps: LampTable, lamp: int, forward: float, left: float, up: 
 
 
 @kernel
-def find_lamps(
-    vehicles: LampCarriers,
-    lamps: LampTable,
+def _find_lamps(
+    vehicles: _LampCarriers,
+    lamps: _LampTable,
     eye: NDArray[np.float64],
     farthest: float,
     found: NDArray[np.float64],
@@ -250,7 +250,7 @@ class _Lamps:
 
     number: Mapping[str, int]
     colour: NDArray[np.float64]
-    lamps: LampTable
+    lamps: _LampTable
 
 
 def light_sources(
@@ -287,8 +287,8 @@ def _of_vehicles(
     if skip is not None:
         lamps[skip] = 0
     position = np.ascontiguousarray(state.position, np.float64)
-    vehicles = LampCarriers(position, turned, size, lamps, numbers)
-    count = find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
+    vehicles = _LampCarriers(position, turned, size, lamps, numbers)
+    count = _find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, _INTENSITY], lit[1], (found[:, _FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, _INTENSITY] > 1e-3)
@@ -379,7 +379,7 @@ def _lamps() -> _Lamps:
     return _Lamps(
         number={**{name: n for n, name in enumerate(bodies())}, **dict.fromkeys(LAMPLESS, len(bodies()))},
         colour=np.array(colour),
-        lamps=LampTable(
+        lamps=_LampTable(
             place=np.array(place),
             area=np.array(area),
             mask=np.array(mask),

@@ -97,7 +97,7 @@ def warn_of_unplayed(name: str, last: TrafficStep) -> None:
         warnings.warn(f"{name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
 
-class EntersFog(Protocol):
+class _EntersFog(Protocol):
     """A traffic simulation, as far as fog concerns it."""
 
     def enter_fog(self, fog: FogAccess) -> None:
@@ -126,7 +126,7 @@ class DriversFog:
         """
         return self._field == fog or (self._field is None and fog.extinction == 0 and not fog.banks)
 
-    def enter(self, fog: FogField, traffic: EntersFog) -> None:
+    def enter(self, fog: FogField, traffic: _EntersFog) -> None:
         """Pass the fog to a traffic; its place is known only when the ego's route is.
 
         Parameters

@@ -42,7 +42,7 @@ from fogsim.values.result_checks import checked_recorder
 AnyStep = TypeVar("AnyStep", bound=TrafficStep)
 
 
-class Recording(Generic[AnyStep]):
+class _Recording(Generic[AnyStep]):
     """Recorders of one run, from its first step until their files are in place.
 
     `failures` maps failed recorders to their errors; `files` are the names of the closed recording's files.
@@ -256,7 +256,7 @@ def _record(
             raise
         information = _information(what, config, record, seed, directory)
         opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
-        recording = Recording(directory, manifest, opened, what.metrics)
+        recording = _Recording(directory, manifest, opened, what.metrics)
         status, last, message = Status.FAILED, None, ""
         try:
             directory.clear_sumo_outputs()

@@ -67,7 +67,7 @@ def run_traffic(
         See `fogsim.run`.
     """
     config = scenario.run_config()
-    policy = MeteredAdvice(config)
+    policy = _MeteredAdvice(config)
     with TrafficRun(config, sumo_outputs=sumo_outputs) as traffic:
         step, limit = traffic.start(seed)
         yield step
@@ -77,7 +77,7 @@ def run_traffic(
     warn_of_unplayed(config.name, step)
 
 
-class MeteredAdvice:
+class _MeteredAdvice:
     """The run's adviser, who goes by the visibility meters; asked once a decision period."""
 
     def __init__(self, config: RunConfig) -> None:

@@ -70,7 +70,7 @@ class Grid:
         others = iter(panel)
         return tuple(policy if name == self.policy_factor else next(others) for name in self.study.factors)
 
-    def figure(self, height: float, across: int = 2, *, same_axes: bool = True) -> tuple[Figure, "PanelAxes"]:
+    def figure(self, height: float, across: int = 2, *, same_axes: bool = True) -> tuple[Figure, "_PanelAxes"]:
         """Figure with a panel of `height` [in] for each combination of the other factors, at most `across` in a row."""
         number = len(self.panels)
         columns = min(number, across)
@@ -86,10 +86,10 @@ class Grid:
                 axes.set_title(self.panels[panel], fontsize=8.5, loc="left", color=INK)
         for i, (_, axes) in enumerate(panels):
             axes.tick_params(labelbottom=not same_axes or i + columns >= number)
-        return figure, PanelAxes(panels)
+        return figure, _PanelAxes(panels)
 
 
-class PanelAxes:
+class _PanelAxes:
     """The panels of a figure, as levels and axes."""
 
     def __init__(self, panels: Sequence[tuple[tuple[str, ...], Axes]]) -> None:

@@ -120,7 +120,7 @@ Cell = tuple[str, ...]
 _SUMS = ROAD_COLUMNS[1:]
 
 
-class CollisionPlace(NamedTuple):
+class _CollisionPlace(NamedTuple):
     """Time [s], position (east, north) [m] and speed difference [m/s] of a collision.
 
     x and y are None if neither vehicle was near the ego.
@@ -147,7 +147,7 @@ class PooledProfiles:
     queue: NDArray[np.float64] = field(default_factory=lambda: np.zeros(CLASSES))
     road: dict[float, NDArray[np.float64]] = field(default_factory=dict)
     path: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
-    collisions: list[CollisionPlace] = field(default_factory=list)
+    collisions: list[_CollisionPlace] = field(default_factory=list)
 
     def add(self, seed: int, profiles: Profiles) -> None:
         """Add the profiles of one run, from `RunProfiles.to_json`."""
@@ -160,7 +160,7 @@ class PooledProfiles:
         path = np.array([profiles["path"]["x_m"], profiles["path"]["y_m"]]).T
         self.path = path if len(path) > len(self.path) else self.path
         columns = (hits[name] for name in ("time_s", "x_m", "y_m", "impact_speed_mps"))
-        self.collisions += [CollisionPlace(seed, *values) for values in zip(*columns, strict=True)]
+        self.collisions += [_CollisionPlace(seed, *values) for values in zip(*columns, strict=True)]
 
     def survival(self) -> NDArray[np.float64]:
         """Share of all vehicles' time with a time to collision above the upper end of each class [-].

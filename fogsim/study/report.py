@@ -54,7 +54,7 @@ class Methods:
         return "\n\n".join(parts) + "\n"
 
 
-def write_methods(study: Study, folder: Path) -> Methods:
+def _write_methods(study: Study, folder: Path) -> Methods:
     """Write ``methods.md`` and return its content."""
     found = study_methods(study)
     write_text(folder / "methods.md", found.markdown(f"Methods of the study {study.name}"))
@@ -350,7 +350,7 @@ def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> 
         figures=found.figures,
         comparisons=_comparisons(study, done, found),
         uninformative=_uninformative(study, found),
-        methods=write_methods(study, folder),
+        methods=_write_methods(study, folder),
         command=f"fogsim study {study.file} --out {folder}",
     )
 

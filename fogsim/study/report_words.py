@@ -22,7 +22,7 @@ _DENOMINATORS: Mapping[str | None, tuple[str, float]] = {
 """Metric that a rate's events are divided by, and how much of it is one unit."""
 
 
-class TableCell(NamedTuple):
+class _TableCell(NamedTuple):
     """A number, or a name with a hint, and small lines below it, the last ones bold."""
 
     text: str
@@ -35,7 +35,7 @@ class Table(NamedTuple):
     """A table whose last columns, as many as `numbers`, hold numbers."""
 
     head: Sequence[str]
-    rows: Sequence[Sequence[str | TableCell]]
+    rows: Sequence[Sequence[str | _TableCell]]
     numbers: int = 0
 
 
@@ -55,7 +55,7 @@ def main_tables(
         cells = [grid.cell(policy, panel) for policy in grid.policies]
         body = [
             [
-                TableCell(metric_words(metric).axis, _first_part(remarks.get(metric)), hint=metric),
+                _TableCell(metric_words(metric).axis, _first_part(remarks.get(metric)), hint=metric),
                 *(_mean_cell(study, metric, of_cell.get(cell, []), found.get((metric, cell))) for cell in cells),
             ]
             for metric in metrics
@@ -68,17 +68,17 @@ def _first_part(remark: str | None) -> list[str]:
     return [] if remark is None else [remark.partition(":")[0]]
 
 
-def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> TableCell:
+def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> _TableCell:
     scale = metric_words(metric).scale
     values = [v for row in rows if (v := number_of(row.get(metric))) is not None]
     text = short_number(scale * sum(values) / len(values)) if values else "–"
     events = _events(event_count(metric, rows))
     if one is None:
-        return TableCell(text, events)
+        return _TableCell(text, events)
     said = [one.untested or signed(scale * one.difference)]
     if one.low is not None and one.high is not None:
         said.append(f"({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})")
-    return TableCell(text, events, said) if one.is_shown(study.confidence) else TableCell(text, [*events, *said])
+    return _TableCell(text, events, said) if one.is_shown(study.confidence) else _TableCell(text, [*events, *said])
 
 
 def event_count(metric: str, rows: Sequence[Row]) -> int | None:
@@ -117,7 +117,7 @@ def comparison_table(
     cells = rows_of_cells(study.factors, rows)
     numbers = ("baseline", "mean", "difference", f"{percent(study.confidence)} interval", "p", "p adjusted", "seeds")
     head = ["metric", *study.factors, *numbers, f"seeds for ± {percent(study.wanted_interval)}"]
-    body: list[list[str | TableCell]] = []
+    body: list[list[str | _TableCell]] = []
     for one in differences:
         unknown = one.untested or remarks.get(one.metric, "–")
         interval = (
@@ -127,7 +127,7 @@ def comparison_table(
         body.append(
             [
                 *(one.metric, *one.levels.values()),
-                *(TableCell(short_number(mean), _events(count)) for mean, count in means),
+                *(_TableCell(short_number(mean), _events(count)) for mean, count in means),
                 *(signed(one.difference), interval),
                 *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
                 "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),

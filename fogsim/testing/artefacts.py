@@ -76,7 +76,7 @@ def keep_artefacts(
     ProcessPool(processes, work).run(runs, folder, lambda *_: watch(next(done), len(runs)))
     return {
         (run.key, finding.name, finding.clause): Artefacts(
-            _if_there(folder / name / f"{title_of(finding)}.svg"), _if_there(folder / name / _VIDEO)
+            _if_there(folder / name / f"{_title_of(finding)}.svg"), _if_there(folder / name / _VIDEO)
         )
         for name, (run, findings) in told.items()
         for finding in findings
@@ -90,7 +90,7 @@ def _folder_name(test: FogTest, run: StudyRun) -> str:
     return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}{'-' if label else ''}{label}")[:150]
 
 
-def title_of(finding: Finding) -> str:
+def _title_of(finding: Finding) -> str:
     """Name of an expectation and its clause, for file names."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", f"{finding.name}.{finding.clause}")
 
@@ -114,7 +114,7 @@ class KeepFailures:
         return outcome.get("message")
 
 
-def conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
+def _conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
     """Conditions of the clause that a finding is about."""
     for clause in clauses_of(scenario.expect):
         if (clause.name, clause.clause) == (finding.name, finding.clause):
@@ -134,7 +134,7 @@ def _kept(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Pa
 
 def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Path) -> None:
     instants = [one.time for one in findings if one.time is not None]
-    logs = {title_of(one): SignalLog(conditions_of(scenario, one)) for one in findings}
+    logs = {_title_of(one): SignalLog(_conditions_of(scenario, one)) for one in findings}
     has_frames = scenario.traffic.has_ego and scenario.renderer != NO_RENDERER
     steps: Iterable[TrafficStep] = run(scenario, seed) if scenario.traffic.has_ego else run_traffic(scenario, seed)
     video = VideoRecorder(folder / _VIDEO, scenario.clocks.camera_period_s) if has_frames and instants else None

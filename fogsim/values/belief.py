@@ -172,7 +172,7 @@ class Belief:
         """
         log_extinctions = 1.0 - np.array(shares)
         # Copies are of one type, for which the kernel is compiled.
-        put_quantiles(np.array(self.log_extinction, float), np.array(self.probability, float), log_extinctions)
+        _put_quantiles(np.array(self.log_extinction, float), np.array(self.probability, float), log_extinctions)
         return tuple((OPTICAL_DEPTH_AT_VISIBILITY / np.exp(log_extinctions)).tolist())
 
     @property
@@ -202,7 +202,7 @@ def _moments(values: NDArray[np.float64], probability: NDArray[np.float64]) -> t
 
 
 @kernel
-def put_quantiles(values: NDArray[np.float64], probability: NDArray[np.float64], shares: NDArray[np.float64]) -> None:
+def _put_quantiles(values: NDArray[np.float64], probability: NDArray[np.float64], shares: NDArray[np.float64]) -> None:
     """Put quantiles in the place of shares, by straight lines between the middles of cells.
 
     Takes `values`, `probability` (n,), `shares` (m,).

@@ -16,7 +16,7 @@ _Array = NDArray[np.float64]
 
 
 @kernel
-def share_inside(start: _Array, end: _Array, box: _Array) -> float:
+def _share_inside(start: _Array, end: _Array, box: _Array) -> float:
     """Share of a straight line that lies inside a box [-]; the same from either end, and 0 for one that touches it.
 
     Takes `start`, `end` (3,) [m], `box` (10,).
@@ -46,7 +46,7 @@ def share_inside(start: _Array, end: _Array, box: _Array) -> float:
 
 
 @kernel
-def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -> None:
+def _add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -> None:
     """Add to each line's way what of it lies inside boxes.
 
     Takes `starts`, `ends` (n, 3) [m], `boxes` (m, 10), `ways` (n,) [m].
@@ -55,11 +55,11 @@ def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -
         x, y, z = ends[line] - starts[line]
         length = np.sqrt(x * x + y * y + z * z)
         for box in boxes:
-            ways[line] += share_inside(starts[line], ends[line], box) * length
+            ways[line] += _share_inside(starts[line], ends[line], box) * length
 
 
 @kernel
-def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
+def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
     """Find for each pair of eyes whether boxes hide all points of its target.
 
     Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10), `bounds` (m, 4) [m], `hidden` (n,) bool.
@@ -71,7 +71,7 @@ def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hi
         for point in targets[one]:
             is_free = True
             for number in near[:count]:
-                if share_inside(eyes[one], point, boxes[number]) > 0.0:
+                if _share_inside(eyes[one], point, boxes[number]) > 0.0:
                     is_free = False
                     break
             if is_free:
@@ -124,7 +124,7 @@ class Obstructions:
         hidden = np.zeros(starts.shape[0], np.bool_)
         if self._boxes.size and hidden.size:
             points = np.ascontiguousarray(targets, np.float64).reshape(hidden.size, -1, 3)
-            find_hidden(starts, points, self._boxes, self._bounds, hidden)
+            _find_hidden(starts, points, self._boxes, self._bounds, hidden)
         return hidden
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
@@ -135,7 +135,7 @@ class Obstructions:
         first, last = (np.ascontiguousarray(points, np.float64).reshape(-1, 3) for points in (starts, ends))
         ways = np.zeros(len(first))
         if len(self._boxes):
-            add_ways_inside(first, last, self._boxes, ways)
+            _add_ways_inside(first, last, self._boxes, ways)
         return ways
 
 

@@ -72,7 +72,7 @@ def checked_belief(method: str, value: object) -> Belief:
             f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
         )
     # Copies have one type, for which the kernel is compiled.
-    is_ascending, least, total = distribution_of(np.array(cells, float), np.array(probability, float))
+    is_ascending, least, total = _distribution_of(np.array(cells, float), np.array(probability, float))
     if not (is_ascending and math.isfinite(cells[0]) and math.isfinite(cells[-1])):
         raise InputError(f"{who}: log_extinction must be finite and ascending, got {shown(cells)}")
     if not (least >= 0.0 and abs(total - 1.0) <= _SUM_TOLERANCE):
@@ -87,7 +87,7 @@ def checked_belief(method: str, value: object) -> Belief:
 
 
 @kernel
-def distribution_of(cells: NDArray[np.float64], probability: NDArray[np.float64]) -> tuple[bool, float, float]:
+def _distribution_of(cells: NDArray[np.float64], probability: NDArray[np.float64]) -> tuple[bool, float, float]:
     """Whether cells ascend, and the minimum and sum of their probabilities; NaN if one of them is NaN."""
     ascends, least, total = True, probability[0], probability[0]
     for i in range(1, len(cells)):

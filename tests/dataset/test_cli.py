@@ -8,7 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
 from early_motorway import EARLY
 
 from tests.helpers.command import Command
@@ -39,22 +38,3 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
     assert done.returncode == 0, done.stderr
     assert f"{there + 2} frames, 2 of them new" in done.stdout
     assert json.loads((out / "annotations.json").read_text(encoding="utf-8"))["info"]["complete"] is True
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--frames", "0"], "--frames: expected a whole number from 1 to 1000000, got '0'"),
-        (["--frames", "3", "--every", "0"], "--every: expected a whole number from 1 to 1000000, got '0'"),
-        (["--frames", "3", "--seed", "-1"], "--seed: expected a whole number from 0 to 9223372036854775807, got '-1'"),
-        (["--frames", "3", "--set", "camera.samples=9"], "camera.samples: input should be less than or equal to 3"),
-    ],
-)
-def test_bad_input_ends_in_one_message_and_writes_nothing(
-    arguments: list[str], message: str, tmp_path: Path, command: Command
-) -> None:
-    done = command("dataset", "motorway_fog_bank", "--out", str(tmp_path / "out"), *arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out").exists()

@@ -288,7 +288,9 @@ def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> 
 
 
 def test_last_digits_and_times_of_a_cell(docs: Callable[[str], ModuleType]) -> None:
-    moved = docs("page_tables").moved
+    same, moved = docs("page_tables").same, docs("page_tables").moved
+    for other in ("| 0.8 … 1.04 | 20 |", "| 0.82 … 1.04 | < 20 |", "| 0.82 … 1.04 | 20 | 1 |"):
+        assert not same("| 0.82 … 1.04 | 20 |", other)
     table = "\n| a | b | x |\n|---|---|---|\n| one | two | 1.0 / 2.00 |\nIt takes 3 ms.\n"
     assert moved("t", table, table.replace("2.00", "2.01").replace("3 ms", "4 ms")) == []
     (cell,) = moved("t", table, table.replace("2.00", "2.02"))

@@ -195,6 +195,7 @@ REFUSED: Sequence[tuple[Sequence[str], str]] = (
     (("estimate", "image.png", "--guess-camera", "--camera", "image.png", "--overwrite"), "would replace"),
     (("estimate", "image.png", "--guess-camera", "--camera", "mine/a"), "not a folder"),
     (("calibrate", "signs", *CALIBRATION, "camera.yaml"), "would replace"),
+    (("calibrate", "signs", "--camera", "camera.yaml", "--out", "mine"), "already exists"),
     (("calibrate", "halos", *CALIBRATION, "mine/a"), "not a folder"),
     (("reproduce", "negru2013", "--out", "mine"), "not a folder"),
     (("reproduce", "negru2013", "--out", "out"), "is a folder"),
@@ -206,7 +207,7 @@ def test_a_command_refuses_its_target_before_it_works(folder: Path, monkeypatch:
         raise AssertionError("the work has begun")
 
     for name in (
-        "fogsim.simulation.loop.ClosedLoop",
+        "fogsim.simulation.loop.ClosedLoop.__init__",
         "fogsim.study.pool.ProcessPool.run",
         "fogsim.offline.guess.guess_camera",
     ):

@@ -7,9 +7,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.lighting.beams import (
-    ECE_LEVEL,
     LampMount,
-    ece_low_beam,
     front_fog_beam,
     high_beam,
     low_beam,
@@ -61,16 +59,6 @@ def test_beyond_a_table_intensity_falls_without_a_step():
     edge, near, far = (toward(low_beam(), 0, up) for up in (-5.0, -5.01, -15.0))
     assert near == pytest.approx(edge, rel=0.01)
     assert far == pytest.approx(edge * 10**-0.7)
-
-
-def test_ece_cut_off_is_sharp_and_rises_to_the_right():
-    beam, us = ece_low_beam(), low_beam()
-    assert toward(beam, 0, -1.5) == pytest.approx(ECE_LEVEL * toward(us, 0, -1.5), rel=0.01)
-    assert toward(beam, 0, -0.3) < 0.15 * toward(beam, 0, -0.9)
-    # To the right the cut-off has risen by 3° tan 15° = 0.8°.
-    assert toward(beam, 3, 0.0) == pytest.approx(ECE_LEVEL * toward(us, 3, 0.0), rel=0.05)
-    right, up = np.radians(np.linspace(-20, 0, 41)), np.radians(np.linspace(0.0, 7.0, 71))
-    assert luminous_intensity(beam, right, up[:, None]).max() <= 625
 
 
 def test_front_fog_lamp_keeps_to_its_limits():

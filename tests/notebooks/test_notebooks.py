@@ -23,12 +23,6 @@ def read(path: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def anchors(page: Path) -> set[str]:
-    """Anchors that GitHub makes of a page's headings."""
-    titles = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
-
-
 def test_there_are_notebooks() -> None:
     assert [path.name[:2] for path in NOTEBOOKS] == [f"{number:02}" for number in range(1, len(NOTEBOOKS) + 1)]
 
@@ -50,17 +44,6 @@ def test_a_notebook_begins_and_ends_as_all_do(path: Path) -> None:
     assert re.search(rf"\nIt needs {install} and about [^.]+ on two cores", first.source)
     assert NEXT in last.source
     assert 3 <= len(re.findall(r"^- ", last.source.partition(NEXT)[2], re.MULTILINE)) <= 5
-
-
-@every_notebook
-def test_links_lead_somewhere(path: Path) -> None:
-    text = "\n".join(cell.source for cell in read(path).cells if cell.cell_type == "markdown")
-    for link in re.findall(r"\]\(([^)\s]+)\)", text):
-        if "://" in link:
-            continue
-        target, _, anchor = link.partition("#")
-        assert (FOLDER / target).is_file(), link
-        assert not anchor or anchor in anchors(FOLDER / target), link
 
 
 @pytest.mark.timeout(900)

@@ -1,18 +1,14 @@
 """The operating range of the sign detector, measured by command."""
 
 import json
-from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from fogsim.calibration.sign_calibration import measure_operating_range
-from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.reproduce.belaroussi2015 import PUBLISHED, Setup, reproduce
 from fogsim.values import Camera, Response
-from tests.helpers.camera_files import camera_yaml
 
 CAMERA = Camera(320, 160, 300.0, (159.5, 79.5), 1.4, pitch=0.01, response=Response.SRGB)
 FOGS = (20.0, 30.0, 45.0)
@@ -29,21 +25,6 @@ def test_signs_come_out_of_thinner_fog_from_farther_away() -> None:
 def test_what_cannot_be_measured_is_told() -> None:
     with pytest.raises(InputError, match="approaches: expected at least 4, got 3"):
         measure_operating_range(CAMERA, 1.0, FOGS, approaches=3)
-
-
-def test_the_command_refuses_before_it_works(tmp_path: Path) -> None:
-    camera, out = tmp_path / "camera.yaml", tmp_path / "range.json"
-    camera.write_text(camera_yaml((320, 160), 300, None, 1.4), encoding="utf-8")
-    out.write_text("mine", encoding="utf-8")
-    run = CliRunner().invoke
-    for options, message in (
-        (["--camera", str(camera), "--out", str(out)], "already exists"),
-        (["--camera", str(camera), "--out", str(tmp_path / "no" / "range.json")], "there is no folder"),
-        (["--camera", str(tmp_path / "none.yaml"), "--out", str(tmp_path / "new.json")], "none.yaml"),
-    ):
-        done = run(app, ["calibrate", "signs", *options])
-        assert message in str(done.exception)
-    assert out.read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.nightly

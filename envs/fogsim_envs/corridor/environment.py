@@ -39,7 +39,7 @@ from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import Defaults, EpisodeChoice, EpisodeSource
 
 
-class SignedRoad(NamedTuple):
+class _SignedRoad(NamedTuple):
     """A road with message signs."""
 
     starts: tuple[float, ...]  # Places of the signs along the road [m]
@@ -48,7 +48,7 @@ class SignedRoad(NamedTuple):
     lanes: int  # Lanes for vehicles where it begins
 
 
-def signed_road(scenario: Scenario) -> SignedRoad:
+def _signed_road(scenario: Scenario) -> _SignedRoad:
     """The road along which a scenario without an ego has its signs."""
     if scenario.traffic.has_ego or scenario.drivers.advised != "signs":
         raise InputError(
@@ -66,7 +66,7 @@ def signed_road(scenario: Scenario) -> SignedRoad:
     if not starts:
         raise InputError(f"FogCorridor: no sign of drivers.signs stands on the road of {length:.0f} m")
     lanes = sum(roads.lanes[place].kind is LaneKind.CARRIAGEWAY for place in roads.edges[scenario.traffic.along[0]])
-    return SignedRoad(starts, axis, length, max(lanes, 1))
+    return _SignedRoad(starts, axis, length, max(lanes, 1))
 
 
 try:
@@ -153,7 +153,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self._source = EpisodeSource(
             scenario, None, fog_distribution, tuple(overrides), split, own, Defaults(_CORRIDOR_FOG)
         )
-        self._road = signed_road(self._source.first_scenario())
+        self._road = _signed_road(self._source.first_scenario())
         self.possible_agents = [f"sign_{number}" for number in range(len(self._road.starts))]
         self.agents: list[str] = []
         self._observation_spaces = {agent: corridor_space() for agent in self.possible_agents}
@@ -232,8 +232,8 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self.drawn = drawn.episode.as_info()
         return self._observe(), self._infos(dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0))
 
-    def _checked_road(self, scenario: Scenario) -> SignedRoad:
-        road = signed_road(scenario)
+    def _checked_road(self, scenario: Scenario) -> _SignedRoad:
+        road = _signed_road(scenario)
         if len(road.starts) != len(self.possible_agents):
             raise InputError(
                 f"reset(): the scenario has {len(road.starts)} signs, and the environment was made with "

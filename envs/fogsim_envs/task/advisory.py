@@ -41,7 +41,7 @@ from fogsim_envs.task.sampling import (
 )
 
 
-class OwnDriver:
+class _OwnDriver:
     """A driver who goes by the advice, or by an own choice of speed where that is lower."""
 
     def __init__(self, choice: str) -> None:
@@ -215,7 +215,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         scenario = drawn.scenario
         self._check_camera(scenario)
         self._step = self._completed(self._begin(scenario, run_seed))
-        self._episode, self._driver = drawn.episode, OwnDriver(drawn.episode.driver)
+        self._episode, self._driver = drawn.episode, _OwnDriver(drawn.episode.driver)
         self._advice, self._frames = build.advice_config(scenario), build.periods(scenario).decision_frames
         self._adviser = AdvisedDriving(self._advice, self._frames)
         self._standard = advice_standard(scenario)

@@ -32,7 +32,7 @@ _OUT_OF_FOG = 1e-9
 
 
 @kernel
-def extinctions_on_rays(
+def _extinctions_on_rays(
     eye: NDArray[np.float64],
     directions: NDArray[np.float64],
     at: NDArray[np.float64],
@@ -145,7 +145,7 @@ class PixelGrid(NamedTuple):
 
 
 @kernel
-def fog_rows_by_grid(
+def _fog_rows_by_grid(
     luminance: NDArray[np.float32],
     distance: NDArray[np.float32],
     grid: PixelGrid,
@@ -350,7 +350,7 @@ def _node_distances(eye: NDArray[np.float64], directions: NDArray[np.float64], m
     """
     probes = np.ascontiguousarray(directions.reshape(-1, 3))
     k = np.empty((len(probes), len(_PROBES)))
-    extinctions_on_rays(eye, probes, _PROBES, medium, k)
+    _extinctions_on_rays(eye, probes, _PROBES, medium, k)
     step = np.diff(_PROBES)
     pieces = 0.5 * (k[:, 1:] + k[:, :-1]) * step
     depth = np.cumsum(pieces, axis=1)
@@ -408,7 +408,7 @@ def radiance_through_grid(
         depth=grid.depth.reshape(len(grid.rows), -1),
         source=np.zeros((len(grid.rows), 0), np.float32) if source is None else source.reshape(len(grid.rows), -1),
     )
-    fog_rows_by_grid(
+    _fog_rows_by_grid(
         radiance.reshape(rows, 3 * columns),
         np.ascontiguousarray(view.distance, dtype=np.float32),
         pixels,

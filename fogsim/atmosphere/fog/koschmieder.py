@@ -51,8 +51,8 @@ def _add_forward_scatter(
     reach = math.ceil(_REACH * width / block)
     weights = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) * block / width)).astype(np.float32)
     across_first, blurred = np.empty_like(small), np.empty_like(small)
-    blur_rows(small, weights, across_first)
-    blur_rows(across_first.transpose(1, 0, 2), weights, blurred.transpose(1, 0, 2))
+    _blur_rows(small, weights, across_first)
+    _blur_rows(across_first.transpose(1, 0, 2), weights, blurred.transpose(1, 0, 2))
     exchange(luminance, difference, transmittance, blurred, block, np.float32(weight))
 
 
@@ -76,7 +76,7 @@ def _pixel_width(angle: float, focal_length: float) -> float:
 
 
 @kernel
-def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+def _blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """Convolve each row of an image; what the weights miss at the edges is shared among the rest.
 
     Takes `image`, `out` (rows, cols, 3), `weights` (2 n + 1,).

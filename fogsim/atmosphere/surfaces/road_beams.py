@@ -19,7 +19,7 @@ from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.pinhole import ray_from_pixel
 
 
-class BeamsAlike(NamedTuple):
+class _BeamsAlike(NamedTuple):
     """Beams of one kind from one height."""
 
     places: NDArray[np.float64]  # (n, 3): Where the lamps are [m]
@@ -31,7 +31,7 @@ class BeamsAlike(NamedTuple):
 
 
 @kernel
-def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: float, ground: GroundLight) -> None:
+def _add_beam_illuminance(beams: _BeamsAlike, pattern: NDArray[np.float64], step: float, ground: GroundLight) -> None:
     """Add beams to a map of illuminance, and set how high up what stands there is lit: as high as lamps there.
 
     Takes `pattern` (m, 2 l + 1) [lx], `step` [m].
@@ -129,8 +129,8 @@ def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
         for height in np.unique(beams.height[beams.kind == kind]):
             rows = np.flatnonzero((beams.kind == kind) & (beams.height == height))
             lamps = beams.position[rows], beams.heading[rows], np.tan(beams.grade[rows]), beams.scale[rows]
-            alike = BeamsAlike(*lamps, dense[rows], float(height))
-            add_beam_illuminance(alike, _pattern(beam, float(height)), STEP, ground)
+            alike = _BeamsAlike(*lamps, dense[rows], float(height))
+            _add_beam_illuminance(alike, _pattern(beam, float(height)), STEP, ground)
     return ground
 
 

@@ -50,7 +50,7 @@ class Reflection(NamedTuple):
 
 
 @kernel
-def add_lamp_illuminance(
+def _add_lamp_illuminance(
     lamps: NDArray[np.float64],
     extinction: NDArray[np.float64],
     height: float,
@@ -265,5 +265,5 @@ def _map_of(
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
     light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops)
-    add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
+    _add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
     return _Map(lamps, middle, dense, light)

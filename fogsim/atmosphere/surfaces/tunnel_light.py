@@ -30,7 +30,7 @@ _UNDER_CEILING = 0.25
 """What a ceiling gets of the road's light, over what renderers give undersides [-]: a tenth, which the road returns."""
 
 
-class TunnelSpace(NamedTuple):
+class _TunnelSpace(NamedTuple):
     """A tunnel, as kernels read it."""
 
     boxes: NDArray[np.float64]  # (m, 10): Its space, in order along it
@@ -40,7 +40,7 @@ class TunnelSpace(NamedTuple):
     daylight: NDArray[np.float64]
 
 
-class Luminaires(NamedTuple):
+class _Luminaires(NamedTuple):
     """Lamps in a row under the ceiling."""
 
     illuminance: float  # What they give the road, over what the sky gives it outside [-]
@@ -80,7 +80,7 @@ def daylight_share(station: float, length: float, half_width: float, height: flo
 
 
 @kernel
-def _place_in(space: TunnelSpace, x: float, y: float, z: float) -> tuple[int, float, float, float]:
+def _place_in(space: _TunnelSpace, x: float, y: float, z: float) -> tuple[int, float, float, float]:
     """Box in which, or before which, a place is, or −1; and where it is along it, across it and above it [m]."""
     last = len(space.boxes) - 1
     for number in range(last + 1):
@@ -96,14 +96,14 @@ def _place_in(space: TunnelSpace, x: float, y: float, z: float) -> tuple[int, fl
 
 
 @kernel
-def light_pixels(
+def _light_pixels(
     radiance: _Picture,
     own: _Picture,
     distance: _Picture,
     rays: _Array,
     eye: _Array,
-    space: TunnelSpace,
-    lamps: Luminaires,
+    space: _TunnelSpace,
+    lamps: _Luminaires,
 ) -> None:
     """Light what is seen of a tunnel and of the road before its portals, in place.
 
@@ -203,18 +203,18 @@ class TunnelLight:
         eye = np.array(pose.position, np.float64)
         for space, lamps_by_lux in self._lit:
             lamps = lamps_by_lux._replace(illuminance=lamps_by_lux.illuminance / self.sky_illuminance)
-            light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps)
+            _light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps)
         return dataclasses.replace(view, radiance=radiance)
 
 
-def _space_and_lamps(tunnel: Tunnel) -> tuple[TunnelSpace, Luminaires]:
+def _space_and_lamps(tunnel: Tunnel) -> tuple[_TunnelSpace, _Luminaires]:
     """A tunnel, and its lamps under a sky that gives 1 lx."""
     boxes = tunnel.boxes()
     stations = np.concatenate([[0.0], np.cumsum(boxes[:-1, 6])])
     # What a lamp sends out, to all sides alike, lights its part of the road.
     flux = LAMPS_ON_ROAD * _SPACING * 2.0 * tunnel.half_width / _UTILANCE
-    lamps = Luminaires(LAMPS_ON_ROAD, flux / (math.pi * _SIZE * _WIDTH), _SPACING, _SIZE, 0.5 * _WIDTH)
+    lamps = _Luminaires(LAMPS_ON_ROAD, flux / (math.pi * _SIZE * _WIDTH), _SPACING, _SIZE, 0.5 * _WIDTH)
     length = float(boxes[:, 6].sum())
     places = np.arange(-BEFORE, length + BEFORE + 2.0 * STEP, STEP)
     daylight = np.array([daylight_share(place, length, boxes[0, 7], boxes[0, 9]) for place in places.tolist()])
-    return TunnelSpace(boxes, stations, length, daylight), lamps
+    return _TunnelSpace(boxes, stations, length, daylight), lamps

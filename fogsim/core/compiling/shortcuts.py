@@ -29,7 +29,7 @@ class Shortcut(NamedTuple):
         return lambda: setattr(self.owner, self.name, own)
 
 
-class UnobservedLock:
+class _UnobservedLock:
     """The lock of LLVM, taken and given back without the events by which numba times it.
 
     Each of 200,000 LLVM calls would be an event, passed to all functions being compiled in nested calls.
@@ -179,7 +179,7 @@ def make_array(kind: Any) -> Any:
 
 
 SHORTCUTS = (
-    UnobservedLock(),
+    _UnobservedLock(),
     Shortcut(BaseFunction, "get_call_type", _resolve_call),
     Shortcut(TargetConfig, "__eq__", compare_options),
     Shortcut(TargetConfig, "__hash__", hash_options),

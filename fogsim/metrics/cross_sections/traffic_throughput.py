@@ -24,7 +24,7 @@ _LEAST_COSINE = math.cos(math.radians(45.0))
 
 
 @kernel
-def count_passages(
+def _count_passages(
     position: Floats,
     step: Numbers,
     vehicle: Numbers,
@@ -105,7 +105,7 @@ class TrafficThroughput(TrafficMetric):
             others[span.ego] = False
         rows = span.position[others, :2], span.moment[others], span.vehicle[others]
         first = int(span.moment[0]) if len(span.moment) else 0
-        self._passed += count_passages(*rows, self._last, self._sections, read, first, ROAD_HALF_WIDTH)
+        self._passed += _count_passages(*rows, self._last, self._sections, read, first, ROAD_HALF_WIDTH)
 
     def result(self) -> dict[str, JsonValue]:
         """Say how many passed."""

@@ -27,7 +27,7 @@ _LEAST_ANGLE = math.radians(20.0)
 _CORNERS = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
 
 
-class Encroachments(NamedTuple):
+class _Encroachments(NamedTuple):
     """Pairs of vehicles that have driven over the same area one after the other."""
 
     # first, second (k,) int: vehicles, in the order of their fronts
@@ -37,7 +37,7 @@ class Encroachments(NamedTuple):
     time: Floats  # (k,): Post-encroachment time [s]; 0 where the second came before the first had left
 
 
-def find_encroachments(tracks: Tracks) -> Encroachments:
+def _find_encroachments(tracks: Tracks) -> _Encroachments:
     """Post-encroachment times of all pairs whose ways cross, at each place where they do.
 
     Bodies of widths w₁, w₂ on straight ways that cross at the angle θ both sweep a parallelogram, whose corners lie at
@@ -68,7 +68,7 @@ def find_encroachments(tracks: Tracks) -> Encroachments:
     place = tracks.travelled[row - 1] + parts * (tracks.travelled[row] - tracks.travelled[row - 1])
     left, came = _least_apart(tracks, row, place, way[numbers])
     between = np.maximum((came - left).min(axis=0, initial=np.inf), 0.0)
-    return Encroachments(fronts.vehicle[row[:, 0]], fronts.vehicle[row[:, 1]], tracks.junction[row[:, 0]], between)
+    return _Encroachments(fronts.vehicle[row[:, 0]], fronts.vehicle[row[:, 1]], tracks.junction[row[:, 0]], between)
 
 
 def _least_apart(tracks: Tracks, row: Numbers, place: Floats, way: Floats) -> tuple[Floats, Floats]:
@@ -103,7 +103,7 @@ _SERIOUS = 1.0
 class TrafficEncroachment(TrafficMetric):
     """Post-encroachment time (PET) of vehicles whose ways cross in a junction, the least of each pair.
 
-    A junction is where SUMO's lanes have names that begin with a colon; the formula is `find_encroachments`'.
+    A junction is where SUMO's lanes have names that begin with a colon; the formula is `_find_encroachments`'.
     """
 
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_encroachment")
@@ -136,7 +136,7 @@ class TrafficEncroachment(TrafficMetric):
         if not len(rows.time):
             return
         tracks = tracks_through(rows, self._junctions)
-        columns = (column.tolist() for column in find_encroachments(tracks))
+        columns = (column.tolist() for column in _find_encroachments(tracks))
         for first, second, junction, time in zip(*columns, strict=True):
             pair = min(first, second), max(first, second), junction
             self._least[pair] = min(time, self._least.get(pair, _MEMORY))

@@ -26,7 +26,7 @@ def check_expectations(scenario: "ScenarioFile", *, is_shortened: bool = False) 
     A run that ``--set`` has shortened is for a look, and may end before its expectations are decided.
     """
     end = math.inf if is_shortened else last_time(scenario)
-    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), end, scenario.traffic.ego)
+    mistakes = _expectation_mistakes(scenario.expect, run_content(scenario), end, scenario.traffic.ego)
     refuse((("expect", *place), mistake) for place, mistake in mistakes)
 
 
@@ -54,7 +54,7 @@ def run_content(scenario: "ScenarioFile") -> RunContent:
     )
 
 
-def expectation_mistakes(
+def _expectation_mistakes(
     expect: Mapping[str, Expectation], content: RunContent, duration: float, ego: str
 ) -> Iterator[tuple[KeyPath, str]]:
     """Expectations that a run could not evaluate, by key path; `duration` is the time of its last frame [s]."""

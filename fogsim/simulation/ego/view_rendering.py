@@ -99,7 +99,7 @@ class EgoView(Protocol):
         """Free what draws; closing twice is allowed."""
 
 
-class NoView:
+class _NoView:
     """A view without a scene, for runs that need no camera: its pictures are black.
 
     Parameters
@@ -368,5 +368,5 @@ MakeView = Callable[[WorldConfig, CameraConfig, RoadNetwork, SignMap, str], EgoV
 
 def view_of_world(world: WorldConfig, camera: CameraConfig, network: RoadNetwork, signs: SignMap, body: str) -> EgoView:
     """What draws a world, or nothing if no renderer is to."""
-    kind = NoView if world.renderer == NO_RENDERER else ViewRenderer
+    kind = _NoView if world.renderer == NO_RENDERER else ViewRenderer
     return kind(world, camera, network, signs, body)

@@ -32,7 +32,7 @@ _LONGEST_END = 5.0
 """Time that a process is given to end by itself [s]."""
 
 
-class UnitProcess:
+class _UnitProcess:
     """A `UnitPool` in another process, which is asked and answers when it is done."""
 
     def __init__(self, config: RunConfig) -> None:
@@ -126,9 +126,9 @@ class EquippedFleet:
 
     def __init__(self, config: RunConfig, processes: int = 0) -> None:
         self._share, self._named = config.equipped_share, frozenset(config.equipped_vehicles)
-        self._pools: Sequence[UnitPool | UnitProcess] = ()
+        self._pools: Sequence[UnitPool | _UnitProcess] = ()
         if config.has_equipped:
-            self._pools = [UnitProcess(config) for _ in range(processes)] or [UnitPool(config)]
+            self._pools = [_UnitProcess(config) for _ in range(processes)] or [UnitPool(config)]
         self._draw = 0
         self._order: list[str] = []
         self._pool_of: dict[str, int] = {}

@@ -184,6 +184,9 @@ class ViewRenderer:
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False
         self._look_by(world, camera)
+        if self._by_lamplight:
+            # In a run frames would wait for lamps that are lit for the first time; a change waits for those in use.
+            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
         self._plan_scene_along(network.route)
 
     def change(self, world: WorldConfig, camera: CameraConfig) -> None:
@@ -206,8 +209,6 @@ class ViewRenderer:
         self._air = Air(self.fog, world.fog.droplets)
         photons = self.fog.ground_albedo is not None
         self._sides = side_light(self.fog, world.fog.droplets) if photons else EVEN_LIGHT
-        if self._by_lamplight:
-            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
     def _plan_scene_along(self, line: NDArray[np.float64]) -> None:
         """Find out what there is in the scene along a line (n, 3) [m]."""

@@ -115,12 +115,12 @@ class Air:
         radiance = daytime_luminance(lit, field, camera, pose, self._droplets)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
-        sources = lights.others
-        has_fog = field.extinction > 0 or bool(field.banks)
+        shining, has_fog = [lights.others], field.extinction > 0 or bool(field.banks)
         if lights.own and has_fog:
-            sources = joined_sources((sources, self._road.sources(lights.own, camera, pose, field)))
+            shining.append(self._road.sources(lights.own, camera, pose, field))
         if lights.beams is not None and has_fog:
-            sources = joined_sources((sources, glow_of_beams(lights.beams, pose, field)))
+            shining.append(glow_of_beams(lights.beams, pose, field))
+        sources = joined_sources(shining)
         if len(sources.intensity):
             self._halos.add(radiance, view, camera, pose, field, sources)
         return radiance

@@ -307,12 +307,12 @@ def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], be
     kinds, kind = list(SIGNAL_LOBES), table.lamps.lobe[lit[0]]
     scale = found[:, _FULL_INTENSITY] / FULL
     burning = lit[1] & sum(map(int, beams))
-    for bits in np.unique(burning).tolist():
+    for bits in sorted(set(burning.tolist())):
         if bits:
             chosen = burning == bits
             kind = np.where(chosen, len(kinds), kind)
             scale = np.where(chosen, 1.0, scale)
-            kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & lamp)))
+            kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & int(lamp))))
     return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, _AXIS : _AXIS + 3]))
 
 

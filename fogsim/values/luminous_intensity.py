@@ -103,8 +103,10 @@ def luminous_intensity(beam: Beam, azimuth: ArrayLike, elevation: ArrayLike) -> 
     table = np.log(np.maximum(beam.intensity, _FLOOR))
     column, column_share, beyond_sides = _place(beam.azimuth, right)
     row, row_share, beyond_ends = _place(beam.elevation, up)
-    below = (1 - column_share) * table[row, column] + column_share * table[row, column + 1]
-    above = (1 - column_share) * table[row + 1, column] + column_share * table[row + 1, column + 1]
+    start, left_share = row * table.shape[1] + column, 1 - column_share
+    below = left_share * table.take(start) + column_share * table.take(start + 1)
+    start += table.shape[1]
+    above = left_share * table.take(start) + column_share * table.take(start + 1)
     outside = np.degrees(np.hypot(beyond_sides, beyond_ends))
     return np.asarray(np.exp((1 - row_share) * below + row_share * above - math.log(10) * FALL_OFF * outside))
 
@@ -114,8 +116,8 @@ def _place(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Interval of each value, the share of it that the value has passed, and how far outside the grid it lies."""
     inside = np.clip(values, grid[0], grid[-1])
-    index = np.clip(np.searchsorted(grid, inside, side="right") - 1, 0, len(grid) - 2)
-    return index, (inside - grid[index]) / (grid[index + 1] - grid[index]), np.abs(values - inside)
+    index = np.searchsorted(grid[1:-1], inside, side="right")
+    return index, (inside - grid.take(index)) / np.diff(grid).take(index), np.abs(values - inside)
 
 
 def signal_share(lobe: SignalLobe, aside: float) -> float:

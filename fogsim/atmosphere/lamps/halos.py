@@ -91,7 +91,7 @@ class LobeMemory:
     def _shapes(self, sources: LightSources, chosen: NDArray[np.int64]) -> LampShapes:
         lobes = sources.lobes or LampLobes.alike(len(sources.intensity))
         numbers = np.full(len(lobes.kinds) + 1, -1, np.int64)
-        for kind in np.unique(lobes.kind[chosen]).tolist():
+        for kind in sorted(set(lobes.kind[chosen].tolist())):
             if kind >= 0:
                 numbers[kind] = self._number(lobes.kinds[kind])
         return LampShapes(numbers[lobes.kind], lobes.scale, lobes.forward)

@@ -35,11 +35,11 @@ _REMEMBERED = 16
 
 @lru_cache(_REMEMBERED)
 def lamp_table(beam: Beam) -> NDArray[np.float32]:
-    """Luminous intensity of a lamp as a stack of tables, the first sharp, the others ever more blurred; read-only.
+    """Luminous intensity of a lamp as a table over blur, the first entries sharp, the others ever wider; read-only.
 
     The latest are remembered, since the same lamps are in every scene.
 
-    Returns Intensity [cd]; rows from below to above, columns from left to right.
+    Returns Intensity [cd]; rows from below to above, columns from left to right, levels of blur.
     """
     checked_beam(beam)
     folded = np.clip(np.linspace(-1.0, 1.0, SIZE), -0.999, 0.999)
@@ -57,7 +57,7 @@ def lamp_table(beam: Beam) -> NDArray[np.float32]:
         cells = FIRST_BLUR * 2.0**level / _STEP
         smooth = np.fft.irfft2(spectrum * np.exp(-2.0 * (math.pi * cells) ** 2 * (down**2 + across**2)), even.shape)
         stack.append(np.maximum(_bilinear(smooth, row, column), 0.0))
-    table = np.ascontiguousarray(np.stack(stack), dtype=np.float32)
+    table = np.stack(stack, axis=-1).astype(np.float32)
     table.flags.writeable = False
     return table
 

@@ -406,7 +406,7 @@ def _group(camera: Camera, lamps: tuple[HeadLamp, ...], droplets: Droplets) -> _
     return _Group(
         light=LampGroup(
             places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
-            tables=np.stack([table[0] for table in tables]),
+            tables=np.stack([table[..., 0] for table in tables]),
             colour=np.array(lamps[0].colour, dtype=np.float32),
         ),
         air=lit_air(_rays(camera)[0], list(zip(places, tables, strict=True)), droplets),

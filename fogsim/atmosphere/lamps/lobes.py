@@ -100,8 +100,10 @@ def mean_intensity(
     emitted = (edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * part).reshape(-1)
     # Light may have left on both sides of that on which the line of sight passes.
     turned = np.stack((origins.turned, -origins.turned), axis=1).reshape(-1)
-    turn = 2.0 * math.pi * np.arange(SIDES)[:, None] / SIDES + turned
-    shone = _shone_about(lobe, azimuth, elevation, emitted, turn.reshape(-1))
+    turn = (2.0 * math.pi * np.arange(SIDES)[:, None] / SIDES + turned).reshape(-1)
+    # One direction at a time, as all of them together do not fit in a processor's cache.
+    ways = zip(azimuth[:, None], elevation[:, None], strict=True)
+    shone = np.concatenate([_shone_about(lobe, right, up, emitted, turn) for right, up in ways])
     weight = np.sin(emitted).reshape(bins, _HALVES)
     weight /= weight.sum(axis=1, keepdims=True)
     in_bins = np.einsum("nehamb,eh->neam", shone.reshape(len(shone), bins, _HALVES, SIDES, -1, 2), 0.5 * weight)

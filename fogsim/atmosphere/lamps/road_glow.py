@@ -158,13 +158,15 @@ _LAMBERTIAN = Beam(
 
 @dataclass(frozen=True, slots=True)
 class _Patches:
-    """Lit pieces of road: middles and spreads in the vehicle's axes from the camera [m], range of the lamps, flux."""
+    """Lit pieces of road: middles in the vehicle's axes from the camera [m], range of the lamps, flux."""
 
     lamps: tuple[HeadLamp, ...]
     middle: NDArray[np.float64]
-    spread: NDArray[np.float64]
     range_: NDArray[np.float64]
     flux: NDArray[np.float64]
+    # slant, area: Share of its area that a piece shows to the camera [-], and this area [m²]
+    slant: NDArray[np.float64]
+    area: NDArray[np.float64]
 
 
 class RoadGlow:
@@ -183,19 +185,7 @@ class RoadGlow:
         eye = np.asarray(pose.position, dtype=np.float64)
         dense = extinction(fog, eye + 0.5 * place)
         reached = patches.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * dense * patches.range_)
-        distance = np.linalg.norm(patches.middle, axis=1)
-        slant = np.maximum(-up / distance, 0.01)
-        upward = ROAD_ALBEDO * reached / math.pi
-        count = len(reached)
-        return LightSources(
-            position=eye + place,
-            intensity=upward * slant,
-            colour=np.ones((count, 3)),
-            area=4.0 * patches.spread[:, 0] * patches.spread[:, 1] * slant,
-            lobes=LampLobes(
-                (_LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, np.tile((1.0, 0.0, 0.0), (count, 1))
-            ),
-        )
+        return _shining_up(eye + place, ROAD_ALBEDO * reached / math.pi, patches.slant, patches.area)
 
     def _patches(self, lamps: tuple[HeadLamp, ...], height: float) -> _Patches:
         known = self._known
@@ -225,15 +215,22 @@ def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSou
     )
     way = eye - position
     slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)
-    upward, count = ROAD_ALBEDO * total / math.pi, len(chosen)
-    axes = np.tile((1.0, 0.0, 0.0), (count, 1))
-    return LightSources(
-        position=position,
-        intensity=upward * slant,
-        colour=np.ones((count, 3)),
-        area=_LIT_AREA * slant,
-        lobes=LampLobes((_LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, axes),
-    )
+    return _shining_up(position, ROAD_ALBEDO * total / math.pi, slant, _LIT_AREA * slant)
+
+
+def _shining_up(
+    position: NDArray[np.float64], upward: NDArray[np.float64], slant: NDArray[np.float64], area: NDArray[np.float64]
+) -> LightSources:
+    """Lit pieces of road as sources (`upward` [cd], `slant` share of it toward the camera)."""
+    white, kind, axes = _alike(len(upward))
+    lobes = LampLobes((_LAMBERTIAN,), kind, upward / _UNIT, axes)
+    return LightSources(position, upward * slant, white, area, lobes)
+
+
+@lru_cache(8)
+def _alike(count: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Colours, kinds and axes of some pieces of road."""
+    return np.ones((count, 3)), np.zeros(count, np.int64), np.tile((1.0, 0.0, 0.0), (count, 1))
 
 
 @lru_cache(64)
@@ -264,4 +261,7 @@ def _lit_patches(lamps: tuple[HeadLamp, ...], height: float) -> _Patches:
     middle = (weight * place).sum(axis=1) / total
     spread = np.sqrt((weight * (place - middle[:, None]) ** 2).sum(axis=1) / total)
     down = np.full((len(middle), 1), -height)
-    return _Patches(lamps, np.hstack((middle, down)), spread, np.sqrt(edges[1:] * edges[:-1]), total[:, 0])
+    middle = np.hstack((middle, down))
+    slant = np.maximum(height / np.linalg.norm(middle, axis=1), 0.01)
+    area = 4.0 * spread[:, 0] * spread[:, 1] * slant
+    return _Patches(lamps, middle, np.sqrt(edges[1:] * edges[:-1]), total[:, 0], slant, area)

@@ -37,6 +37,8 @@ HIDDEN = 0.4
 _LAST_CELL = SIZE - 1.001
 _LAST_BLUR = BLURS - 1.001
 _HALF = 0.5 * (SIZE - 1)
+# Unsigned, because indices that may be negative cost a comparison each.
+_NEXT, _TO_NEXT_COLUMN, _TO_NEXT_ROW = np.uint32(1), np.uint32(BLURS), np.uint32(SIZE * BLURS)
 
 
 class VeilRays(NamedTuple):
@@ -70,21 +72,78 @@ class LitAir(NamedTuple):
 
 
 @kernel
-def _intensity(table: NDArray[np.float32], forward: float, right: float, up: float, blur: float) -> float:
-    """Intensity toward a place ahead of a lamp, blurred by an angle [cd]."""
-    column = min(_LAST_CELL, (right / (FOLD * forward + abs(right)) + 1.0) * _HALF)
-    row = min(_LAST_CELL, (up / (FOLD * forward + abs(up)) + 1.0) * _HALF)
-    level = max(0.0, blur / FIRST_BLUR)
-    if level > 1.0:
-        level = min(_LAST_BLUR, 1.0 + math.log2(level))
-    i, j, n = int(row), int(column), int(level)
-    down, aside, between = row - i, column - j, level - n
-    total = 0.0
-    for m in range(2):
-        low = table[n + m, i, j] + (table[n + m, i, j + 1] - table[n + m, i, j]) * aside
-        high = table[n + m, i + 1, j] + (table[n + m, i + 1, j + 1] - table[n + m, i + 1, j]) * aside
-        total += (between if m else 1.0 - between) * (low + (high - low) * down)
-    return total
+def _place_pieces(
+    at: NDArray[np.float64],
+    direction: NDArray[np.float32],
+    offset: NDArray[np.float64],
+    square: NDArray[np.float64],
+    way: NDArray[np.float64],
+    column: NDArray[np.float64],
+    row: NDArray[np.float64],
+    phase: NDArray[np.float64],
+) -> None:
+    """Ways from a lamp to the pieces of a ray [m], and where in its beam's table and in phase functions they are."""
+    ux, uy, uz, ahead, aside, above = direction[0], direction[1], direction[2], offset[0], offset[1], offset[2]
+    for n in range(at.shape[0]):
+        forward, left, up = at[n] * ux - ahead, at[n] * uy - aside, at[n] * uz - above
+        square[n] = forward * forward + left * left + up * up
+        way[n] = math.sqrt(square[n])
+        cosine = -(forward * ux + left * uy + up * uz) / way[n]
+        phase[n] = min(PHASE_SIZE - 1.001, math.sqrt(max(0.0, 0.5 + 0.5 * cosine)) * (PHASE_SIZE - 1))
+        column[n] = min(_LAST_CELL, (-left / (FOLD * forward + abs(left)) + 1.0) * _HALF)
+        row[n] = min(_LAST_CELL, (up / (FOLD * forward + abs(up)) + 1.0) * _HALF)
+
+
+@kernel
+def _blur_levels(
+    way: NDArray[np.float64], spread: float, straight: NDArray[np.float64], turned: NDArray[np.float64]
+) -> None:
+    """Tables in a stack from which beams are read: as they are, but blurred by the lamp's face, and spread."""
+    for n in range(way.shape[0]):
+        # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.
+        near = _LAMP_SIZE / way[n]
+        straight[n] = near / FIRST_BLUR
+        turned[n] = math.sqrt(near * near + spread * spread) / FIRST_BLUR
+    for levels in (straight, turned):
+        for n in range(way.shape[0]):
+            if levels[n] > 1.0:
+                levels[n] = min(_LAST_BLUR, 1.0 + math.log2(levels[n]))
+
+
+@kernel
+def _read_beam(
+    table: NDArray[np.float32],
+    row: NDArray[np.float64],
+    column: NDArray[np.float64],
+    level: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    """Intensities from a flat stack of tables [cd]."""
+    for n in range(row.shape[0]):
+        i, j, m = np.uint32(row[n]), np.uint32(column[n]), np.uint32(level[n])
+        down, aside, between = row[n] - np.float64(i), column[n] - np.float64(j), level[n] - np.float64(m)
+        a = i * _TO_NEXT_ROW + j * _TO_NEXT_COLUMN + m
+        b, c, d = a + _TO_NEXT_COLUMN, a + _TO_NEXT_ROW, a + _TO_NEXT_ROW + _TO_NEXT_COLUMN
+        low = table[a] + (table[b] - table[a]) * aside
+        high = table[c] + (table[d] - table[c]) * aside
+        sharper = low + (high - low) * down
+        low = table[a + _NEXT] + (table[b + _NEXT] - table[a + _NEXT]) * aside
+        high = table[c + _NEXT] + (table[d + _NEXT] - table[c + _NEXT]) * aside
+        out[n] = (1.0 - between) * sharper + between * (low + (high - low) * down)
+
+
+@kernel
+def _read_phase(table: NDArray[np.float32], place: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Multiply by a phase function."""
+    for n in range(place.shape[0]):
+        i = np.uint32(place[n])
+        out[n] *= table[i] + (table[i + _NEXT] - table[i]) * (place[n] - np.float64(i))
+
+
+@kernel
+def _add(values: NDArray[np.float64], out: NDArray[np.float32]) -> None:
+    for n in range(values.shape[0]):
+        out[n] += values[n]
 
 
 @kernel
@@ -99,33 +158,36 @@ def add_scattered_light(
 
     Takes `offset` (3,) [m].
     """
-    directions, at, length = rays.directions, rays.at, rays.length
-    phase, spread_phase, spread = phases.straight, phases.spread, phases.width
-    straight, turned, path = air.straight, air.turned, air.path
-    for m in range(directions.shape[0]):
-        ux, uy, uz = directions[m, 0], directions[m, 1], directions[m, 2]
-        for n in range(at.shape[0]):
-            forward = at[n] * ux - offset[0]
-            if not forward > 0.0:
-                continue
-            left, up = at[n] * uy - offset[1], at[n] * uz - offset[2]
-            square = forward * forward + left * left + up * up
-            s = math.sqrt(square)
-            cosine = -(forward * ux + left * uy + up * uz) / s
-            place = min(PHASE_SIZE - 1.001, math.sqrt(max(0.0, 0.5 + 0.5 * cosine)) * (PHASE_SIZE - 1))
-            i = int(place)
-            share = place - i
-            # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.
-            near = _LAMP_SIZE / s
-            falling = length[n] / (square + HIDDEN * HIDDEN)
-            once = (phase[i] + (phase[i + 1] - phase[i]) * share) * _intensity(table, forward, -left, up, near)
-            wide = math.sqrt(near * near + spread * spread)
-            again = (spread_phase[i] + (spread_phase[i + 1] - spread_phase[i]) * share) * _intensity(
-                table, forward, -left, up, wide
-            )
-            straight[m, n] += once * falling
-            turned[m, n] += again * falling
-            path[m, n] += (once + again) * falling * s
+    stack, scratch = table.reshape(-1), np.empty((9, rays.at.shape[0]))
+    for m in range(rays.directions.shape[0]):
+        # Pieces before the lamp.
+        begin, end, ahead = 0, rays.at.shape[0], rays.directions[m, 0]
+        while begin < end and not rays.at[begin] * ahead - offset[0] > 0.0:
+            begin += 1
+        while begin < end and not rays.at[end - 1] * ahead - offset[0] > 0.0:
+            end -= 1
+        count, at, length = end - begin, rays.at[begin:end], rays.length[begin:end]
+        square, way, column = scratch[0, :count], scratch[1, :count], scratch[2, :count]
+        row, phase, level = scratch[3, :count], scratch[4, :count], scratch[5, :count]
+        spread_level, once, again = scratch[6, :count], scratch[7, :count], scratch[8, :count]
+        _place_pieces(at, rays.directions[m], offset, square, way, column, row, phase)
+        _blur_levels(way, phases.width, level, spread_level)
+        _read_beam(stack, row, column, level, once)
+        _read_beam(stack, row, column, spread_level, again)
+        _read_phase(phases.straight, phase, once)
+        _read_phase(phases.spread, phase, again)
+        # One thing in each loop, which become vector instructions.
+        for n in range(count):
+            square[n] = length[n] / (square[n] + HIDDEN * HIDDEN)
+        for n in range(count):
+            way[n] = (once[n] + again[n]) * square[n] * way[n]
+        for n in range(count):
+            once[n] *= square[n]
+        for n in range(count):
+            again[n] *= square[n]
+        _add(once, air.straight[m, begin:end])
+        _add(again, air.turned[m, begin:end])
+        _add(way, air.path[m, begin:end])
 
 
 @kernel

@@ -125,12 +125,13 @@ def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
     dark, low = np.zeros((CELLS, CELLS), np.float32), np.full((CELLS, CELLS), -np.inf, np.float32)
     ground = GroundLight(origin, _CELL, dark, low)
     dense = _extinction_before(fog, beams)
-    for kind, beam in enumerate(beams.kinds):
-        for height in np.unique(beams.height[beams.kind == kind]):
-            rows = np.flatnonzero((beams.kind == kind) & (beams.height == height))
-            lamps = beams.position[rows], beams.heading[rows], np.tan(beams.grade[rows]), beams.scale[rows]
-            alike = _BeamsAlike(*lamps, dense[rows], float(height))
-            _add_beam_illuminance(alike, _pattern(beam, float(height)), STEP, ground)
+    alike: dict[tuple[int, float], list[int]] = {}
+    for row, which in enumerate(zip(beams.kind.tolist(), beams.height.tolist(), strict=True)):
+        alike.setdefault(which, []).append(row)
+    for (kind, height), rows in sorted(alike.items()):
+        lamps = beams.position[rows], beams.heading[rows], np.tan(beams.grade[rows]), beams.scale[rows]
+        pattern = _pattern(beams.kinds[kind], height)
+        _add_beam_illuminance(_BeamsAlike(*lamps, dense[rows], height), pattern, STEP, ground)
     return ground
 
 

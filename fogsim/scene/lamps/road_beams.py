@@ -89,18 +89,18 @@ def road_beams(
     Takes `eye` (3,) [m], `sky_illuminance` [lx].
     """
     state, _ = with_pieces(state, skip)
-    shining = int(sum(beams))
+    shining = sum(map(int, beams))
     away = np.hypot(*(state.position[:, :2] - np.asarray(eye, np.float64)[:2]).T)
     lit = np.flatnonzero(((state.lamps & shining) != 0) & (away < FARTHEST))
     nearest = [row for row in lit[np.argsort(away[lit], kind="stable")].tolist() if row != skip][:_MOST]
-    names, kinds = body_names(state), tuple(beams)
+    names, kinds = body_names(state), [(int(lamp), _FOG_HEIGHT if lamp is Lamp.FRONT_FOG else 1.0) for lamp in beams]
     found: list[tuple[int, float, int, float]] = []
     for row in nearest:
-        for kind, lamp in enumerate(kinds):
-            count = sum(bool(burning(int(state.lamps[row]), side) & lamp) for side in (Side.LEFT, Side.RIGHT))
+        left, right = (burning(int(state.lamps[row]), side) for side in (Side.LEFT, Side.RIGHT))
+        for kind, (lamp, share) in enumerate(kinds):
+            count = bool(left & lamp) + bool(right & lamp)
             if count:
-                height = _head_lamp_height(names[row]) * float(state.height[row])
-                height *= _FOG_HEIGHT if lamp is Lamp.FRONT_FOG else 1.0
+                height = _head_lamp_height(names[row]) * float(state.height[row]) * share
                 found.append((row, max(round(height / _HEIGHT_STEP), 1) * _HEIGHT_STEP, kind, float(count)))
     if not found:
         return None

@@ -184,6 +184,9 @@ class ViewRenderer:
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False
         self._look_by(world, camera)
+        if self._by_lamplight:
+            # In a run frames would wait for lamps that are lit for the first time; a change waits for those in use.
+            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
         self._plan_scene_along(network.route)
 
     def change(self, world: WorldConfig, camera: CameraConfig) -> None:
@@ -198,6 +201,7 @@ class ViewRenderer:
         self._camera, self._samples = camera.on(self._body), camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = camera.mount(self._body).setback
+        self._head_lamps: dict[int, tuple[HeadLamp, ...]] = {}
         has_bonnet = camera.has_bonnet and self._body == CAR
         self._bonnet = Bonnet(self._setback - _BEHIND_BUMPER) if has_bonnet else None
         self._world, self._daylight = world, world.illuminance
@@ -206,8 +210,6 @@ class ViewRenderer:
         self._air = Air(self.fog, world.fog.droplets)
         photons = self.fog.ground_albedo is not None
         self._sides = side_light(self.fog, world.fog.droplets) if photons else EVEN_LIGHT
-        if self._by_lamplight:
-            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
     def _plan_scene_along(self, line: NDArray[np.float64]) -> None:
         """Find out what there is in the scene along a line (n, 3) [m]."""
@@ -347,14 +349,16 @@ class ViewRenderer:
         if not self._by_lamplight:
             return _UNLIT
         return Lights(
-            own=() if ego is None else self._own_lamps(Lamp(int(state.lamps[ego]))),
+            own=() if ego is None else self._own_lamps(int(state.lamps[ego])),
             others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),
             streets=self._streets,
             beams=road_beams(state, ego, pose.position, self._mount.beams, self._sky),
         )
 
-    def _own_lamps(self, lit: Lamp) -> tuple[HeadLamp, ...]:
-        return own_head_lamps(lit, self._camera.mount_height, self._setback, self._mount)
+    def _own_lamps(self, lit: int) -> tuple[HeadLamp, ...]:
+        if lit not in self._head_lamps:
+            self._head_lamps[lit] = own_head_lamps(Lamp(lit), self._camera.mount_height, self._setback, self._mount)
+        return self._head_lamps[lit]
 
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""

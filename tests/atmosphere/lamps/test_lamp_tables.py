@@ -29,14 +29,14 @@ def test_the_sharp_table_holds_the_beam() -> None:
         azimuth = np.arctan(tangent(column))
         elevation = np.arctan(tangent(row) * np.cos(azimuth))
         table = lamp_table(low_beam())
-        assert table.shape == (BLURS, SIZE, SIZE)
-        assert table[0, row, column] == pytest.approx(luminous_intensity(low_beam(), azimuth, elevation), rel=1e-5)
+        assert table.shape == (SIZE, SIZE, BLURS)
+        assert table[row, column, 0] == pytest.approx(luminous_intensity(low_beam(), azimuth, elevation), rel=1e-5)
 
 
 def test_blurring_leaves_even_light_even_near_the_axis() -> None:
     middle = slice(place(-0.1), place(0.1))
-    assert lamp_table(EVEN)[:6, middle, middle] == pytest.approx(700.0, rel=1e-4)
-    assert np.all(np.diff(lamp_table(low_beam()).max(axis=(1, 2))) < 0)
+    assert lamp_table(EVEN)[middle, middle, :6] == pytest.approx(700.0, rel=1e-4)
+    assert np.all(np.diff(lamp_table(low_beam()).max(axis=(0, 1))) < 0)
 
 
 def test_phase_functions_are_read_over_the_cosine_of_half_the_angle() -> None:

@@ -178,7 +178,8 @@ class UpdateSchedule:
         step, following, batch, due = self._step, self._current + 1, self._batch, self._due
         # What `_due_at` does, without a call for each.
         for vehicle, pause in zip(vehicles, pauses, strict=True):
-            number = max(((now + pause) / step + _ROUNDING) // 1.0, following)
+            number = ((now + pause) / step + _ROUNDING) // 1.0
+            number = number if number > following else following
             due[number - number % batch if number - following >= batch - 1 else number].append(vehicle)
 
     def _due_at(self, time: float) -> list[str]:

@@ -158,10 +158,9 @@ class VehicleReader:
         lamps_of: Mapping[str, Lamp] | None = None,
     ) -> TrafficState:
         """Vehicles near the ego (`heard` [m/s])."""
-        self._roster.update()
+        now = self._dynamic_state()
         new, self._mark = self._roster.entered_since(self._mark)
         self._bodies.forget(new)
-        now = self._dynamic_state()
         off_lanes = _off_lanes(now)
         constants = self._constants_of(now.ids)
         ego = constants.ego
@@ -278,6 +277,7 @@ class SubscribedReader(VehicleReader):
     def _dynamic_state(self) -> _DynamicState:
         if self._ego is None:
             return super()._dynamic_state()
+        self._roster.update()
         rows = self._surroundings()
         # Rows of a subscription of the user's own may be among them, with other variables.
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))

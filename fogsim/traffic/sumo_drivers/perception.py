@@ -157,6 +157,9 @@ MAX_PAUSE = 0.5
 _LONG_WAY = 70.0 * MAX_PAUSE
 """By more than this no gap changes until then [m]: at 250 km/h towards a standing vehicle."""
 
+_CLOSING = closing_speed_bound(0.0, 0.0, MAX_PAUSE)
+"""By so much the difference of two speeds changes until then, on the average [m/s]."""
+
 _NO_LEADER = "", 0.0
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
@@ -276,14 +279,14 @@ class Perception:
                 calm.append(follower)
             else:
                 near.append((follower, leader, near_edge))
+        followers, leaders, ways = zip(*near, strict=True) if near else ((), (), ())
+        speeds = zip(map(speed, followers), map(speed, leaders), ways, strict=True)
         # Until the gap could have changed by so much.
-        pauses = [
-            min(way / closing_speed_bound(speed(v), speed(other), MAX_PAUSE), MAX_PAUSE) for v, other, way in near
-        ]
+        pauses = [min(way / (abs(other - own) + _CLOSING), MAX_PAUSE) for own, other, way in speeds]
         if doubtful:
             pauses += self._decide_by_sight(doubtful, own_lamps)
         self._due.schedule(calm, MAX_PAUSE)
-        self._due.schedule_each([pair[0] for pair in (*near, *doubtful)], pauses)
+        self._due.schedule_each([*followers, *(pair[0] for pair in doubtful)], pauses)
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""

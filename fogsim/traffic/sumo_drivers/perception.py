@@ -286,7 +286,7 @@ class Perception:
         if doubtful:
             pauses += self._decide_by_sight(doubtful, own_lamps)
         self._due.schedule(calm, MAX_PAUSE)
-        self._due.schedule_each([*followers, *(pair[0] for pair in doubtful)], pauses)
+        self._due.schedule_each([pair[0] for pair in near + doubtful], pauses)
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""

@@ -287,9 +287,10 @@ class SumoTraffic:
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
             orders.pop(self._setup.ego, None)
         run.speeds.apply(orders)
-        run.lamps.publish(self._published_lamps(), run.roster.present)
+        lamps = self._published_lamps()
+        run.lamps.publish(lamps, run.roster.present)
         run.actions.play(self._elapsed(run), run.roster.present)
-        self._update_drivers(run, command)
+        self._update_drivers(run, command, lamps)
 
     @_translates_errors
     def look(self) -> None:
@@ -320,13 +321,13 @@ class SumoTraffic:
         return Situation(self._elapsed(run), present, run.directions.driven, gap_to_ego, may_change)
 
     def _step(self, run: _Run) -> None:
-        self._update_drivers(run, _NO_ADVICE)
+        self._update_drivers(run, _NO_ADVICE, self._published_lamps())
         self._link.step()
         self._read_step(run)
 
-    def _update_drivers(self, run: _Run, command: Command) -> None:
+    def _update_drivers(self, run: _Run, command: Command, lamps: Mapping[str, Lamp]) -> None:
         if run.perception is not None:
-            run.perception.update(self._published_lamps(), run.script.lamps)
+            run.perception.update(lamps, run.script.lamps)
         if run.drivers is not None:
             run.drivers.update(command)
 

@@ -1,5 +1,6 @@
 """Where every vehicle and person is at one instant, and what the traffic lights show."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -209,7 +210,7 @@ class TrafficState:
 
 def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
     """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad]."""
-    pieces = np.flatnonzero(state.pieces.row == row)
+    pieces = np.flatnonzero(state.pieces.row == row) if state.pieces.kind else ()
     if len(pieces):
         last = int(pieces[-1])
         front, heading, length = state.pieces.position[last], state.pieces.heading[last], state.pieces.length[last]
@@ -259,7 +260,8 @@ def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np
 
     Takes `heard` [m/s].
     """
-    return np.array([heard.get(vehicle, np.inf) for vehicle in ids]) if heard else np.zeros(0)
+    spoken = map(heard.get, ids, itertools.repeat(np.inf)) if heard else ()
+    return np.fromiter(spoken, np.float64)
 
 
 @dataclass(frozen=True, slots=True)

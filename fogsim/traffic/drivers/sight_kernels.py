@@ -34,9 +34,10 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
 
 
-_X, _Y, Z, SPEED, MINIMUM_GAP, _BODY_CONTRAST, EYE_HEIGHT = range(7)
-"""Columns of what is known of a vehicle: where its front bumper is [m], its speed [m/s], its driver's minimum gap [m],
-the contrast of its body [-], and its driver's eyes above the road [m]."""
+_X, _Y, _Z = range(3)
+_MINIMUM_GAP, BODY_CONTRAST, EYE_HEIGHT = range(3)
+"""Columns of traits of vehicles: the driver's minimum gap [m], the body's contrast [-], the driver's eyes above the
+road [m]."""
 
 
 EYES, END, LINE, BEARING, AHEAD, ASIDE = 0, 3, 6, 7, 8, 9
@@ -51,38 +52,45 @@ class Closing(NamedTuple):
     speed: float  # By how much one vehicle's speed changes, on the average over the time that is looked ahead [m/s]
     drift: float  # How fast fog drifts and changes [m/s]
     extinction: float  # Extinction coefficient that is exceeded nowhere [1/m]
-    is_even: bool  # Whether the fog is the same everywhere, so that nothing but the gap changes its optical depth
+    even: float  # Extinction coefficient of fog that is the same everywhere [1/m]; negative for other fog
 
 
 @kernel
 def face_leaders(
-    vehicles: NDArray[np.float64],
-    gaps: NDArray[np.float64],
+    traits: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    read: NDArray[np.float64],
+    lamps: NDArray[np.float64],
     closing: Closing,
     facing: NDArray[np.float64],
     lines: NDArray[np.float64],
 ) -> None:
     """Put down where leaders are, how fast that changes, and in uneven fog the lines on which drivers look at them.
 
-    Takes `vehicles` (2n, 7), all followers before their leaders, `gaps` (n,) [m], `facing` (10, n), `lines` (2, n, 3)
-    [m].
+    Takes `traits` (m, 3 or more), the `rows` (2, n) of followers and leaders in it, what is `read` of them (4, n), gaps
+    [m], speeds [m/s] and signals of leaders, the luminous intensity of rear `lamps` (2, 128) by signals [cd], `facing`
+    (10, n), and `lines` (2, n, 3), in uneven fog with the places of followers and leaders [m].
     """
-    for i in range(gaps.size):
-        own, other = vehicles[i], vehicles[gaps.size + i]
-        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], NEAREST)
-        facing[CONTRAST, i] = other[_BODY_CONTRAST]
-        facing[_CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed
-        # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
-        apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
-        facing[_DEEPENING, i] = closing.extinction * (facing[_CLOSING, i] if closing.is_even else apart)
-        if closing.is_even:
+    for i in range(rows.shape[1]):
+        own, other, signals = traits[rows[0, i]], traits[rows[1, i]], int(read[3, i]) & 127
+        facing[DISTANCE, i] = max(read[0, i] + own[_MINIMUM_GAP], NEAREST)
+        facing[CONTRAST, i], facing[STEADY, i] = other[BODY_CONTRAST], lamps[0, 0]
+        facing[INTENSITY, i], facing[BRIGHTEST, i] = lamps[0, signals], lamps[1, signals]
+        facing[OWN_STEADY, i] = facing[OWN, i] = 1.0
+        facing[_CLOSING, i] = abs(read[2, i] - read[1, i]) + closing.speed
+        if closing.even >= 0.0:
+            facing[DEPTH, i] = closing.even * facing[DISTANCE, i]
+            facing[_DEEPENING, i] = closing.extinction * facing[_CLOSING, i]
             continue
-        x, y, z = other[_X] - own[_X], other[_Y] - own[_Y], other[Z] - own[Z]
-        height = own[EYE_HEIGHT]
+        # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
+        apart = read[1, i] + read[2, i] + 2.0 * closing.speed + closing.drift
+        facing[_DEEPENING, i] = closing.extinction * apart
+        start, end, height = lines[0, i], lines[1, i], own[EYE_HEIGHT]
+        x, y, z = end[_X] - start[_X], end[_Y] - start[_Y], end[_Z] - start[_Z]
+        start[_Z] += height
         z += min(height, BODY_MIDDLE) - height
         share = facing[DISTANCE, i] / math.sqrt(x * x + y * y + z * z)
-        lines[0, i] = own[_X], own[_Y], own[Z] + height
-        lines[1, i] = own[_X] + x * share, own[_Y] + y * share, own[Z] + height + z * share
+        end[_X], end[_Y], end[_Z] = start[_X] + x * share, start[_Y] + y * share, start[_Z] + z * share
 
 
 @kernel
@@ -205,10 +213,10 @@ def draw_lines_of_sight(
             if distance < nearest:
                 nearest = distance
                 lines[n, END], lines[n, END + 1] = end_x, end_y
-                lines[n, END + 2] = parts[i, Z] + min(height, BODY_MIDDLE)
+                lines[n, END + 2] = parts[i, _Z] + min(height, BODY_MIDDLE)
                 lines[n, AHEAD], lines[n, ASIDE] = ahead - parts[i, 4], aside
         first = ends[n]
-        lines[n, EYES], lines[n, EYES + 1], lines[n, EYES + 2] = x, y, observers[n, Z] + height
+        lines[n, EYES], lines[n, EYES + 1], lines[n, EYES + 2] = x, y, observers[n, _Z] + height
         up = lines[n, END + 2] - lines[n, EYES + 2]
         lines[n, LINE] = max(math.sqrt(nearest * nearest + up * up), NEAREST)
         bearing = math.atan2(lines[n, END + 1] - y, lines[n, END] - x) - observers[n, 3]

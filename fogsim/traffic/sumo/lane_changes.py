@@ -84,10 +84,11 @@ class LaneChangeSmoothing:
                 self._begin(last, state, changed)
         return self._glided(state) if self._glides else state
 
-    def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[str]) -> None:
+    def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
-        for vehicle, jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
+        for (_, row), jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
             if _LEAST_JUMP <= abs(jump) <= _LARGEST_JUMP:
+                vehicle = state.ids[row]
                 earlier = self._glides.get(vehicle)
                 left, rate = (0.0, 0.0) if earlier is None else earlier.left(state.time)
                 offset = left + jump
@@ -111,19 +112,22 @@ class LaneChangeSmoothing:
         return replace(state, position=position, heading=heading) if self._glides else state
 
 
-def _lane_changed(last: TrafficState, state: TrafficState) -> list[str]:
-    """Vehicles on lanes in both states whose lane is another, be it only the next along the road."""
-    if state.lane == last.lane and state.ids == last.ids:
+def _lane_changed(last: TrafficState, state: TrafficState) -> list[tuple[int, int]]:
+    """Rows in both states of vehicles on lanes whose lane is another, be it only the next along the road."""
+    before: Sequence[int] = range(len(last.ids))
+    if state.ids != last.ids:
+        known = {vehicle: row for row, vehicle in enumerate(last.ids)}
+        before = [known.get(vehicle, -1) for vehicle in state.ids]
+    elif state.lane == last.lane:
         return []
-    before = dict(zip(last.ids, last.lane, strict=True))
-    both = zip(state.ids, state.lane, strict=True)
-    return [v for v, lane in both if lane and v in before and before[v] not in ("", lane)]
+    lanes = (*last.lane, "")
+    both = enumerate(zip(before, state.lane, strict=True))
+    return [(old, new) for new, (old, lane) in both if lane and lanes[old] not in ("", lane)]
 
 
-def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[str]) -> NDArray[np.float64]:
+def _sideways_jumps(last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
     """How far vehicles have moved to their left (n,) [m]; ``inf`` for those who were not driven there."""
-    before, now = ({v: i for i, v in enumerate(s.ids)} for s in (last, state))
-    old, new = [before[v] for v in vehicles], [now[v] for v in vehicles]
+    old, new = np.array(changed).T
     moved = state.position[new, :2] - last.position[old, :2]
     # Along an arc one moves in the direction of the mean heading, so that a bend is no move to the side.
     turn = np.remainder(state.heading[new] - last.heading[old] + np.pi, 2.0 * np.pi) - np.pi

@@ -101,7 +101,7 @@ class NearbyVehicles:
             is_far = waits > 0.0
             near = list(itertools.compress(vehicles, (~is_far).tolist()))
             vehicles, waits = list(itertools.compress(vehicles, is_far.tolist())), waits[is_far]
-        self._far.add_each(vehicles, (self._roster.time + waits).tolist())
+        self._far.add_each(vehicles, waits.tolist(), self._roster.time)
         return near
 
     def _highest_rate(self) -> float:

@@ -2,7 +2,7 @@
 
 import itertools
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -173,14 +173,14 @@ class UpdateSchedule:
         """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
         self._due_at(time).extend(vehicles)
 
-    def add_each(self, vehicles: Sequence[str], times: Iterable[float]) -> None:
-        """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
-        # Mostly many wait for the same time.
-        due: dict[float, list[str]] = {}
-        for vehicle, time in zip(vehicles, times, strict=True):
-            if time not in due:
-                due[time] = self._due_at(time)
-            due[time].append(vehicle)
+    def add_each(self, vehicles: Sequence[str], pauses: Sequence[float], now: float) -> None:
+        """Schedule vehicles as `add` does, each for a pause of its own (`pauses`, `now` [s])."""
+        step, following, batch, due = self._step, self._current + 1, self._batch, self._due
+        # What `_due_at` does, without a call for each.
+        for vehicle, pause in zip(vehicles, pauses, strict=True):
+            number = ((now + pause) / step + _ROUNDING) // 1.0
+            number = number if number > following else following
+            due[number - number % batch if number - following >= batch - 1 else number].append(vehicle)
 
     def _due_at(self, time: float) -> list[str]:
         """Those who wait with who waits until a time."""
@@ -246,10 +246,9 @@ class DueVehicles:
         if vehicles:
             self._schedule.add(vehicles, self._roster.time + pause)
 
-    def schedule_each(self, vehicles: Sequence[str], pauses: Iterable[float]) -> None:
+    def schedule_each(self, vehicles: Sequence[str], pauses: Sequence[float]) -> None:
         """Schedule vehicles that have been taken out, each for a pause of its own (`pauses` [s])."""
-        now = self._roster.time
-        self._schedule.add_each(vehicles, [now + pause for pause in pauses])
+        self._schedule.add_each(vehicles, pauses, self._roster.time)
 
     def bring_forward(self, vehicle: str) -> None:
         """Let a vehicle that waits be due in the next step."""

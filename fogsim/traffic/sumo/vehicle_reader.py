@@ -1,5 +1,6 @@
 """Reading SUMO's vehicles into arrays: what changes for those near the ego, what never changes once."""
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -142,9 +143,9 @@ class VehicleReader:
         self._slope = vehicle_getter(api, "getSlope")
         self._level = math.nan
         self._hits = getter(api, "simulation", "getCollisions")
-        self._lane_limit = getter(api, "lane", "getMaxSpeed")
+        limit = getter(api, "lane", "getMaxSpeed")
         # A vehicle off the lanes is limited by nothing but itself.
-        self._lane_limits = {"": math.inf}
+        self._lane_limit = functools.cache(lambda lane: limit(lane) if lane else math.inf)
         self._mark = 0
         self._constants: _Constants | None = None
         self._free: tuple[tuple[str, ...], _Constants | None, NDArray[np.float64]] = (), None, np.zeros(0)
@@ -157,10 +158,9 @@ class VehicleReader:
         lamps_of: Mapping[str, Lamp] | None = None,
     ) -> TrafficState:
         """Vehicles near the ego (`heard` [m/s])."""
-        self._roster.update()
+        now = self._dynamic_state()
         new, self._mark = self._roster.entered_since(self._mark)
         self._bodies.forget(new)
-        now = self._dynamic_state()
         off_lanes = _off_lanes(now)
         constants = self._constants_of(now.ids)
         ego = constants.ego
@@ -195,10 +195,7 @@ class VehicleReader:
         Limits are as they were when the ego first came near: those of signs that change are advice.
         """
         if lanes != self._free[0] or constants is not self._free[1]:
-            known = self._lane_limits
-            for lane in {*lanes}.difference(known):
-                known[lane] = float(self._lane_limit(lane))
-            limits = np.array([known[lane] for lane in lanes]) * constants.speed_factor
+            limits = np.fromiter(map(self._lane_limit, lanes), np.float64, len(lanes)) * constants.speed_factor
             self._free = lanes, constants, np.minimum(limits, constants.top_speed)
         return self._free[2]
 
@@ -280,6 +277,7 @@ class SubscribedReader(VehicleReader):
     def _dynamic_state(self) -> _DynamicState:
         if self._ego is None:
             return super()._dynamic_state()
+        self._roster.update()
         rows = self._surroundings()
         # Rows of a subscription of the user's own may be among them, with other variables.
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))

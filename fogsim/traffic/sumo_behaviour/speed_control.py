@@ -228,9 +228,8 @@ class SumoDesiredSpeeds:
         return self._heard
 
     def update(self, command: Command) -> None:
-        """Let new drivers choose a speed, and all drivers if it is time to choose again."""
+        """Let new drivers choose a speed, by a roster that is up to date, and all if it is time to choose again."""
         roster = self._roster
-        roster.update()
         time, present = roster.time, roster.present
         new, self._mark = roster.entered_since(self._mark)
         if new:

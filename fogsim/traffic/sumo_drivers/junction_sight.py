@@ -189,10 +189,12 @@ class JunctionSight:
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)
+        pauses = []
         for driver, foes in doubts.items():
             is_seen = {foe: (driver, foe) in seen for foe in foes}
             is_emerging = self._unseen.decide(driver, is_seen, self._roster.time)
-            self._due.schedule((driver,), 0.0 if is_emerging else min(foes.values()))
+            pauses.append(0.0 if is_emerging else min(foes.values()))
+        self._due.schedule_each(list(doubts), pauses)
 
     def _seen(self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps) -> set[tuple[str, str]]:
         """Those of some pairs of a driver and a foe in which the driver sees the foe."""

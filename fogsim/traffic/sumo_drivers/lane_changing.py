@@ -15,6 +15,7 @@ Drivers look each `_LOOK_PERIOD`; who has no one unseen about is not touched.
 """
 
 import contextlib
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -146,7 +147,8 @@ class _StandingLeaders:
         hidden, speed = self._leaders.hidden, self._leaders.speed
         # A hidden leader may have left since the driver's last look ahead.
         behind = [(v, hidden[v]) for v in drivers if v in hidden and hidden[v] in present]
-        soon_standing = [pair for pair in behind if speed(pair[1]) < _SOON_STANDING]
+        speeds = map(speed, [leader for _, leader in behind])
+        soon_standing = [pair for pair, now in zip(behind, speeds, strict=True) if now < _SOON_STANDING]
         self._strategic.decide(drivers, [pair[0] for pair in soon_standing if self._would_be_left_for(*pair)])
 
     def expect_unseen(self, driver: str, leader: str) -> None:
@@ -255,7 +257,8 @@ class LaneChanging:
         """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         speed, certain_until = self._leaders.speed, self._certain_until
         soon, later = self._roster.time + 0.5 * _LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
-        looking = [driver for driver in drivers if certain_until.get(driver, 0.0) <= soon]
+        certain = map(certain_until.get, drivers, itertools.repeat(0.0))
+        looking = [driver for driver, until in zip(drivers, certain, strict=True) if until <= soon]
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         for driver, (leader, gap) in zip(looking, self._neighbours.left_leaders(looking), strict=True):

@@ -83,19 +83,19 @@ class Neighbours:
 
         Those are left out in which a driver is held back for certain by some of the others.
         """
-        wanted: dict[tuple[str, _Side], int] = {}
-        for vehicle, signals in zip(vehicles, map(self._signals, vehicles), strict=True):
-            # Who wants to change lanes blinks.
-            for side in (_LEFT, _RIGHT) if signals & _BLINKERS else ():
-                state = int(self._state(vehicle, side.offset)[1])
-                # Another vehicle blocks what the driver's own model wants.
-                if state & side.wanted and state & side.blocked and not state & _TRACI:
-                    wanted[vehicle, side] = state
-        there = {vehicle for vehicle, _ in wanted}
-        for vehicle in wishing:
-            if vehicle not in there and not (state := int(self._state(vehicle, _LEFT.offset)[1])) & _TRACI:
-                wanted[vehicle, _LEFT] = state
-        changes = (self._change(*which, state, is_held_back) for which, state in wanted.items())
+        read = self._state
+        wanted: list[tuple[str, _Side, int]] = [
+            (vehicle, side, state)
+            for vehicle, signals in zip(vehicles, map(self._signals, vehicles), strict=True)
+            # Who wants to change lanes blinks; and another vehicle blocks what the driver's own model wants.
+            if signals & _BLINKERS
+            for side in (_LEFT, _RIGHT)
+            if (state := read(vehicle, side.offset)[1]) & side.wanted and state & side.blocked and not state & _TRACI
+        ]
+        there = {vehicle for vehicle, _, _ in wanted}
+        others = [(vehicle, _LEFT, read(vehicle, _LEFT.offset)[1]) for vehicle in wishing if vehicle not in there]
+        wanted += [other for other in others if not other[2] & _TRACI]
+        changes = (self._change(*one, is_held_back) for one in wanted)
         return [change for change in changes if change is not None]
 
     def _change(

@@ -28,16 +28,12 @@ from fogsim.traffic.drivers.sight_kernels import (
     DAZZLED,
     DEPTH,
     DISTANCE,
-    EYE_HEIGHT,
     INTENSITY,
-    MINIMUM_GAP,
     OWN,
     OWN_STEADY,
     SEEN,
-    SPEED,
     STEADY,
     Closing,
-    Z,
     face_leaders,
 )
 from fogsim.traffic.sumo.claims import SPEED_GAIN, SessionValues
@@ -55,15 +51,11 @@ _LEAST_EXTINCTION = 1e-6
 _FASTEST_DRIFT = 30.0
 """Fog drifts and changes no faster than if a wind of this speed carried it [m/s]."""
 
-_STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
-"""Of the rear lamps that other drivers always light [cd]."""
-
-_SIGNALS = 127
-"""Bits of SUMO's vehicle signals that stand for lamps."""
-
-_LIT = [int(OTHERS_LAMPS) | lamps_from_signals(signals) for signals in range(_SIGNALS + 1)]
+_LIT = [int(OTHERS_LAMPS) | lamps_from_signals(signals) for signals in range(128)]
 _REAR_LIGHTS = np.array([[rear_intensity(lit | soon) for lit in _LIT] for soon in (0, int(Lamp.STOP))])
 """Luminous intensity of the brightest rear lamp that signals light, and that may soon be lit (2, n) [cd]."""
+
+_NOWHERE = np.empty((2, 0, 3))
 
 _Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
@@ -79,9 +71,9 @@ class LeaderSight:
         (self._signals,) = view.getters("getSignals")
         self._glare = OncomingGlare(view)
         self._most_glare = most_glare(view.sight.illuminance)
-        is_even, most = view.extinction is not None, view.fog.maximum_extinction
-        densest, change = max(most, _LEAST_EXTINCTION) if is_even else most, closing_speed_bound(0.0, 0.0, horizon)
-        self._closing = Closing(change, _FASTEST_DRIFT, densest, is_even)
+        densest, change = view.fog.maximum_extinction, closing_speed_bound(0.0, 0.0, horizon)
+        densest = densest if view.extinction is None else max(densest, _LEAST_EXTINCTION)
+        self._closing = Closing(change, _FASTEST_DRIFT, densest, -1.0 if view.extinction is None else view.extinction)
 
     def assess(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> tuple[list[bool], list[float]]:
         """Whether each leader is seen, and for how long that is sure to stay so [s]."""
@@ -99,25 +91,18 @@ class LeaderSight:
     def _facing(self, pairs: Sequence[_Pair]) -> NDArray[np.float64]:
         """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
         followers, leaders, gaps = zip(*pairs, strict=True)
-        facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
-        face_leaders(self._read(followers + leaders), np.array(gaps, np.float64), self._closing, facing, lines)
-        known = self._extinction
-        facing[DEPTH] = self._fog.optical_depth(*lines) if known is None else known * facing[DISTANCE]
-        facing[STEADY], facing[OWN_STEADY:] = _STEADY_INTENSITY, 1.0
-        facing[INTENSITY : BRIGHTEST + 1] = _REAR_LIGHTS[:, [lit & _SIGNALS for lit in map(self._signals, leaders)]]
+        both, count, facing, lines = followers + leaders, len(pairs), np.empty((OWN + 1, len(pairs))), _NOWHERE
+        if self._extinction is None:
+            flat = itertools.chain.from_iterable(map(self._position, both))
+            lines = np.fromiter(flat, np.float64, 6 * count).reshape(2, -1, 3)
+        read = np.fromiter(
+            itertools.chain(gaps, map(self._speed, both), map(self._signals, leaders)), np.float64, 4 * count
+        ).reshape(4, -1)
+        rows = self._vehicles.rows(both).reshape(2, -1)
+        face_leaders(self._vehicles.traits, rows, read, _REAR_LIGHTS, self._closing, facing, lines)
+        if self._extinction is None:
+            facing[DEPTH] = self._fog.optical_depth(*lines)
         return facing
-
-    def _read(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        """What is known of vehicles (n, 7): where they are, which does not matter in even fog, how fast, and so on."""
-        # Mostly who leads one follows another.
-        rows = {vehicle: row for row, vehicle in enumerate(dict.fromkeys(vehicles))}
-        read = np.empty((len(rows), EYE_HEIGHT + 1))
-        if not self._closing.is_even:
-            flat = itertools.chain.from_iterable(map(self._position, rows))
-            read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(rows)).reshape(-1, 3)
-        read[:, SPEED] = np.fromiter(map(self._speed, rows), np.float64, len(rows))
-        read[:, MINIMUM_GAP:] = self._vehicles.traits(rows)[:, : EYE_HEIGHT + 1 - MINIMUM_GAP]
-        return read[[rows[vehicle] for vehicle in vehicles]]
 
     @staticmethod
     def _doubt_own_beams(
@@ -172,6 +157,10 @@ MAX_PAUSE = 0.5
 _LONG_WAY = 70.0 * MAX_PAUSE
 """By more than this no gap changes until then [m]: at 250 km/h towards a standing vehicle."""
 
+_CLOSING = closing_speed_bound(0.0, 0.0, MAX_PAUSE)
+"""By so much the difference of two speeds changes until then, on the average [m/s]."""
+
+_NO_LEADER = "", 0.0
 _IGNORED = "carFollowModel.ignoreIDs"
 _NO_SPEED_GAIN = 0.0
 
@@ -258,28 +247,28 @@ class Perception:
                 self._ignored_leaders.stop_ignoring(follower)
             trains = {v for v in new if self._vehicle_class(v) in TRAINS}
             due = [v for v in due if v not in trains]
-        doubtful = self._decide_by_gap(due) if due else ()
-        if doubtful:
-            self._decide_by_sight(doubtful, own_lamps)
+        if due:
+            self._look(due, own_lamps)
 
-    def _decide_by_gap(self, due: Sequence[str]) -> list[_Pair]:
-        """Decide where the gap alone is enough, and give back the rest."""
+    def _look(self, due: Sequence[str], own_lamps: OwnLamps) -> None:
+        """Decide by the gap alone where that is enough, and by sight where it is not."""
         ignored, speed, seen, hidden = self._ignored, self.speed, self._certainly_seen, self._certainly_hidden
         ahead = list(map(self.leader, due, itertools.repeat(REACH)))
         behind = self._obstructed(due, ahead)
         # Most vehicles are far from any doubt, and pause for the longest time.
         calm: list[str] = []
+        near: list[_Pair] = []
         doubtful: list[_Pair] = []
-        pauses: dict[str, float] = {}
         for follower, found in zip(due, ahead, strict=True):
-            if not found or not found[0]:
+            leader, gap = found or _NO_LEADER
+            if not leader:
                 calm.append(follower)
                 if follower in ignored:
                     self._reveal(follower)
                 continue
-            leader, gap = found
             if gap > hidden or follower in behind:
-                self._hide(follower, leader)
+                if ignored.get(follower) != leader or follower in self._emerging:
+                    self._hide(follower, leader)
                 near_edge = 0.0 if follower in behind else gap - hidden
             elif gap > seen or follower in ignored:
                 doubtful.append((follower, leader, gap))
@@ -289,11 +278,15 @@ class Perception:
             if near_edge >= _LONG_WAY:
                 calm.append(follower)
             else:
-                # Until the gap could have changed by so much.
-                pauses[follower] = near_edge / closing_speed_bound(speed(follower), speed(leader), MAX_PAUSE)
+                near.append((follower, leader, near_edge))
+        followers, leaders, ways = zip(*near, strict=True) if near else ((), (), ())
+        speeds = zip(map(speed, followers), map(speed, leaders), ways, strict=True)
+        # Until the gap could have changed by so much.
+        pauses = [min(way / (abs(other - own) + _CLOSING), MAX_PAUSE) for own, other, way in speeds]
+        if doubtful:
+            pauses += self._decide_by_sight(doubtful, own_lamps)
         self._due.schedule(calm, MAX_PAUSE)
-        self._due.schedule_each(tuple(pauses), [min(pause, MAX_PAUSE) for pause in pauses.values()])
-        return doubtful
+        self._due.schedule_each([pair[0] for pair in near + doubtful], pauses)
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""
@@ -302,7 +295,8 @@ class Perception:
         pairs = [(v, found[0]) for v, found in zip(followers, ahead, strict=True) if found and found[0]]
         return {v for (v, _), hidden in zip(pairs, self._hidden_vehicles.are_hidden(pairs), strict=True) if hidden}
 
-    def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> None:
+    def _decide_by_sight(self, pairs: Sequence[_Pair], own_lamps: OwnLamps) -> list[float]:
+        """Decide where sight is in doubt, and give back the pauses until the next looks [s]."""
         seen, pauses = self._leader_sight.assess(pairs, own_lamps)
         ignored, emerging = self._ignored, self._emerging
         for (follower, leader, _), is_seen in zip(pairs, seen, strict=True):
@@ -311,10 +305,7 @@ class Perception:
                     self._hide(follower, leader)
             elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-        followers = [pair[0] for pair in pairs]
-        if emerging:
-            pauses = [0.0 if v in emerging else pause for v, pause in zip(followers, pauses, strict=True)]
-        self._due.schedule_each(followers, pauses)
+        return [0.0 if pair[0] in emerging else pause for pair, pause in zip(pairs, pauses, strict=True)]
 
     def _hide(self, follower: str, leader: str) -> None:
         """From now on a follower does not react to a leader."""

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,17 @@ from fogsim.traffic.drivers.lamp_intensity import (
     uses_high_beam,
 )
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
-from fogsim.traffic.drivers.sight_kernels import AHEAD, ASIDE, BEARING, END, EYES, LINE, draw_lines_of_sight
+from fogsim.traffic.drivers.sight_kernels import (
+    AHEAD,
+    ASIDE,
+    BEARING,
+    BODY_CONTRAST,
+    END,
+    EYE_HEIGHT,
+    EYES,
+    LINE,
+    draw_lines_of_sight,
+)
 from fogsim.traffic.sumo.claims import SOLE_SESSION
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo.roster import Roster
@@ -50,9 +60,6 @@ class _SeenBody(NamedTuple):
     missing: int  # Bits of sides on which there is no lamp
 
 
-_CONTRAST, _EYES_TO_WIDTH = 1, slice(2, 5)
-"""Columns of bodies in an array."""
-
 _OF_TARGET = 10
 """Column of lines of sight, after those that kernels draw: the target's contrast."""
 
@@ -67,7 +74,8 @@ class _SeenVehicles:
         self._getters = tuple(vehicle_getter(api, name) for name in names)
         self._bodies: dict[str, _SeenBody] = {}
         self._rows: dict[str, int] = {}
-        self._traits = np.empty((64, len(_SeenBody._fields)))
+        self.traits = np.empty((64, len(_SeenBody._fields)))
+        """A row for each body, in the order of the fields of `_SeenBody`; another array once it has grown."""
         self._count = 0
 
     def forget(self, vehicles: Iterable[str]) -> None:
@@ -80,15 +88,14 @@ class _SeenVehicles:
         """Body of a vehicle."""
         return self._bodies.get(vehicle) or self._read(vehicle)
 
-    def traits(self, vehicles: Collection[str]) -> NDArray[np.float64]:
-        """Bodies of vehicles (n, 7), in the order of the fields of `_SeenBody`."""
-        rows = self._rows
+    def rows(self, vehicles: Sequence[str]) -> NDArray[np.intp]:
+        """Rows of vehicles in `traits` (n,)."""
         try:
-            return self._traits[[rows[vehicle] for vehicle in vehicles]]
+            return np.fromiter(map(self._rows.__getitem__, vehicles), np.intp, len(vehicles))
         except KeyError:
-            for vehicle in set(vehicles).difference(rows):
+            for vehicle in set(vehicles).difference(self._rows):
                 self._read(vehicle)
-            return self._traits[[rows[vehicle] for vehicle in vehicles]]
+            return self.rows(vehicles)
 
     def _read(self, vehicle: str) -> _SeenBody:
         colour, gap, length, width, height, vehicle_class, shape = (get(vehicle) for get in self._getters)
@@ -99,9 +106,9 @@ class _SeenVehicles:
         body = _SeenBody(gap, contrast, eyes, length, width, height, missing)
         row = self._rows[vehicle] = self._count
         self._count += 1
-        if row == len(self._traits):
-            self._traits = np.concatenate((self._traits, np.empty_like(self._traits)))
-        self._traits[row] = self._bodies[vehicle] = body
+        if row == len(self.traits):
+            self.traits = np.concatenate((self.traits, np.empty_like(self.traits)))
+        self.traits[row] = self._bodies[vehicle] = body
         return body
 
     def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
@@ -233,11 +240,12 @@ class VehicleSight:
         """Straight lines (n, 11) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
         observers, targets = zip(*pairs, strict=True)
         both, count = observers + targets, len(pairs)
-        read, lines, traits = np.empty((2 * count, 7)), np.empty((count, _OF_TARGET + 1)), self._vehicles.traits(both)
+        read, lines, rows = np.empty((2 * count, 7)), np.empty((count, _OF_TARGET + 1)), self._vehicles.rows(both)
+        traits = self._vehicles.traits[rows]
         flat = itertools.chain.from_iterable(map(self._position, both))
         read[:, :3] = np.fromiter(flat, np.float64, 6 * count).reshape(-1, 3)
         read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, both), np.float64, 2 * count))
-        read[:, 4:], lines[:, _OF_TARGET] = traits[:, _EYES_TO_WIDTH], traits[count:, _CONTRAST]
+        read[:, 4:], lines[:, _OF_TARGET] = traits[:, EYE_HEIGHT : EYE_HEIGHT + 3], traits[count:, BODY_CONTRAST]
         bodies, ends = read[count:], np.arange(1, count + 1)
         bodies[:, 4] = 0.0
         if (bodies[:, 5] > LONGEST_RIGID).any():

@@ -1,6 +1,8 @@
 """Which vehicles drive on the oncoming lane, where SUMO counts their position from the far end."""
 
+import itertools
 import math
+from collections.abc import Sequence
 
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 
@@ -41,6 +43,15 @@ class LaneDirections:
         if known is None or known[0] != lane:
             known = self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
         return known[1]
+
+    def against(self, vehicles: Sequence[str], lanes: Sequence[str]) -> list[int]:
+        """Rows of those of some vehicles that drive against the direction of their lanes."""
+        both = enumerate(zip(lanes, map(self._known.get, vehicles, itertools.repeat(("", False))), strict=True))
+        return [
+            row
+            for row, (lane, known) in both
+            if (known[1] if known[0] == lane else self.is_two_way(lane) and self.is_against(vehicles[row], lane))
+        ]
 
     def is_two_way(self, lane: str) -> bool:
         """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so."""

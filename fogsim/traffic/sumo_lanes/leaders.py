@@ -208,15 +208,14 @@ class Courses:
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._spots = _LaneSpots(api, remote)
         self._directions = LaneDirections(api)
-        self._two_way: dict[str, bool] = {}
         self._last: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
-        self._against: tuple[int, ...] = ()
+        self._against: Sequence[int] = ()
 
     def add(self, state: TrafficState) -> TrafficState:
         """The state with `TrafficState.course` and `TrafficState.across`; as it is where all just keep to lanes."""
         if (state.ids, state.lane) != self._last:
             self._last = state.ids, state.lane
-            self._against = self._find_against(state)
+            self._against = self._directions.against(state.ids, state.lane)
         if not self._against and not self._spots.is_divided:
             return state
         course, across = list(state.lane), state.across
@@ -229,10 +228,3 @@ class Courses:
         for row in self._against:
             course[row] = f"-{course[row]}"
         return replace(state, course=tuple(course), across=across)
-
-    def _find_against(self, state: TrafficState) -> tuple[int, ...]:
-        """Rows of those who drive against their lane's direction."""
-        known = self._two_way
-        known.update((lane, self._directions.is_two_way(lane)) for lane in {*state.lane}.difference(known))
-        rows = [row for row, lane in enumerate(state.lane) if known[lane]]
-        return tuple(row for row in rows if self._directions.is_against(state.ids[row], state.lane[row]))

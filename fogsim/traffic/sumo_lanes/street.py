@@ -65,7 +65,7 @@ class SignalReader:
         self._places = np.array([head.position for head in self._heads]).reshape(-1, 3)
         self._asked = np.full(2, np.inf)
         self._near: list[SignalHead] = []
-        self._last = NO_SIGNALS
+        self._last, self._signals = NO_SIGNALS, tuple[str, ...]()
         self._shown: dict[str, str] = {}
 
     def state(self, here: NDArray[np.float64]) -> SignalState:
@@ -74,7 +74,7 @@ class SignalReader:
             return self._last
         if not np.hypot(*(here[:2] - self._asked)) < _MOVED:
             self._find_near(here[:2])
-        shown = {signal: self._letters(signal) for signal in dict.fromkeys(self._last.ids)}
+        shown = dict(zip(self._signals, map(self._letters, self._signals), strict=True))
         if shown != self._shown or len(self._last.colour) < len(self._near):
             self._shown = shown
             colours = tuple(SIGNAL_COLOURS[_letter(shown[head.signal_id], head.links)] for head in self._near)
@@ -86,6 +86,7 @@ class SignalReader:
         off = self._places[:, :2] - here
         near = np.flatnonzero(np.hypot(off[:, 0], off[:, 1]) < _SIGNAL_REACH + _MOVED).tolist()
         self._near = heads = [self._heads[row] for row in near]
+        self._signals = tuple({head.signal_id: None for head in heads})
         self._last = SignalState(
             ids=tuple(head.signal_id for head in heads),
             lane=tuple(head.lane_id for head in heads),

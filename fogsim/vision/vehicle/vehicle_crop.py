@@ -14,7 +14,7 @@ from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.luminance import Clipping, clipping, linear_pixels, linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
-from fogsim.vision.lines.horizon import levelled
+from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
 from fogsim.vision.strips.sky import Sky, sky_above
@@ -189,7 +189,8 @@ def daytime_crop(
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    margin = 3.0 * pitch_deviation * camera.focal_length + 2.0
+    # That of joint_road, so that a frame's sky is read once.
+    margin = 3.0 * calibrated_horizon(camera, pitch_deviation).standard_deviation + 2.0
     sky = sky_above(pixels, camera, margin)
     airlight = None if sky is None else row_airlight(sky, camera, extinction)
     luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)

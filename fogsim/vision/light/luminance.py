@@ -117,10 +117,10 @@ def darker_by(fall: float, headroom: float, spread: float) -> tuple[float, float
 def _censored(values: Pixels, camera: Camera) -> tuple[float, float]:
     """By how much the mean of one channel is too low, and its noise."""
     top = 2**camera.bits - 1
-    upto = np.cumsum(np.bincount(values, minlength=top + 1)) / max(values.size, 1)
-    share = 1.0 - float(upto[top - 1])
+    share = np.count_nonzero(values == top) / max(values.size, 1)
     if not _LEAST <= share <= _MOST:
         return 0.0, 0.0
+    upto = np.cumsum(np.bincount(values, minlength=top + 1)) / values.size
     # Two values between which pixel values change, and the shares of pixels below them: rounding changes neither.
     lower = int(np.argmin(np.abs(upto[: top - 1] - _LOWER * upto[top - 1])))
     if upto[lower] < _LEAST:

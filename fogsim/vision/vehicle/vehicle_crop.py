@@ -248,8 +248,8 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     rows = _rows_above(camera, margin)
     light = day.luminance_of(rows, slice(camera.width // 6, camera.width - camera.width // 6))
     level = sky.luminance if day.airlight is None else day.airlight.level
-    core = np.abs(light - level) <= _SKY_CORE * level + 4.0 * sky.noise
-    if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < _SKY_SHARE:
+    core = np.count_nonzero(np.abs(light - level) <= _SKY_CORE * level + 4.0 * sky.noise)
+    if sky.noise > MOST_NOISE * level or not light.size or core / light.size < _SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
     hidden = hidden_at_side(camera.focal_length, depth)
     axis = camera.principal_point[0] - camera.width // 6
@@ -257,7 +257,8 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     if not clear.any():
         raise CannotTellError("no part of the sky is as bright as the sky next to the vehicle")
-    lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
+    sides = pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6]
+    lost = clipping(sides[clear], camera) if sides.max() == 2**camera.bits - 1 else Clipping(0.0, 0.0, 0.0)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     is_clipped = not lost.noise > 0.0 and sky.is_clipped
     deviation = 0.0

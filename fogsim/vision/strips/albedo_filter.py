@@ -201,6 +201,13 @@ def _cost_without(used: int, noise: float, airlight: float) -> float:
 
 
 @kernel
+def with_factor(logarithm: float, product: float, factor: float) -> tuple[float, float]:
+    """Multiply by a factor whose logarithm counts: one logarithm for several of them."""
+    product *= factor
+    return (logarithm, product) if 1e-100 < product < 1e100 else (logarithm + math.log(product), 1.0)
+
+
+@kernel
 def _mark_outliers(
     residuals: Residuals,
     i: int,
@@ -247,10 +254,7 @@ def whiten(
                 continue
             first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
             total = _show(joint, shares, first, line) + noise[strip, i]
-            # One logarithm for several factors.
-            product *= total
-            if not 1e-100 < product < 1e100:
-                log_determinant, product = log_determinant + math.log(product), 1.0
+            log_determinant, product = with_factor(log_determinant, product, total)
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
                 line[size + j] -= columns[strip, i, j]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
+from fogsim.vision.strips.albedo_filter import with_factor
 from fogsim.vision.strips.joint_kernels import (
     MOST_DARKER,
     Bins,
@@ -73,10 +74,7 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
                     rest = luminance[strip, i] - airlight * base[j] - drop * t
                     weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
                     if iteration == 3:
-                        # One logarithm for several factors.
-                        product *= 1.0 + rest * rest / spread
-                        if product > 1e100:
-                            total, product = total + math.log(product), 1.0
+                        total, product = with_factor(total, product, 1.0 + rest * rest / spread)
                     y, one = luminance[strip, i] - likely * base[j], base[j]
                     s0, s1, s2 = s0 + weight * one * one, s1 + weight * one * t, s2 + weight * t * t
                     r0, r1 = r0 + weight * one * y, r1 + weight * t * y

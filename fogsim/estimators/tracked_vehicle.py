@@ -2,7 +2,6 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections import deque
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -134,8 +133,10 @@ class SmoothedRanges:
 
     def __init__(self, deviation: float) -> None:
         self._deviation = deviation
-        self._measured: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
-        self._count = 0
+        # Time, distance and speed of each; those in use are the last ones.
+        self._measured = np.empty((3, 2 * _KEPT))
+        self._likely: Floats | None = None
+        self._count = self._used = 0
 
     def add(self, time: float, measured: LeadMeasurement) -> int:
         """Take a measurement.
@@ -143,7 +144,12 @@ class SmoothedRanges:
         Returns Its number, by which it is asked for. Takes `time` [s].
         """
         speed = measured.relative_speed if math.isfinite(measured.relative_speed) else 0.0
-        self._measured.append((time, measured.distance, speed))
+        if self._used == 2 * _KEPT:
+            self._measured[:, : _KEPT - 1] = self._measured[:, -_KEPT + 1 :]
+            self._used = _KEPT - 1
+        self._measured[:, self._used] = time, measured.distance, speed
+        self._used += 1
+        self._likely = None
         self._count += 1
         return self._count - 1
 
@@ -152,13 +158,17 @@ class SmoothedRanges:
 
         Returns [m] (n,). Takes `measured` (n,) [m].
         """
-        if self._deviation <= 0.0 or len(self._measured) < 3:
+        if self._deviation <= 0.0 or self._used < 3:
             return measured
-        time, distance, speed = np.array(self._measured).T.copy()
-        likely = _smoothed(time, distance, speed, self._deviation)
-        if _is_contradicted((likely - distance) / self._deviation):
+        if self._likely is None:
+            time, distance, speed = self._measured[:, max(self._used - _KEPT, 0) : self._used]
+            likely = _smoothed(time, distance, speed, self._deviation)
+            is_contradicted = _is_contradicted((likely - distance) / self._deviation)
+            self._likely = likely[:0] if is_contradicted else likely
+        likely = self._likely
+        if not likely.size:
             return measured
-        at = np.array(numbers, np.int64) - (self._count - time.size)
+        at = np.array(numbers, np.int64) - (self._count - likely.size)
         return np.asarray(np.where(at >= 0, likely[np.maximum(at, 0)], measured))
 
 

@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.row_kernels import LIGHTS
-from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import quantile
+from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
 from fogsim.vision.lines.horizon import Horizon
 
 _BLOCKS = 80
@@ -66,24 +68,39 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     is_seen = first >= 0 and last > top and ground + _LEAST_ROWS < camera.height and extinction > 0.0
     if not is_seen or camera.mount_height > _BELOW_CROWNS:
         return 0.0
-    light = linear_luminance(level[top:], camera.response, camera.bits, camera.black_level)
-    per_block = max(light.shape[1] // _BLOCKS, 1)
-    count = light.shape[1] // per_block
-    blocks = light[:, : count * per_block].reshape(light.shape[0], count, per_block).mean(axis=2)
-    aside = np.abs((np.arange(count) + 0.5) * per_block - camera.principal_point[0]) > _OWN_LANE * camera.width
-    blocks = blocks[:, aside]
-    airlight = quantile(blocks[: last - top], _BRIGHTEST) if aside.any() else 0.0
+    pixels = linear_pixels(level, camera)
+    per_block = max(camera.width // _BLOCKS, 1)
+    middles = (np.arange(camera.width // per_block) + 0.5) * per_block
+    aside = np.flatnonzero(np.abs(middles - camera.principal_point[0]) > _OWN_LANE * camera.width)
+    sky = _block_means(pixels, top, last, per_block, aside)
+    airlight = quantile(sky, _BRIGHTEST) if aside.size else 0.0
     if not airlight > 0.0:
         return 0.0
-    blocks = blocks / airlight
-    above, below = blocks[first - top : last - top].mean(axis=0), blocks[ground - top :]
+    above = (sky[first - top :] / airlight).mean(axis=0, dtype=np.float64)
+    if above.min() >= _DARKER:
+        return 0.0
     depth = -np.log1p(-np.clip(above, 0.0, _DARKER)) / extinction
-    foot = camera.row_distance / np.maximum(depth, 1e-3)
-    rows = np.arange(below.shape[0])[:, None] + ground - horizon.row
-    before = (rows < foot - margin) & (below > above + _BRIGHTER)
-    counted = (rows < foot - margin).sum(axis=0)
-    seen = (above < _DARKER) & (counted >= _LEAST_ROWS) & (before.sum(axis=0) > 0.5 * counted)
-    return float(seen.mean())
+    ends = np.ceil(camera.row_distance / np.maximum(depth, 1e-3) - margin + horizon.row).astype(np.int64)
+    ends = np.minimum(np.where(above < _DARKER, ends, ground), camera.height)
+    below = _block_means(pixels, ground, max(int(ends.max()), ground), per_block, aside)
+    rows, counted = np.arange(ground, ground + len(below))[:, None], ends - ground
+    brighter = ((rows < ends) & (below > airlight * (above + _BRIGHTER))).sum(axis=0)
+    return float(((counted >= _LEAST_ROWS) & (brighter > 0.5 * counted)).mean())
+
+
+@kernel
+def _block_means(
+    image: LinearPixels, first: int, end: int, width: int, blocks: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Mean luminance of rows of some blocks of so many columns (rows, blocks)."""
+    means = np.empty((end - first, blocks.size), np.float32)
+    for row in range(first, end):
+        for i in range(blocks.size):
+            total = 0.0
+            for col in range(blocks[i] * width, (blocks[i] + 1) * width):
+                total += pixel_luminance(image, row, col)
+            means[row - first, i] = total / width
+    return means
 
 
 _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0

@@ -31,10 +31,15 @@ def linear_table(response: Response, bits: int = 8, black_level: float = 0.0) ->
 
 def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
     """Pair an image with the inverse of its camera's response; no pixel is touched (`image` (rows, cols))."""
-    table = linear_table(camera.response, camera.bits, camera.black_level)
-    weights = np.array(LUMINANCE_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
-    return LinearPixels(pixels, weights[:, None] * table)
+    return LinearPixels(pixels, _tables(camera.response, camera.bits, camera.black_level, image.ndim == 3))
+
+
+@lru_cache(maxsize=6 * len(Response))
+def _tables(response: Response, bits: int, black_level: float, is_colour: bool) -> NDArray[np.float32]:
+    """What each channel adds to the luminance (channels, levels); it is shared."""
+    weights = np.array(LUMINANCE_WEIGHTS if is_colour else (1.0,), np.float32)
+    return weights[:, None] * linear_table(response, bits, black_level)
 
 
 def linear_luminance(image: Pixels, response: Response, bits: int = 8, black_level: float = 0.0) -> NDArray[np.float32]:
@@ -112,10 +117,10 @@ def darker_by(fall: float, headroom: float, spread: float) -> tuple[float, float
 def _censored(values: Pixels, camera: Camera) -> tuple[float, float]:
     """By how much the mean of one channel is too low, and its noise."""
     top = 2**camera.bits - 1
-    upto = np.cumsum(np.bincount(values, minlength=top + 1)) / max(values.size, 1)
-    share = 1.0 - float(upto[top - 1])
+    share = np.count_nonzero(values == top) / max(values.size, 1)
     if not _LEAST <= share <= _MOST:
         return 0.0, 0.0
+    upto = np.cumsum(np.bincount(values, minlength=top + 1)) / values.size
     # Two values between which pixel values change, and the shares of pixels below them: rounding changes neither.
     lower = int(np.argmin(np.abs(upto[: top - 1] - _LOWER * upto[top - 1])))
     if upto[lower] < _LEAST:

@@ -325,19 +325,30 @@ def _derivatives(image: Image, smooth: Image, derivative: Image, across: Image, 
     Pixels at equal distances are added first, so that a mirrored image gives the same to the last bit.
     """
     rows, cols = image.shape
-    line = np.empty((2, cols + 2 * _TAPS), np.float32)
+    means, slopes = np.empty(cols + 2 * _TAPS, np.float32), np.empty(cols + 2 * _TAPS, np.float32)
     for row in range(rows):
+        mean, slope, here, side, height = means[_TAPS:], slopes[_TAPS:], image[row], across[row], down[row]
         for col in range(cols):
-            mean, slope = smooth[0] * image[row, col], np.float32(0.0)
-            for tap in range(1, _TAPS + 1):
-                lower, upper = image[min(row + tap, rows - 1), col], image[max(row - tap, 0), col]
-                mean += smooth[tap] * (lower + upper)
-                slope += derivative[tap] * (lower - upper)
-            line[0, _TAPS + col], line[1, _TAPS + col] = mean, slope
-        line[:, :_TAPS], line[:, _TAPS + cols :] = line[:, _TAPS : _TAPS + 1], line[:, _TAPS + cols - 1 : _TAPS + cols]
+            mean[col], slope[col] = smooth[0] * here[col], np.float32(0.0)
+        for tap in range(1, _TAPS + 1):
+            # Loops over the columns, since each spans in vector registers.
+            lower, upper, weight, change = (
+                image[min(row + tap, rows - 1)],
+                image[max(row - tap, 0)],
+                smooth[tap],
+                derivative[tap],
+            )
+            for col in range(cols):
+                mean[col] += weight * (lower[col] + upper[col])
+                slope[col] += change * (lower[col] - upper[col])
+        means[:_TAPS], means[_TAPS + cols :] = mean[0], mean[cols - 1]
+        slopes[:_TAPS], slopes[_TAPS + cols :] = slope[0], slope[cols - 1]
         for col in range(cols):
-            slope, mean = np.float32(0.0), smooth[0] * line[1, _TAPS + col]
-            for tap in range(1, _TAPS + 1):
-                slope += derivative[tap] * (line[0, _TAPS + col + tap] - line[0, _TAPS + col - tap])
-                mean += smooth[tap] * (line[1, _TAPS + col + tap] + line[1, _TAPS + col - tap])
-            across[row, col], down[row, col] = slope, mean
+            side[col], height[col] = np.float32(0.0), smooth[0] * slope[col]
+        for tap in range(1, _TAPS + 1):
+            weight, change = smooth[tap], derivative[tap]
+            before, after = means[_TAPS - tap :], means[_TAPS + tap :]
+            above, below = slopes[_TAPS - tap :], slopes[_TAPS + tap :]
+            for col in range(cols):
+                side[col] += change * (after[col] - before[col])
+                height[col] += weight * (below[col] + above[col])

@@ -26,8 +26,8 @@ from fogsim.vision.lines.road_course_kernels import (
     fit_course,
     stripe_middles,
 )
-from fogsim.vision.lines.road_line_kernels import LEAST_TURN, RIDGE, Points, RoadLines, may_lie_on_road, row_points
-from fogsim.vision.lines.road_lines import AGREES, SeenLines, straight_lines
+from fogsim.vision.lines.road_line_kernels import LEAST_TURN, RIDGE, Points, RoadLines, chosen_lines
+from fogsim.vision.lines.road_lines import AGREES, Cells, SeenLines, cells_of, lying_points, straight_lines
 
 Floats = NDArray[np.float64]
 
@@ -221,7 +221,7 @@ def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: H
 
     Returns None if too few lines show one that is to be believed.
     """
-    points = stripe_middles(_points(seen, image, camera, horizon), _WIDEST / camera.mount_height)
+    points = _points(seen, image, camera, horizon)
     fit = _fitted(points, 0.0, camera, horizon)
     if fit is None:
         bent = [_fitted(points, curvature, camera, horizon) for curvature in (_BENT, -_BENT)]
@@ -234,31 +234,36 @@ def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: H
 
 def _fitted(points: Points, curvature: float, camera: Camera, horizon: Horizon) -> CourseFit | None:
     """Fit a course to lines that are found as straight ones once a bend has been taken off."""
-    focal, unit = camera.focal_length, camera.row_distance
-    bend = 0.5 * curvature * focal * unit
+    focal, unit, deviation = camera.focal_length, camera.row_distance, horizon.standard_deviation
+    cells, precision = cells_of(camera, horizon), _precision(camera, deviation)
+    fit = _fitted_to(points, 0.5 * curvature * focal * unit, cells, precision, unit, camera.mount_height, focal)
+    believed = fit.span >= LEAST_TURN and fit.points >= _LEAST_POINTS and fit.scatter <= _MOST_SCATTER
+    return fit if believed and abs(fit.unknown[ROW]) <= AGREES * deviation else None
+
+
+@kernel
+def _fitted_to(
+    points: Points, bend: float, cells: Cells, precision: Floats, unit: float, height: float, focal: float
+) -> CourseFit:
+    """`_fitted` with a bend taken off [px²]; of no points where too few marks are found."""
     ahead = points.below > LIMITS[-1] * focal
     below = points.below[ahead]
-    straightened = Points(points.across[ahead] - bend / below, below, points.kind[ahead])
-    lines = straight_lines(straightened, camera, horizon)
-    marks = (lines.kind == RIDGE) & (np.abs(lines.slope) * camera.mount_height < _FARTHEST_MARK)
-    if not marks.any():
-        return None
-    lines = lines.chosen(marks)
-    lines = lines.chosen(np.abs(lines.offset - _middle(lines)) <= _SPREAD * focal)
-    if lines.slope.size < 2 or float(np.ptp(lines.slope)) < LEAST_TURN:
-        return None
-    precision = _precision(camera, horizon.standard_deviation)
-    fit = fit_course(points, lines, bend, precision, unit, camera.mount_height, focal)
-    believed = fit.span >= LEAST_TURN and fit.points >= _LEAST_POINTS and fit.scatter <= _MOST_SCATTER
-    return fit if believed and abs(fit.unknown[ROW]) <= AGREES * horizon.standard_deviation else None
+    lines = straight_lines(Points(points.across[ahead] - bend / below, below, points.kind[ahead]), cells)
+    lines = chosen_lines(lines, (lines.kind == RIDGE) & (np.abs(lines.slope) * height < _FARTHEST_MARK))
+    if lines.slope.size > 0:
+        lines = chosen_lines(lines, np.abs(lines.offset - _middle(lines)) <= _SPREAD * focal)
+    if lines.slope.size < 2 or lines.slope.max() - lines.slope.min() < LEAST_TURN:
+        return CourseFit(np.zeros(SLOPE), np.zeros((SLOPE, SLOPE)), 0, 0.0, 0, 0.0)
+    return fit_course(points, lines, bend, precision, unit, height, focal)
 
 
+@kernel
 def _middle(lines: RoadLines) -> float:
     """Median of the lines' columns at the horizon, of as many as they have points [px]."""
-    order = np.argsort(lines.offset, kind="stable")
+    order = np.argsort(lines.offset, kind="mergesort")
     until = np.cumsum(lines.points[order])
-    both = (np.searchsorted(until, 0.5 * until[-1], side) for side in ("left", "right"))
-    return 0.5 * float(sum(lines.offset[order][one] for one in both))
+    low, high = np.searchsorted(until, 0.5 * until[-1]), np.searchsorted(until, 0.5 * until[-1], "right")
+    return 0.5 * float(lines.offset[order[low]] + lines.offset[order[high]])
 
 
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
@@ -346,16 +351,25 @@ def _without(unknown: Floats, covariance: Floats, first: int) -> tuple[Floats, F
 
 
 def _points(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horizon) -> Points:
-    """Add points of every far row."""
+    """Points of every far row and of those below it, with the middles of stripes."""
     top = max(math.ceil(horizon.row + LIMITS[-1] * camera.focal_length) - 2, 0)
     bottom = min(math.ceil(horizon.row + _FAR_ROWS * camera.focal_length), camera.height - 1)
-    place, kind = row_points(image.pixels, image.tables, np.arange(top, bottom, dtype=np.int64))
-    lies, near = may_lie_on_road(place, 1), seen.points.below >= bottom - horizon.row
-    return Points(
-        np.concatenate((place[lies, 0] - camera.principal_point[0], seen.points.across[near])),
-        np.concatenate((place[lies, 1] - horizon.row, seen.points.below[near])),
-        np.concatenate((kind[lies], seen.points.kind[near])),
+    column, widest = camera.principal_point[0], _WIDEST / camera.mount_height
+    return _joined(seen.points, image, top, bottom, column, horizon.row, widest)
+
+
+@kernel
+def _joined(
+    seen: Points, image: LinearPixels, top: int, bottom: int, column: float, row: float, widest: float
+) -> Points:
+    """`_points` from a place [px] on, of rows from the top to before the bottom."""
+    far, near = lying_points(image, np.arange(top, bottom), 1, column, row), seen.below >= bottom - row
+    points = Points(
+        np.concatenate((far.across, seen.across[near])),
+        np.concatenate((far.below, seen.below[near])),
+        np.concatenate((far.kind, seen.kind[near])),
     )
+    return stripe_middles(points, widest)
 
 
 @functools.lru_cache(maxsize=8)

@@ -190,12 +190,14 @@ class RoadLines(NamedTuple):
     kind: NDArray[np.int64]  # (n,) int64: Kind of their points
     points: Floats  # (n,): How many points they are of
 
-    def chosen(self, mask: NDArray[np.bool_]) -> "RoadLines":
-        """Some of the lines (`mask` (n,) bool)."""
-        return RoadLines(self.offset[mask], self.slope[mask], self.kind[mask], self.points[mask])
+
+@kernel
+def chosen_lines(lines: RoadLines, mask: NDArray[np.bool_]) -> RoadLines:
+    """Some of the lines (`mask` (n,) bool)."""
+    return RoadLines(lines.offset[mask], lines.slope[mask], lines.kind[mask], lines.points[mask])
 
 
-class _RoadFit(NamedTuple):
+class RoadFit(NamedTuple):
     """Least squares of all lines at once."""
 
     # column, row: where they meet, from the expected vanishing point [px]
@@ -327,7 +329,7 @@ class _Fit(NamedTuple):
 
 
 @kernel
-def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, bend_deviation: float) -> _RoadFit:
+def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, bend_deviation: float) -> RoadFit:
     """Least squares of all lines at once (Gauss–Newton): they meet in one point and bend alike.
 
     A line along a road of constant curvature is u = u_h + s (v − v_h) + c / (v − v_h), with the same c for all lines.
@@ -363,7 +365,7 @@ def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, 
         if fit.number[line] >= LEAST_POINTS:
             low, high = min(low, unknown[_SLOPE + line]), max(high, unknown[_SLOPE + line])
             used, total = used + 1, total + fit.number[line]
-    return _RoadFit(unknown[_COLUMN], unknown[_ROW], float(inverse[_ROW, _ROW]), used, high - low, total)
+    return RoadFit(unknown[_COLUMN], unknown[_ROW], float(inverse[_ROW, _ROW]), used, high - low, total)
 
 
 @kernel

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon, weighted_mean
@@ -14,14 +15,16 @@ from fogsim.vision.lines.road_line_kernels import (
     LEAST_POINTS,
     LEAST_TURN,
     Points,
+    RoadFit,
     RoadLines,
+    chosen_lines,
     fit_road_lines,
     hough_road_lines,
     may_lie_on_road,
     refitted_lines,
     row_points,
 )
-from fogsim.vision.lines.vanishing_point import VanishingPoint, all_pairs, crossings, sloped_lines, supports
+from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 Floats = NDArray[np.float64]
 
@@ -64,24 +67,63 @@ class SeenLines(NamedTuple):
 def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLines | None:
     """Find straight lines that can run along the road.
 
-    Edges along single rows, placed within the pixel; Hough's transform of those that can lie on lines toward the
-    neighbourhood of the expected vanishing point.
+    Edges along single rows, placed within the pixel, without those that stand upright, which are followed up to the
+    horizon; Hough's transform of those that can lie on lines toward the neighbourhood of the expected vanishing point.
 
     Returns None if the image shows too few rows of road.
     """
-    rows = _rows(camera, horizon)
-    if rows.size < LEAST_POINTS:
+    cells = cells_of(camera, horizon)
+    if cells.rows.size < LEAST_POINTS:
         return None
-    points = _points(image, rows, camera, horizon)
-    return SeenLines(points, straight_lines(points, camera, horizon))
+    return _seen_lines(image, cells, camera.principal_point[0], horizon.row)
 
 
-def straight_lines(points: Points, camera: Camera, horizon: Horizon) -> RoadLines:
+class Cells(NamedTuple):
+    """Where lines are looked for."""
+
+    rows: NDArray[np.int64]  # Rows of the image, with those above the first one that is voted for
+    step: int  # From one of them to the next
+    first: float  # The first row below the horizon that is voted for [px]
+    least: int  # Fewest points of a line
+    # offsets, slopes: of the lines that are voted for [px], [-]
+    offsets: Floats
+    slopes: Floats
+
+
+@functools.lru_cache(maxsize=8)
+def cells_of(camera: Camera, horizon: Horizon) -> Cells:
+    """Cells of a camera; they belong to all who ask."""
+    rows, reach = _rows(camera, horizon), _YAW * camera.focal_length
+    offsets = np.linspace(-reach, reach, 2 * math.ceil(_YAW / _YAW_STEP) + 1)
+    slopes = np.linspace(-_STEEPEST, _STEEPEST, 2 * round(_STEEPEST / _SLOPE_STEP) + 1)
+    least = max(int(LEAST_POINTS), rows.size // 8)
+    if rows.size < LEAST_POINTS:
+        return Cells(rows, 1, 0.0, least, offsets, slopes)
+    step = int(rows[1] - rows[0])
+    above = np.arange(int(rows[0]) - step, max(math.floor(horizon.row), -1), -step, dtype=np.int64)[::-1]
+    return Cells(np.concatenate((above, rows)), step, rows[0] - horizon.row, least, offsets, slopes)
+
+
+@kernel
+def _seen_lines(image: LinearPixels, cells: Cells, column: float, row: float) -> SeenLines:
+    points = lying_points(image, cells.rows, cells.step, column, row)
+    return SeenLines(points, straight_lines(points, cells))
+
+
+@kernel
+def lying_points(image: LinearPixels, rows: NDArray[np.int64], step: int, column: float, row: float) -> Points:
+    """Edges on rows some way apart that may lie on the road, from a place on [px]."""
+    place, kind = row_points(image.pixels, image.tables, rows)
+    lies = may_lie_on_road(place, step)
+    return Points(place[lies, 0] - column, place[lies, 1] - row, kind[lies])
+
+
+@kernel
+def straight_lines(points: Points, cells: Cells) -> RoadLines:
     """Straight lines through points that are not too near to the horizon."""
-    rows, (offsets, slopes) = _rows(camera, horizon), _cells(_YAW * camera.focal_length)
-    near = _below(points, rows[0] - horizon.row)
-    found = hough_road_lines(near, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
-    return refitted_lines(near, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
+    near = _below(points, cells.first)
+    found = hough_road_lines(near, cells.offsets, cells.slopes, MOST_LINES, cells.least)
+    return refitted_lines(near, found, 0.5 * (cells.offsets[1] - cells.offsets[0]) + 2.0)
 
 
 def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
@@ -104,66 +146,59 @@ def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> Van
 
     Returns None if no two lines meet near the assumed horizon.
     """
-    first = _first_point(seen.lines, AGREES * horizon.standard_deviation + 2.0)
-    if first is None:
+    farthest, first = AGREES * horizon.standard_deviation + 2.0, _first_row(camera, horizon) - horizon.row
+    fit = _meeting(seen, farthest, first, BEND * camera.focal_length**2)
+    if fit.lines < 2:
         return None
-    lines = _lines_through(seen.lines, first, _TOLERANCE)
-    if lines.slope.size < 2:
-        return None
-    points = _below(seen.points, _first_row(camera, horizon) - horizon.row)
-    fit = fit_road_lines(points, lines, *first, BEND * camera.focal_length**2)
     deviation = math.hypot(math.sqrt(fit.variance), _FLAT * camera.focal_length, _DRAWN)
     apart = AGREES * math.hypot(horizon.standard_deviation, deviation)
-    if fit.lines < 2 or fit.span < LEAST_TURN or not abs(fit.row) <= apart:
+    if fit.span < LEAST_TURN or not abs(fit.row) <= apart:
         return None
     place = camera.principal_point[0] + fit.column, horizon.row + fit.row
     return VanishingPoint(*place, deviation, fit.lines, fit.points)
 
 
-def _lines_through(lines: RoadLines, point: tuple[float, float], tolerance: float) -> RoadLines:
-    """Lines that pass a point (`point` [px], `tolerance` [px])."""
-    return lines.chosen(np.abs(lines.offset + lines.slope * point[1] - point[0]) <= tolerance)
+@kernel
+def _meeting(seen: SeenLines, farthest: float, first: float, bend: float) -> RoadFit:
+    """Fit of the lines that meet, to points from a row on; without lines where no two do."""
+    lines = seen.lines
+    column, row = _first_point(lines, farthest)
+    through = lines.offset + lines.slope * row - column
+    lines = chosen_lines(lines, np.abs(through) <= _TOLERANCE)
+    if lines.slope.size < 2:
+        return RoadFit(0.0, 0.0, 0.0, 0, 0.0, 0.0)
+    return fit_road_lines(_below(seen.points, first), lines, column, row, bend)
 
 
+@kernel
 def _below(points: Points, least: float) -> Points:
     """Points from a row below the horizon downward."""
-    start = int(np.searchsorted(points.below, least))
-    return Points(points.across[start:], points.below[start:], points.kind[start:])
+    start = np.searchsorted(points.below, least)
+    return Points(points.across[start:].copy(), points.below[start:].copy(), points.kind[start:].copy())
 
 
-def _points(image: LinearPixels, rows: NDArray[np.int64], camera: Camera, horizon: Horizon) -> Points:
-    """Edges on rows, without those that stand upright: these are followed up to the horizon."""
-    step = int(rows[1] - rows[0])
-    above = np.arange(int(rows[0]) - step, max(math.floor(horizon.row), -1), -step, dtype=np.int64)[::-1]
-    place, kind = row_points(image.pixels, image.tables, np.concatenate((above, rows)))
-    lies = may_lie_on_road(place, step)
-    return Points(place[lies, 0] - camera.principal_point[0], place[lies, 1] - horizon.row, kind[lies])
-
-
-def _first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
+@kernel
+def _first_point(found: RoadLines, farthest: float) -> tuple[float, float]:
     """Crossing of two lines, near the expected point, through which lines with most points pass: column and row.
 
-    Takes `farthest` [px].
+    NaN without any. Takes `farthest` [px].
     """
-    first, second = all_pairs(found.slope.size)
-    lines = sloped_lines(found.offset, found.slope)
-    crossed = crossings(lines, first, second, LEAST_TURN)
-    aside = np.abs(crossed[:, 1])
-    # Of points that are about as good, the one nearer to the expected row.
-    support = supports(lines, found.points, crossed, _TOLERANCE) * (1.0 - 0.3 * aside / farthest)
-    support[~(aside <= farthest)] = 0.0
-    if not support.any():
-        return None
-    best = int(np.argmax(support))
-    row = float(crossed[best, 1])
-    return float(found.offset[first[best]] + found.slope[first[best]] * row), row
-
-
-@functools.lru_cache(maxsize=8)
-def _cells(reach: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Offsets [px] and slopes of the lines that are voted for; they belong to all who ask."""
-    offsets = np.linspace(-reach, reach, 2 * math.ceil(_YAW / _YAW_STEP) + 1)
-    return offsets, np.linspace(-_STEEPEST, _STEEPEST, 2 * round(_STEEPEST / _SLOPE_STEP) + 1)
+    most, column, at = 0.0, np.nan, np.nan
+    for i in range(found.slope.size):
+        for j in range(i):
+            turn = found.slope[i] - found.slope[j]
+            if abs(turn) < LEAST_TURN:
+                continue
+            across = (found.slope[i] * found.offset[j] - found.slope[j] * found.offset[i]) / turn
+            row, support = (found.offset[j] - found.offset[i]) / turn, 0.0
+            for line in range(found.slope.size):
+                if abs(across - found.slope[line] * row - found.offset[line]) <= _TOLERANCE:
+                    support += found.points[line]
+            # Of points that are about as good, the one nearer to the expected row.
+            support *= 1.0 - 0.3 * abs(row) / farthest
+            if abs(row) <= farthest and support > most:
+                most, column, at = support, found.offset[i] + found.slope[i] * row, row
+    return column, at
 
 
 def _rows(camera: Camera, horizon: Horizon) -> NDArray[np.int64]:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.exponential import exponential
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.vision.region.law import row_transmittance
+from fogsim.vision.region.law import SMALLEST
 from fogsim.vision.region.profile import RoadCurve, decreasing
 
 Floats = NDArray[np.float64]
@@ -162,24 +163,35 @@ def _inflections(
     """`subpixel_inflections` of curves over the same rows (n,)."""
     top = max(below[-1], 2.0 * _HIGHEST)
     step = math.log(top / _HIGHEST) / (_CANDIDATES - 1)
-    at, error = _HIGHEST * np.exp(step * np.arange(_CANDIDATES)), np.empty((_CANDIDATES, luminance.shape[1]))
-    squares, light = np.zeros(luminance.shape[1]), np.zeros(luminance.shape[1])
-    for i in range(below.size):
-        for m in range(light.size):
-            light[m] += weight[i] * luminance[i, m]
-            squares[m] += weight[i] * luminance[i, m] ** 2
-    shape = np.zeros(below.size)
+    at, error = _HIGHEST * np.exp(step * np.arange(_CANDIDATES)), np.full((_CANDIDATES, luminance.shape[1]), np.inf)
+    used = np.flatnonzero(weight > 0.0)
+    rows, weights, light = below[used], weight[used], luminance[used]
+    rates = _rates(rows, distance[used], row_distance)
+    sums = np.zeros((2, luminance.shape[1]))
+    for i in range(used.size):
+        for m in range(sums.shape[1]):
+            sums[0, m] += weights[i] * light[i, m]
+            sums[1, m] += weights[i] * light[i, m] ** 2
+    shape = np.empty(used.size)
     for candidate in range(_CANDIDATES):
-        for i in range(below.size):
-            if weight[i] > 0.0:
-                slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
-                shape[i] = row_transmittance(2.0 * at[candidate] * slant, below[i])
         if at[candidate] <= below[-1] / 1.2:
-            seen = (below, weight, shape, luminance, light, squares)
-            _add_errors(*seen, at[candidate], printed, error[candidate])
-        else:
-            error[candidate] = np.inf
+            for i in range(used.size):
+                ends = exponential(at[candidate] * rates[0, i]) + exponential(at[candidate] * rates[2, i])
+                shape[i] = (ends + 4.0 * exponential(at[candidate] * rates[1, i])) / 6.0
+            _add_errors(rows, weights, shape, light, sums, at[candidate], printed, error[candidate])
     return _least(at, error, weight.sum())
+
+
+@kernel
+def _rates(below: Floats, distance: Floats, row_distance: float) -> Floats:
+    """Change of the optical depth of each row's top, middle and bottom with the inflection's row [1/px] (3, n)."""
+    rates = np.empty((3, below.size))
+    for i in range(below.size):
+        slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
+        for j in range(3):
+            end = below[i] + 0.5 * (j - 1)
+            rates[j, i] = -2.0 * slant / end if end > SMALLEST else -np.inf
+    return rates
 
 
 @kernel
@@ -188,36 +200,34 @@ def _add_errors(
     weight: Floats,
     shape: Floats,
     luminance: Floats,
-    light: Floats,
-    squares: Floats,
+    sums: Floats,
     at: float,
     printed: bool,
     error: Floats,
 ) -> None:
     """What the models of one candidate leave of each curve; infinite where they cannot be fog's."""
     curves = luminance.shape[1]
-    near_light, near_both, both = np.zeros(curves), np.zeros(curves), np.zeros(curves)
+    near, both = np.zeros((2, curves)), np.zeros(curves)
     count, by_shape, by_square, total, shapes, shape_squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(below.size):
-        if weight[i] == 0.0:
-            continue
-        about = weight[i] if at / _ABOUT - 1.0 <= below[i] <= _ABOUT * at + 1.0 else 0.0
-        count, by_shape, by_square = count + about, by_shape + about * shape[i], by_square + about * shape[i] ** 2
-        total, shapes = total + weight[i], shapes + shape[i] * weight[i]
-        shape_squares += shape[i] ** 2 * weight[i]
+        by_weight = shape[i] * weight[i]
+        total, shapes, shape_squares = total + weight[i], shapes + by_weight, shape_squares + shape[i] * by_weight
         for m in range(curves):
-            near_light[m] += about * luminance[i, m]
-            near_both[m] += about * shape[i] * luminance[i, m]
-            both[m] += shape[i] * weight[i] * luminance[i, m]
+            both[m] += by_weight * luminance[i, m]
+        if at / _ABOUT - 1.0 <= below[i] <= _ABOUT * at + 1.0:
+            count, by_shape, by_square = count + weight[i], by_shape + by_weight, by_square + shape[i] * by_weight
+            for m in range(curves):
+                near[0, m] += weight[i] * luminance[i, m]
+                near[1, m] += by_weight * luminance[i, m]
     turn = count * by_square - by_shape**2
     for m in range(curves):
-        rise = (count * near_both[m] - by_shape * near_light[m]) / max(turn, 1e-12)
-        start = (near_light[m] - by_shape * rise) / max(count, 1.0)
+        rise = (count * near[1, m] - by_shape * near[0, m]) / max(turn, 1e-12)
+        start = (near[0, m] - by_shape * rise) / max(count, 1.0)
         # At the inflection itself kd = 2: the level is A + (R − A) e⁻², the slope (R − A) e⁻² 2 / (v_i − v_h).
         part = math.exp(-2.0) * rise
         road, airlight = _road_and_airlight(start + part, part, printed)
         drop = airlight - road
-        left = squares[m] - 2.0 * airlight * light[m] + 2.0 * drop * both[m]
+        left = sums[1, m] - 2.0 * airlight * sums[0, m] + 2.0 * drop * both[m]
         left += airlight**2 * total - 2.0 * airlight * drop * shapes + drop**2 * shape_squares
         error[m] = left if count >= _FEWEST_ROWS and turn > 1e-9 and drop > 0.0 else np.inf
 

@@ -30,7 +30,7 @@ _ALBEDO_DEVIATION = 0.03
 _ABSORBED = 1.3
 """By how much more a road's texture moves an estimate than its residuals say: the fit has taken some of it up [-]."""
 
-_SMALLEST = 0.05
+SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
@@ -49,8 +49,8 @@ def transmittance(optical: Floats | float, below_horizon: Floats) -> Floats:
 
     Takes `optical` [px], `below_horizon` [px].
     """
-    ends = [np.maximum(below_horizon + part, _SMALLEST) for part in (-0.5, 0.0, 0.5)]
-    top, middle, bottom = (np.exp(-optical / end) * (end > _SMALLEST) for end in ends)
+    ends = [np.maximum(below_horizon + part, SMALLEST) for part in (-0.5, 0.0, 0.5)]
+    top, middle, bottom = (np.exp(-optical / end) * (end > SMALLEST) for end in ends)
     return np.asarray((top + 4.0 * middle + bottom) / 6.0)
 
 
@@ -97,7 +97,7 @@ def row_transmittance(optical: float, below: float) -> float:
     total = 0.0
     for j in range(3):
         end = below + 0.5 * (j - 1)
-        if end > _SMALLEST:
+        if end > SMALLEST:
             total += (4.0 if j == 1 else 1.0) * math.exp(-optical / end)
     return total / 6.0
 

@@ -111,56 +111,60 @@ def albedo_transitions(
     return out
 
 
+_WHOLE = 8
+"""Numbers that a vector register holds: rows of a filter's matrix have a multiple of it."""
+
+
 @kernel
 def _predict(
-    covariance: NDArray[np.float64], state: NDArray[np.float64], change: NDArray[np.float64], albedo: Albedo
+    joint: NDArray[np.float64], kept: NDArray[np.float64], change: NDArray[np.float64], albedo: Albedo
 ) -> None:
-    """Predict drift (states 0, 1: value, slope), uneven airlight (3) and patches (5, 7, …) a step farther."""
-    size, width = state.shape
+    """Predict drift (states 0, 1: value, slope), uneven airlight (3) and patches (5, 7, …) a step farther.
+
+    What of each column stays is written down; of others than these it is 1.
+    """
     f00, f01, f10, f11, keep, cloud = change[0], change[1], change[2], change[3], change[4], change[7]
-    for j in range(width):
-        first, second = state[0, j], state[1, j]
-        state[0, j], state[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
-    for j in range(size):
-        first, second = covariance[0, j], covariance[1, j]
-        covariance[0, j], covariance[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
-    for a in range(_FIRST - 1, size, 2):
-        kept = keep if a >= _FIRST else cloud
-        for j in range(width):
-            state[a, j] *= kept
-        for j in range(size):
-            covariance[a, j] *= kept
-    for j in range(size):
-        first, second = covariance[j, 0], covariance[j, 1]
-        covariance[j, 0], covariance[j, 1] = f00 * first + f01 * second, f10 * first + f11 * second
-        covariance[j, _FIRST - 1] *= cloud
-        for a in range(_FIRST + 1, size, 2):
-            covariance[j, a] *= keep
+    size, kept[_FIRST - 1] = joint.shape[0], cloud
+    for a in range(_FIRST + 1, size, 2):
+        kept[a] = keep
+    for j in range(joint.shape[1]):
+        first, second = joint[0, j], joint[1, j]
+        joint[0, j], joint[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
+    for a in range(size):
+        for j in range(joint.shape[1]):
+            joint[a, j] = joint[a, j] * kept[a] * kept[j]
+        first, second = joint[a, 0], joint[a, 1]
+        joint[a, 0], joint[a, 1] = f00 * first + f01 * second, f10 * first + f11 * second
     value = albedo.drift_deviation**2
     slope = (math.sqrt(3.0) / albedo.drift_length * albedo.drift_deviation) ** 2
-    covariance[0, 0] += value - f00 * f00 * value - f01 * f01 * slope
-    covariance[1, 1] += slope - f10 * f10 * value - f11 * f11 * slope
+    joint[0, 0] += value - f00 * f00 * value - f01 * f01 * slope
+    joint[1, 1] += slope - f10 * f10 * value - f11 * f11 * slope
     cross = f00 * f10 * value + f01 * f11 * slope
-    covariance[0, 1] -= cross
-    covariance[1, 0] -= cross
-    covariance[_FIRST - 1, _FIRST - 1] += (1.0 - cloud * cloud) * albedo.cloud_deviation**2
+    joint[0, 1] -= cross
+    joint[1, 0] -= cross
+    joint[_FIRST - 1, _FIRST - 1] += (1.0 - cloud * cloud) * albedo.cloud_deviation**2
     for a in range(_FIRST + 1, size, 2):
-        covariance[a, a] += (1.0 - keep * keep) * albedo.patch_deviation**2
+        joint[a, a] += (1.0 - keep * keep) * albedo.patch_deviation**2
 
 
 @kernel
-def _initial_covariance(strips: int, albedo: Albedo) -> NDArray[np.float64]:
-    """Covariance of drift, its slope, sheen, airlight, and each strip's constant and patches before all is seen."""
-    covariance = np.zeros((_FIRST + 2 * strips, _FIRST + 2 * strips))
-    covariance[0, 0] = albedo.drift_deviation**2
-    covariance[1, 1] = 3.0 * (albedo.drift_deviation / albedo.drift_length) ** 2
-    covariance[2, 2] = albedo.sheen_deviation**2
-    covariance[_FIRST - 1, _FIRST - 1] = albedo.cloud_deviation**2
+def _begun(strips: int, columns: int, albedo: Albedo) -> NDArray[np.float64]:
+    """Covariance of drift, its slope, sheen, airlight, and each strip's constant and patches before all is seen.
+
+    Behind it, in each state's row, its mean under each of the columns, and room up to whole registers.
+    """
+    size = _FIRST + 2 * strips
+    joint = np.zeros((size, -(-(size + columns) // _WHOLE) * _WHOLE))
+    joint[0, 0] = albedo.drift_deviation**2
+    joint[1, 1] = 3.0 * (albedo.drift_deviation / albedo.drift_length) ** 2
+    joint[2, 2] = albedo.sheen_deviation**2
+    joint[_FIRST - 1, _FIRST - 1] = albedo.cloud_deviation**2
     for strip in range(strips):
         first = _FIRST + 2 * strip
-        covariance[first, first] = CONSTANT_DEVIATION**2
-        covariance[first + 1, first + 1] = albedo.patch_deviation**2
-    return covariance
+        joint[first, first] = CONSTANT_DEVIATION**2
+        joint[first + 1, first + 1] = albedo.patch_deviation**2
+    joint[2, size] = albedo.sheen
+    return joint
 
 
 class Shares(NamedTuple):
@@ -179,21 +183,13 @@ def _shares(scale: float, veil: float, airlight: float, change: NDArray[np.float
 
 
 @kernel
-def _covariance_with_bin(
-    covariance: NDArray[np.float64], shares: Shares, strip: int, out: NDArray[np.float64]
-) -> float:
-    """Covariance of all states with what a bin shows of them; returns that of the bin itself."""
-    for a in range(covariance.shape[0]):
-        total = covariance[0, a] * shares.drift + covariance[2, a] * shares.sheen + covariance[3, a] * shares.cloud
-        out[a] = total + covariance[strip, a] * shares.constant + covariance[strip + 1, a] * shares.patches
-    return _shown(out, shares, strip)
-
-
-@kernel
-def _shown(states: NDArray[np.float64], shares: Shares, strip: int) -> float:
-    """What a bin shows of states."""
-    total = states[0] * shares.drift + states[2] * shares.sheen + states[3] * shares.cloud
-    return float(total + states[strip] * shares.constant + states[strip + 1] * shares.patches)
+def _show(joint: NDArray[np.float64], shares: Shares, strip: int, out: NDArray[np.float64]) -> float:
+    """What a bin shows of states: its covariance with all, and its mean under each column; returns its variance."""
+    for j in range(out.size):
+        total = joint[0, j] * shares.drift + joint[2, j] * shares.sheen + joint[3, j] * shares.cloud
+        out[j] = total + joint[strip, j] * shares.constant + joint[strip + 1, j] * shares.patches
+    total = out[0] * shares.drift + out[2] * shares.sheen + out[3] * shares.cloud
+    return float(total + out[strip] * shares.constant + out[strip + 1] * shares.patches)
 
 
 @kernel
@@ -205,21 +201,10 @@ def _cost_without(used: int, noise: float, airlight: float) -> float:
 
 
 @kernel
-def _update(
-    covariance: NDArray[np.float64],
-    state: NDArray[np.float64],
-    gain: NDArray[np.float64],
-    innovation: NDArray[np.float64],
-    total: float,
-) -> None:
-    """Take a bin's innovations of a variance into state and covariance; `gain` holds the gains times that variance."""
-    size, width = state.shape
-    for a in range(size):
-        share = gain[a] / total
-        for j in range(width):
-            state[a, j] += share * innovation[j]
-        for b in range(size):
-            covariance[a, b] -= share * gain[b]
+def with_factor(logarithm: float, product: float, factor: float) -> tuple[float, float]:
+    """Multiply by a factor whose logarithm counts: one logarithm for several of them."""
+    product *= factor
+    return (logarithm, product) if 1e-100 < product < 1e100 else (logarithm + math.log(product), 1.0)
 
 
 @kernel
@@ -228,19 +213,15 @@ def _mark_outliers(
     i: int,
     change: NDArray[np.float64],
     airlight: float,
-    covariance: NDArray[np.float64],
-    state: NDArray[np.float64],
+    joint: NDArray[np.float64],
     room: NDArray[np.float64],
     used: NDArray[np.uint8],
 ) -> None:
     """Note which strips show road on one bin: all by what lies nearer, so that none comes before another."""
     for strip in range(used.shape[0]):
-        shares, first = (
-            _shares(residuals.scale[strip, i], residuals.veil[strip, i], airlight, change),
-            _FIRST + 2 * strip,
-        )
-        total = _covariance_with_bin(covariance, shares, first, room)
-        innovation = residuals.columns[strip, i, 0] - _shown(state[:, 0], shares, first)
+        shares = _shares(residuals.scale[strip, i], residuals.veil[strip, i], airlight, change)
+        total = _show(joint, shares, _FIRST + 2 * strip, room)
+        innovation = residuals.columns[strip, i, 0] - room[joint.shape[0]]
         is_road = innovation * innovation <= _OUTLIER**2 * (total + residuals.noise[strip, i])
         used[strip, i] = USED if is_road else 0
 
@@ -253,45 +234,36 @@ def whiten(
 
     Takes `changes` (n, 9), `airlight` [linear grey levels].
     """
-    columns, scale, veil, noise, used = (
-        residuals.columns,
-        residuals.scale,
-        residuals.veil,
-        residuals.noise,
-        out.used,
-    )
+    columns, scale, veil, noise = residuals.columns, residuals.scale, residuals.veil, residuals.noise
     strips, count, width = columns.shape
-    covariance = _initial_covariance(strips, albedo)
-    size = covariance.shape[0]
-    state, gain, innovation = np.zeros((size, width)), np.empty(size), np.empty(width)
-    state[2, 0] = albedo.sheen
+    joint, used = _begun(strips, width, albedo), out.used
+    size, line, kept = joint.shape[0], np.empty(joint.shape[1]), np.ones(joint.shape[1])
     log_determinant, product = 0.0, 1.0
     for i in range(count):
         if i:
-            _predict(covariance, state, changes[i], albedo)
+            _predict(joint, kept, changes[i], albedo)
         if reject:
-            _mark_outliers(residuals, i, changes[i], airlight, covariance, state, gain, used)
+            _mark_outliers(residuals, i, changes[i], airlight, joint, line, used)
         for strip in range(strips):
             out.innovations[strip, i, :] = 0.0
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
                 continue
-            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
-            total = _covariance_with_bin(covariance, shares, first, gain) + noise[strip, i]
-            for j in range(width):
-                innovation[j] = columns[strip, i, j] - _shown(state[:, j], shares, first)
             if used[strip, i] != USED:
                 log_determinant += _cost_without(used[strip, i], noise[strip, i], airlight)
                 continue
-            # One logarithm for several factors.
-            product *= total
-            if not 1e-100 < product < 1e100:
-                log_determinant, product = log_determinant + math.log(product), 1.0
-            _update(covariance, state, gain, innovation, total)
+            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
+            total = _show(joint, shares, first, line) + noise[strip, i]
+            log_determinant, product = with_factor(log_determinant, product, total)
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
-                out.innovations[strip, i, j] = innovation[j] * weight
-    out.constants[:] = state[_FIRST::2]
+                line[size + j] -= columns[strip, i, j]
+                out.innovations[strip, i, j] = -line[size + j] * weight
+            for a in range(size):
+                share = line[a] / total
+                for j in range(joint.shape[1]):
+                    joint[a, j] -= share * line[j]
+    out.constants[:] = joint[_FIRST::2, size : size + width]
     return log_determinant + math.log(product)
 
 

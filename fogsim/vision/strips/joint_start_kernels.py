@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
+from fogsim.vision.strips.albedo_filter import with_factor
 from fogsim.vision.strips.joint_kernels import (
     MOST_DARKER,
     Bins,
@@ -61,10 +62,9 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
             value[j], _, _ = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[0, i], k)
             if darker > 0.0:
                 base[j] = 1.0 - darker * darkening(bins, i, level, on, prior.shift)[0] * (1.0 - value[j])
-        airlight, drop, total = likely, 0.0, 0.0
+        airlight, drop, total, product, apart = likely, 0.0, 0.0, 1.0, 0.0
         for iteration in range(4):
             s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
-            total = 0.0
             for strip in range(strips):
                 for j in range(value.size):
                     i = j * stride
@@ -74,18 +74,18 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
                     rest = luminance[strip, i] - airlight * base[j] - drop * t
                     weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
                     if iteration == 3:
-                        total += math.log1p(rest * rest / spread)
+                        total, product = with_factor(total, product, 1.0 + rest * rest / spread)
                     y, one = luminance[strip, i] - likely * base[j], base[j]
                     s0, s1, s2 = s0 + weight * one * one, s1 + weight * one * t, s2 + weight * t * t
                     r0, r1 = r0 + weight * one * y, r1 + weight * t * y
             off = airlight - likely
             known = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
-            total += known * off * off
-            s0 += known
+            apart, s0 = known * off * off, s0 + known
             determinant = max(s0 * s2 - s1 * s1, 1e-12)
             airlight = likely + (s2 * r0 - s1 * r1) / determinant
             drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
             drop = max(drop, -airlight)
+        total += math.log(product) + apart
         if total < best:
             best, best_k, best_airlight = total, k, airlight
     return best_k, best_airlight

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
 from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
-from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, even_column, pixel_luminance
 
 _SKY_SHARE, _SKY_WIDTH = 7, 0.012
 """Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
@@ -334,8 +335,23 @@ the sky may be brighter then, as a deviation [-]."""
 def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     """Look at the sky in the middle two thirds of the image above the horizon.
 
+    Several methods ask for that of one image: it is read once.
+
     Returns None if there are no such rows, or something high hides the sky all along them. Takes `margin` [px].
     """
+    for pixels, known, below, sky in _LAST:
+        if pixels is image.pixels and below == margin and known == camera:
+            return sky
+    sky = _sky_above(image, camera, margin)
+    _LAST.append((image.pixels, camera, margin, sky))
+    return sky
+
+
+_LAST: deque[tuple[Pixels, Camera, float, Sky | None]] = deque(maxlen=1)
+"""The sky that was read last: of which pixels, by which camera and margin."""
+
+
+def _sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
     top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:

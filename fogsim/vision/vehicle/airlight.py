@@ -206,11 +206,13 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float:
     for step in range(3):
         reach = np.float32((_ALIKE * about + 4.0 * noise, max(4.0 * noise, 1.0), max(3.0 * noise, 1.0))[step])
         count, total = 0, 0.0
-        for value in part.flat:
-            if abs(value - np.float32(middle)) <= reach:
-                core[count] = value
-                total += float(value)
-                count += 1
+        for row in range(part.shape[0]):
+            for col in range(part.shape[1]):
+                value = part[row, col]
+                if abs(value - np.float32(middle)) <= reach:
+                    core[count] = value
+                    total += float(value)
+                    count += 1
         if count < max(_LEAST_SEEN * part.size, 1.0):
             return np.nan
         middle = float(np.float32(np.median(core[:count]))) if step == 0 else total / count

@@ -14,7 +14,7 @@ from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.luminance import Clipping, clipping, linear_pixels, linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
-from fogsim.vision.lines.horizon import levelled
+from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
 from fogsim.vision.strips.sky import Sky, sky_above
@@ -189,7 +189,8 @@ def daytime_crop(
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    margin = 3.0 * pitch_deviation * camera.focal_length + 2.0
+    # That of joint_road, so that a frame's sky is read once.
+    margin = 3.0 * calibrated_horizon(camera, pitch_deviation).standard_deviation + 2.0
     sky = sky_above(pixels, camera, margin)
     airlight = None if sky is None else row_airlight(sky, camera, extinction)
     luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)
@@ -247,8 +248,8 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     rows = _rows_above(camera, margin)
     light = day.luminance_of(rows, slice(camera.width // 6, camera.width - camera.width // 6))
     level = sky.luminance if day.airlight is None else day.airlight.level
-    core = np.abs(light - level) <= _SKY_CORE * level + 4.0 * sky.noise
-    if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < _SKY_SHARE:
+    core = np.count_nonzero(np.abs(light - level) <= _SKY_CORE * level + 4.0 * sky.noise)
+    if sky.noise > MOST_NOISE * level or not light.size or core / light.size < _SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
     hidden = hidden_at_side(camera.focal_length, depth)
     axis = camera.principal_point[0] - camera.width // 6
@@ -256,7 +257,8 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     if not clear.any():
         raise CannotTellError("no part of the sky is as bright as the sky next to the vehicle")
-    lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
+    sides = pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6]
+    lost = clipping(sides[clear], camera) if sides.max() == 2**camera.bits - 1 else Clipping(0.0, 0.0, 0.0)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     is_clipped = not lost.noise > 0.0 and sky.is_clipped
     deviation = 0.0

@@ -19,15 +19,15 @@ from fogsim.values import Camera, Response
 from fogsim.vision.lines.segments import RoadSegments, road_segments
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
-_ASSUMED_FIELD_OF_VIEW, _FIELDS_OF_VIEW = math.radians(73.0), "33° to 123°"
+_ASSUMED_FIELD_OF_VIEW, _FIELDS_OF_VIEW = math.radians(73.0), "31° to 127°"
 """Field of view of an unknown camera, along the longer side of its images [rad], and what 90 % of cameras have."""
 
 _ASSUMED_MOUNT_HEIGHT = 1.3
 """Default height of a dash camera in a passenger car [m]."""
 
-_STATED_DEVIATION, _METADATA_DEVIATION, _FIELD_DEVIATION, _HEIGHT_DEVIATION = 0.03, 0.05, 0.55, 0.12
+_STATED_DEVIATION, _METADATA_DEVIATION, _FIELD_DEVIATION, _HEIGHT_DEVIATION = 0.03, 0.05, 0.6, 0.12
 """Relative standard deviations of stated values, of a focal length in metadata, of one by the assumed field of view
-(33° to 123° within 90 %: tele lenses, telephones, dash and action cameras), and of the assumed height [-]. Images do
+(31° to 127° within 90 %: tele lenses, telephones, dash and action cameras), and of the assumed height [-]. Images do
 not show the focal length: lengths across the road and heights go with the depth over it."""
 
 _LANE_WIDTH, _LANE_DEVIATION = 3.5, 0.08

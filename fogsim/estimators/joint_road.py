@@ -12,7 +12,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation
 from fogsim.vision.day.day_fit import free_road
-from fogsim.vision.day.second_opinion import SecondOpinion
+from fogsim.vision.day.second_opinion import GLARES, SecondOpinion
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
@@ -68,6 +68,9 @@ uneven, by what nodes along the way leave out [-]."""
 _MEMORY, _CHANGING, _MOST_CHANGE = 10.0, 1.5, 0.15
 """Time over which recent extinctions measure how uneven the fog is [s], the factor on a single one's relative
 deviation, and its upper limit [-]: fog that has varied along the road will vary further."""
+
+_VEILED = 0.25
+"""Relative deviation of the extinction by the veil of glass in which the sun shines [-]."""
 
 _LEAST_DEPTH = 1.0
 """Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
@@ -208,7 +211,10 @@ class JointRoad:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
         else:
             own, free = self._joint(observation, pixels, sky, horizon, course, free, found)
-        return self._second.on(own, level, horizon, free, observation.time, lines)
+        found_by_both = self._second.on(own, level, horizon, free, observation.time, lines)
+        if sky is not None and sky.has_sun and not found_by_both.valid:
+            return Estimate.invalid(self.method, GLARES, **found)
+        return found_by_both
 
     def _joint(
         self,
@@ -233,7 +239,8 @@ class JointRoad:
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
         changing = self._change(observation.time, fit.fit.extinction)
-        own = self._estimate(fit, front, found, unsure, changing)
+        veiled = _VEILED * fit.fit.extinction if sky.has_sun else 0.0
+        own = self._estimate(fit, front, found, math.hypot(unsure, veiled), changing)
         return own, min(free, _obstacle(fit.fit, self._geometry))
 
     def _fitted(

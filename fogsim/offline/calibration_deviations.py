@@ -3,9 +3,11 @@
 import math
 from dataclasses import dataclass, replace
 
+from fogsim.core.parameters import accepted_parameters
+from fogsim.estimators import ESTIMATORS
 from fogsim.values import Estimate
 from fogsim.values.estimate import OpticalDepths
-from fogsim.vision.lines.horizon import PITCH_DEVIATION
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, SCALE_DEVIATION
 
 _ON_THE_ROAD = ("night_road",)
 """Methods that take distances from the calibration of the road plane, so that their extinction goes with the inverse of
@@ -33,27 +35,37 @@ class CalibrationDeviations:
         """Relative standard deviation of distances on the road [-]."""
         return math.hypot(self.focal_length, self.mount_height)
 
-    def widened(self, estimate: Estimate) -> Estimate:
-        """Estimate with the uncertainty of distances on the road in its deviations.
+    @property
+    def parameters(self) -> dict[str, float]:
+        """What methods are given, as far as they have these parameters: of the scale the usual deviation at most.
 
-        Parameters
-        ----------
-        estimate : Estimate
-            Of a method that may measure along the road.
+        They weigh hypotheses about a road whose distances they know; what a guess leaves open goes into their answer.
         """
-        if not estimate.valid or self.scale == 0.0 or estimate.method not in _ON_THE_ROAD:
-            return estimate
-        deviation = self._of(estimate.extinction, estimate.standard_deviation)
-        depths = estimate.optical_depths
-        if depths is not None:
-            both = zip(depths.depth, depths.standard_deviation, strict=True)
-            depths = OpticalDepths(depths.distance, depths.depth, tuple(self._of(*one) for one in both))
-        common = math.hypot(estimate.common_deviation, self.scale)
-        return replace(estimate, standard_deviation=deviation, optical_depths=depths, common_deviation=common)
+        return {"pitch_deviation": self.pitch, "scale_deviation": min(self.scale, SCALE_DEVIATION)}
 
-    def _of(self, value: float, deviation: float) -> float:
-        """Standard deviation of a value with its own deviation, times a factor of 1 ± `scale`."""
-        return math.hypot(deviation * math.hypot(1.0, self.scale), value * self.scale)
+    def left_by(self, method: str) -> float:
+        """Part of `scale` that a method's answer goes with and that is none of its parameters [-]."""
+        if "scale_deviation" in accepted_parameters(ESTIMATORS[method]):
+            return math.sqrt(self.scale**2 - self.parameters["scale_deviation"] ** 2)
+        return self.scale if method in _ON_THE_ROAD else 0.0
+
+
+def on_any_scale(estimate: Estimate, scale: float) -> Estimate:
+    """Estimate of a method that measures along the road, with another uncertainty of distances there (`scale` [-])."""
+    if not estimate.valid or scale == 0.0:
+        return estimate
+    depths = estimate.optical_depths
+    if depths is not None:
+        both = zip(depths.depth, depths.standard_deviation, strict=True)
+        wider = tuple(math.hypot(deviation, scale * depth) for depth, deviation in both)
+        depths = OpticalDepths(depths.distance, depths.depth, wider)
+    return replace(
+        estimate,
+        standard_deviation=math.hypot(estimate.standard_deviation, scale * estimate.extinction),
+        optical_depths=depths,
+        common_deviation=math.hypot(estimate.common_deviation, scale),
+        scale_deviation=scale,
+    )
 
 
 EXACT = CalibrationDeviations()

@@ -9,7 +9,7 @@ import numpy as np
 from fogsim.core.parameters import accepted_parameters
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
-from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
+from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.drive.road_scale import NightDrive
 from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
@@ -185,7 +185,7 @@ class _Bench:
         self, camera: Camera, methods: Sequence[str], night: NightDrive | None, deviations: CalibrationDeviations
     ) -> None:
         self._camera, self._night, self._deviations = camera, night, deviations
-        self._methods = tuple(methods)
+        self._methods, self._left = tuple(methods), [deviations.left_by(name) for name in methods]
         self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
 
     def _made(self, camera: Camera) -> list[Estimator]:
@@ -193,9 +193,8 @@ class _Bench:
 
     def _parameters_of(self, name: str) -> dict[str, object]:
         drive = NightDrive() if self._night is None else self._night
-        deviations = {"pitch_deviation": self._deviations.pitch, "scale_deviation": self._deviations.scale}
-        known = accepted_parameters(ESTIMATORS[name])
-        return {**drive.parameters_of(name), **{key: value for key, value in deviations.items() if key in known}}
+        known, given = accepted_parameters(ESTIMATORS[name]), self._deviations.parameters
+        return {**drive.parameters_of(name), **{key: value for key, value in given.items() if key in known}}
 
     def reset(self) -> None:
         """Forget all earlier images."""
@@ -224,7 +223,7 @@ class _Bench:
     def estimates(self, results: tuple[object, ...]) -> tuple[Estimate, ...]:
         """Estimates of all methods; InputError if a user's method returned none."""
         checked = (checked_estimate(name, one) for name, one in zip(self._methods, results, strict=True))
-        return tuple(self._deviations.widened(one) for one in checked)
+        return tuple(map(on_any_scale, checked, self._left))
 
 
 def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:

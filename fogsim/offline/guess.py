@@ -19,25 +19,31 @@ from fogsim.values import Camera, Response
 from fogsim.vision.lines.segments import RoadSegments, road_segments
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
-_ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
-"""Default field of view of an unknown camera, along the longer side of its images [rad]."""
+_ASSUMED_FIELD_OF_VIEW, _FIELDS_OF_VIEW = math.radians(73.0), "31° to 127°"
+"""Field of view of an unknown camera, along the longer side of its images [rad], and what 90 % of cameras have."""
 
 _ASSUMED_MOUNT_HEIGHT = 1.3
 """Default height of a dash camera in a passenger car [m]."""
 
-_STATED_DEVIATION, _METADATA_DEVIATION, _FIELD_DEVIATION, _HEIGHT_DEVIATION = 0.03, 0.05, 0.25, 0.12
+_STATED_DEVIATION, _METADATA_DEVIATION, _FIELD_DEVIATION, _HEIGHT_DEVIATION = 0.03, 0.05, 0.6, 0.12
 """Relative standard deviations of stated values, of a focal length in metadata, of one by the assumed field of view
-(45° to 82° within 90 %), and of the assumed height [-]."""
+(31° to 127° within 90 %: tele lenses, telephones, dash and action cameras), and of the assumed height [-]. Images do
+not show the focal length: lengths across the road and heights go with the depth over it."""
 
 _LANE_WIDTH, _LANE_DEVIATION = 3.5, 0.08
 """Usual width of lanes [m] and its relative standard deviation, including the lines' own errors [-]."""
 
-_NEAREST_LINE, _FARTHEST_LINE, _SHORTEST_LINE = 0.4, 3.0, 0.3
-"""Lateral offsets over the camera's height between which the own lane's lines are sought, and their least length over
+_FARTHEST_LINE, _SHORTEST_LINE = 3.0, 0.2
+"""Lateral offset over the camera's height up to which the own lane's lines are searched, and their least length over
 the longest on that side [-]."""
 
 _AGREEING = 2.0
 """Standard deviations up to which the height by the lane agrees with the assumed one."""
+
+_MISSED_LINES, _MISSED_DEVIATION = 1.5, 0.45
+"""Height over that by the lane, and its relative standard deviation, where that is above a car's [-]: faint lines are
+missed from there, so that two lanes count as one; by photographs of pool 0 of `benchmarks/photograph_pictures.py` taken
+from 2.4, 6 and 9 m."""
 
 _LINES_DEVIATION = math.radians(0.25)
 """Standard deviation of the pitch by the lines of real roads, which bend and undulate and whose shadows pass for lines
@@ -231,8 +237,9 @@ def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | N
         return _Guessed(focal, _METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
     degrees = math.degrees(_ASSUMED_FIELD_OF_VIEW)
     warning = (
-        f"the field of view is assumed to be {degrees:g}° along the longer side, and an error of the focal length goes "
-        "into every visibility one to one: look it up and give its angle from left to right as --field-of-view"
+        f"the lens is not known: its field of view is assumed to be {degrees:g}° along the longer side, and intervals "
+        f"have room for {_FIELDS_OF_VIEW}, since every visibility goes with the focal length: look the angle from left "
+        "to right up and give it as --field-of-view"
     )
     # A camera that is held upright keeps its focal length.
     focal = 0.5 * max(cols, rows) / math.tan(0.5 * _ASSUMED_FIELD_OF_VIEW)
@@ -296,8 +303,14 @@ def _mount_height(lines: Sequence[RoadSegments], stated: float | None) -> _Guess
         return assumed
     by_lane = _LANE_WIDTH / float(np.median(widths))
     apart = math.log(by_lane / _ASSUMED_MOUNT_HEIGHT)
-    if abs(apart) > _AGREEING * math.hypot(_HEIGHT_DEVIATION, _LANE_DEVIATION):
+    agreeing = _AGREEING * math.hypot(_HEIGHT_DEVIATION, _LANE_DEVIATION)
+    if apart < -agreeing:
         return assumed
+    if apart > agreeing:
+        height = round(_MISSED_LINES * by_lane, 1)
+        reason = f"ASSUMED: above a passenger car, since lanes of {_LANE_WIDTH} m give {by_lane:.1f} m or more"
+        warning = f"the camera is higher than a passenger car's: its mount height may be {height} m: measure it"
+        return _Guessed(height, _MISSED_DEVIATION, reason, (warning,))
     share = _HEIGHT_DEVIATION**2 / (_HEIGHT_DEVIATION**2 + _LANE_DEVIATION**2)
     height = round(_ASSUMED_MOUNT_HEIGHT * math.exp(share * apart), 2)
     reason = f"ASSUMED: a passenger car, and lanes of {_LANE_WIDTH} m, which alone give {by_lane:.2f} m"
@@ -342,7 +355,7 @@ def _lane_over_height(lines: RoadSegments) -> float | None:
     sides = []
     for side in (-1.0, 1.0):
         offset = side * lines.slopes
-        near = (offset > _NEAREST_LINE) & (offset < _FARTHEST_LINE)
+        near = (offset > 0.0) & (offset < _FARTHEST_LINE)
         if not near.any():
             return None
         sure = near & (lines.length >= _SHORTEST_LINE * lines.length[near].max())

@@ -161,6 +161,9 @@ class Estimate:
     common_deviation : float
         Standard deviation of ln k that all images of a drive have in common, as by the droplets or the pattern of the
         own beam [-], a part of the whole: averaging over images does not reduce it.
+    scale_deviation : float
+        Standard deviation of the logarithm of all distances, as by an unknown lens [-], a part of the whole: the
+        interval has it as a factor.
     """
 
     method: str
@@ -173,6 +176,7 @@ class Estimate:
     optical_depths: OpticalDepths | None = None
     denser: DenserFog | None = None
     common_deviation: float = 0.0
+    scale_deviation: float = 0.0
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
@@ -205,21 +209,30 @@ class Estimate:
                 visibility_from_extinction(self.bounds.most * widened),
                 visibility_from_extinction(self.bounds.least / widened),
             )
-        half_width = NORMAL_90_PERCENT * self.standard_deviation
-        least = self.extinction - half_width
-        return (
-            visibility_from_extinction(self.extinction + half_width),
-            # What rounding leaves of a difference of equals is no visibility of 1e18 m.
-            visibility_from_extinction(least if least > 1e-9 * half_width else 0.0),
-        )
+        half_width = NORMAL_90_PERCENT * self._deviation_without(self.scale_deviation * self.extinction)
+        least, most = self.extinction - half_width, self.extinction + half_width
+        # What rounding leaves of a difference of equals is no visibility of 1e18 m.
+        least = least if least > 1e-9 * half_width else 0.0
+        if self.scale_deviation > 0.0:
+            least, most = self._on_any_scale(least, -1.0), self._on_any_scale(most, 1.0)
+        return visibility_from_extinction(most), visibility_from_extinction(least)
+
+    def _on_any_scale(self, end: float, side: float) -> float:
+        """The lower (side −1) or upper (1) end of an interval of k with what an unknown scale adds to it [1/m]."""
+        by_scale = NORMAL_90_PERCENT * self.scale_deviation
+        if self.extinction == 0.0 or end == 0.0:
+            return end * math.exp(by_scale)
+        return self.extinction * math.exp(side * math.hypot(math.log(end / self.extinction), by_scale))
+
+    def _deviation_without(self, part: float) -> float:
+        """Standard deviation of k without an independent part [1/m]."""
+        return self.standard_deviation if part == 0.0 else math.sqrt(max(self.standard_deviation**2 - part**2, 0.0))
 
     @property
     def own_deviation(self) -> float:
         """Standard deviation of k that this image alone has [1/m]."""
-        if self.common_deviation == 0.0:
-            return self.standard_deviation
         common = self.extinction * math.expm1(NORMAL_90_PERCENT * self.common_deviation) / NORMAL_90_PERCENT
-        return math.sqrt(max(self.standard_deviation**2 - common**2, 0.0))
+        return self._deviation_without(common)
 
     @property
     def category(self) -> FogCategory:

@@ -7,27 +7,34 @@ from pathlib import Path
 import pytest
 
 from fogsim.offline import Calibration, CalibrationDeviations, estimate_images, load_calibration
+from fogsim.offline.calibration_deviations import on_any_scale
 from fogsim.values import Estimate
-from fogsim.values.estimate import OpticalDepths
-
-DEVIATIONS = CalibrationDeviations(focal_length=0.03, mount_height=0.04)
+from fogsim.values.estimate import NORMAL_90_PERCENT, OpticalDepths
 
 
-def test_relative_deviations_add_in_quadrature_to_those_of_methods_on_the_road() -> None:
+def test_an_unknown_scale_is_a_factor_of_an_interval() -> None:
     depths = OpticalDepths((50.0,), (1.0,), (0.1,))
-    estimate = Estimate("night_road", 0.02, 0.001, optical_depths=depths)
-    widened = DEVIATIONS.widened(estimate)
-    assert widened.extinction == 0.02
-    # 5 % of k, next to its own 5 %, which counts a little more on an uncertain scale.
-    assert widened.standard_deviation == pytest.approx(0.001 * math.sqrt(2.0), rel=0.002)
-    assert widened.optical_depths.standard_deviation == pytest.approx((math.hypot(0.1, 0.05),), rel=0.002)
+    estimate = Estimate("joint_road", 0.02, 0.001, optical_depths=depths)
+    widened = on_any_scale(estimate, 0.5)
+    assert (widened.visibility, widened.common_deviation) == (estimate.visibility, 0.5)
+    assert widened.optical_depths.standard_deviation == (math.hypot(0.1, 0.5),)
+    for end, before in zip(widened.visibility_interval, estimate.visibility_interval, strict=True):
+        off = math.hypot(math.log(before / estimate.visibility), 0.5 * NORMAL_90_PERCENT)
+        assert abs(math.log(end / estimate.visibility)) == pytest.approx(off)
+    # Clear air is clear on any scale, but from another distance on.
+    clear = Estimate("joint_road", 0.0, 0.001)
+    low, high = on_any_scale(clear, 0.5).visibility_interval
+    assert low == pytest.approx(clear.visibility_interval[0] * math.exp(-0.5 * NORMAL_90_PERCENT))
+    assert high == math.inf
 
 
-@pytest.mark.parametrize(
-    "estimate", [Estimate("sign_contrast", 0.02, 0.001), Estimate.invalid("joint_road", "the road is hidden")]
-)
-def test_other_distances_and_refusals_stay(estimate: Estimate) -> None:
-    assert DEVIATIONS.widened(estimate) is estimate
+def test_other_distances_and_refusals_stay() -> None:
+    deviations = CalibrationDeviations(focal_length=0.3, mount_height=0.4)
+    assert [deviations.left_by(one) for one in ("sign_contrast", "night_road")] == [0.0, 0.5]
+    left, given = deviations.left_by("joint_road"), deviations.parameters["scale_deviation"]
+    assert math.hypot(left, given) == pytest.approx(0.5)
+    refused = Estimate.invalid("joint_road", "the road is hidden")
+    assert on_any_scale(refused, 0.5) is refused
 
 
 def test_a_camera_file_states_deviations_or_has_the_usual_ones(drive, tmp_path: Path) -> None:

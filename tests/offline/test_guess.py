@@ -11,8 +11,11 @@ from PIL import Image
 from fogsim.errors import InputError
 from fogsim.offline import camera_text, find_source, guess_camera, write_camera
 from fogsim.offline.camera_file import load_camera
+from fogsim.offline.guess import _mount_height
 from fogsim.offline.source import ImageFiles
 from fogsim.values import Response
+from fogsim.vision.lines.segments import RoadSegments
+from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 HEIGHT = 1.38
 
@@ -31,13 +34,22 @@ def test_the_pitch_comes_from_the_lines_of_the_road(drive) -> None:
 def test_what_is_not_stated_is_assumed_and_said(drive) -> None:
     source = find_source(drive.folder / "images")
     by_height = guess_camera(source, mount_height=HEIGHT)
-    assert by_height.camera.focal_length == pytest.approx(320.0 / math.tan(math.radians(30.0)))
+    assert by_height.camera.focal_length == pytest.approx(320.0 / math.tan(math.radians(36.5)))
     assert any("--field-of-view" in warning for warning in by_height.warnings)
     by_angle = guess_camera(source, field_of_view=1.0)
     # The lanes are 3.75 m wide, not the 3.5 m that are assumed of them.
     assert by_angle.camera.mount_height == pytest.approx(HEIGHT, rel=0.05)
     assert any("measure it" in warning for warning in by_angle.warnings)
     assert "ASSUMED" in camera_text(by_angle)
+
+
+def test_lines_close_below_a_camera_put_it_above_a_car_and_lines_far_apart_do_not_put_it_below() -> None:
+    point = VanishingPoint(320.0, 200.0, 0.5, 4, 400.0)
+    for width, height in ((3.5 / 6.0, 9.0), (7.0 / 1.3, 1.3), (3.5 / 1.3, 1.3)):
+        lines = RoadSegments(point, 0.5 * width * np.array([-1.0, 1.0]), np.full(2, 200.0))
+        guessed = _mount_height([lines] * 5, None)
+        assert guessed.value == pytest.approx(height)
+        assert guessed.warnings
 
 
 def test_an_unknown_camera_that_is_held_upright_has_the_same_focal_length(tmp_path: Path) -> None:
@@ -81,7 +93,7 @@ def test_a_camera_file_says_what_it_was_guessed_from_and_reads_back(drive, tmp_p
     write_camera(path, guess)
     text = path.read_text(encoding="utf-8")
     assert "lines of the road meet" in text
-    assert "# Uncertain: the field of view is assumed" in text
+    assert "# Uncertain: the lens is not known" in text
     read = load_camera(path)
     rounded = replace(guess.camera, focal_length=read.focal_length, pitch=read.pitch)
     assert read == rounded

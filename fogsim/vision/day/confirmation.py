@@ -14,10 +14,12 @@ from fogsim.vision.day.day_fit import fit_free_road
 from fogsim.vision.day.second_opinion import (
     CLEAR,
     DISAGREE,
+    GLARES,
     STANDS_OUT,
     WIDEST,
     DayVerdict,
     agree,
+    has_sun,
     refused,
     stands_out,
     verdict_of,
@@ -98,6 +100,8 @@ class Confirmation:
 
     def _rejection_reason(self, own: Estimate, level: NDArray[Any], day: DayVerdict, *, is_open: bool) -> str:
         """Say why an estimate does not count; empty if it does."""
+        if day.reason and has_sun(level, self._camera, math.floor(self._horizon.row)):
+            return GLARES
         if day.shows_fog:
             least = own.extinction - NORMAL_90_PERCENT * own.standard_deviation
             return STANDS_OUT if self._stands_out(level, least) else _contradiction(own, day)

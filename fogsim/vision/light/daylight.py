@@ -74,7 +74,7 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
 _SHOWN = (
     "",
     "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog",
-    "lamps light the sky and the road: this is a daytime method",
+    "lamps or a low sun light the sky and the road: this is a method for an even daylight",
 )
 """What may show that lamps light the road."""
 

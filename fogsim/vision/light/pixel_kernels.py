@@ -95,3 +95,46 @@ def even_column(j: int, count: int, left: float, right: float) -> int:
     """
     apart = (min(j, count - 1 - j) + 0.5) * (right - left) / count
     return math.floor(left + apart + 0.5) if 2 * j < count else math.ceil(right - apart - 0.5)
+
+
+SATURATED_SHARE = 0.02
+"""Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
+
+
+@kernel
+def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
+    """Shares of pixels saturated in the least saturated channel, and in any (`rows` (n,) int64).
+
+    Noise is each channel's own: where it comes after clipping, a channel of a clipped sky is saturated in more than
+    half of the pixels, but all channels are at once in far fewer.
+    """
+    pixels, largest = image.pixels, image.tables.shape[1] - 1
+    cols, channels = pixels.shape[1], pixels.shape[2]
+    each, some = np.zeros(channels), 0
+    for row in rows:
+        for col in range(side, cols - side):
+            is_any = False
+            for channel in range(channels):
+                is_saturated = pixels[row, col, channel] == largest
+                each[channel] += is_saturated
+                is_any |= is_saturated
+            some += is_any
+    total = max(rows.size * (cols - 2 * side), 1)
+    return each.min() / total, some / total
+
+
+_MOST_OF_ROW = 0.5
+"""Most of a row that the sun and its glow saturate [-]."""
+
+
+@kernel
+def sun_in_sky(image: LinearPixels, rows: NDArray[np.int64], side: int) -> bool:
+    """Whether the sun or a lamp shines in rows of sky: it saturates some pixels, none at the image's top or lowest row.
+
+    Takes `rows` (n,) int64, downward, `side` [px].
+    """
+    if saturation(image, rows, side)[1] <= SATURATED_SHARE:
+        return False
+    most = max([saturation(image, rows[i : i + 1], side)[1] for i in range(rows.size)])
+    ends = max(saturation(image, np.zeros(1, np.int64), 0)[1], saturation(image, rows[-1:], side)[1])
+    return most < _MOST_OF_ROW and ends <= SATURATED_SHARE

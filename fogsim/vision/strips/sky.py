@@ -12,7 +12,15 @@ from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
 from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
-from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, even_column, pixel_luminance
+from fogsim.vision.light.pixel_kernels import (
+    SATURATED_SHARE,
+    LinearPixels,
+    Pixels,
+    even_column,
+    pixel_luminance,
+    saturation,
+    sun_in_sky,
+)
 
 _SKY_SHARE, _SKY_WIDTH = 7, 0.012
 """Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
@@ -31,11 +39,12 @@ def sky_rows(
     left: int,
     right: int,
     floor: float,
+    has_sun: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
 
     Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
-    the row.
+    the row; but at the row's middle where the sun is in the sky, which its glow brightens.
 
     Returns brightness [linear grey levels], and the share of each row that is as bright (n,). Takes `rows` (n,) int64,
     `floor` [linear grey levels].
@@ -47,7 +56,7 @@ def sky_rows(
         for j in range(count):
             samples[j] = pixel_luminance(image, rows[i], even_column(j, count, left - 0.5, right - 0.5))
         sort_few(samples, ordered)
-        centre, kept = float(ordered[count - 1 - count // _SKY_SHARE]), 0
+        centre, kept = float(ordered[count // 2 if has_sun else count - 1 - count // _SKY_SHARE]), 0
         reach = max(2.5 * floor, _SKY_WIDTH * centre)
         for _ in range(4):
             total, kept = 0.0, 0
@@ -120,28 +129,6 @@ def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
         square += ordered[i] * ordered[i]
     # For a normal difference of deviation √2 σ, the lower three quarters have a mean square of 0.3692 · 2 σ².
     return math.sqrt(square / kept / (2.0 * 0.3692))
-
-
-@kernel
-def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
-    """Shares of pixels saturated in the least saturated channel, and in any (`rows` (n,) int64).
-
-    Noise is each channel's own: where it comes after clipping, a channel of a clipped sky is saturated in more than
-    half of the pixels, but all channels are at once in far fewer.
-    """
-    pixels, largest = image.pixels, image.tables.shape[1] - 1
-    cols, channels = pixels.shape[1], pixels.shape[2]
-    each, some = np.zeros(channels), 0
-    for row in rows:
-        for col in range(side, cols - side):
-            is_any = False
-            for channel in range(channels):
-                is_saturated = pixels[row, col, channel] == largest
-                each[channel] += is_saturated
-                is_any |= is_saturated
-            some += is_any
-    total = max(rows.size * (cols - 2 * side), 1)
-    return each.min() / total, some / total
 
 
 _SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
@@ -257,10 +244,6 @@ def _add_sky(
 
 Floats = NDArray[np.float64]
 
-SATURATED_SHARE = 0.02
-"""Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
-
-
 UNKNOWN_VIGNETTING = 0.3
 """Standard deviation of a lens's vignetting where the sky does not show it [-]: most pictures are corrected."""
 
@@ -293,6 +276,7 @@ class Sky(NamedTuple):
     slope_deviation: float = math.inf
     # (float, float): Least and greatest height above the horizon at which that was seen [rad]
     heights: tuple[float, float] = (0.0, 0.0)
+    has_sun: bool = False  # Whether the sun shines in it, or a lamp
 
     @property
     def is_clipped(self) -> bool:
@@ -365,14 +349,17 @@ def _sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None
 def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin: float) -> Sky:
     """`sky_above` of rows (n,), given principal point, horizon and focal length [px]; NaN where it is hidden."""
     side, noise = image.pixels.shape[1] // 6, pixel_noise(image, rows)
-    bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3))
+    saturated, clipped = saturation(image, rows, side)
+    has_sun = sun_in_sky(image, rows, side)
+    if has_sun:
+        saturated = clipped = 0.0
+    bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3), has_sun)
     height, most = np.empty(rows.size), 1e-9
     for i in range(rows.size):
         height[i], most = (axis[2] - rows[i]) / axis[3], max(most, bright[i])
     level, _, scatter, lowest = level_at_horizon(bright, height, max(_DARKER, 2.0 * noise / most))
-    if lowest > _MOST_HIDDEN:
+    if lowest > _MOST_HIDDEN and not has_sun:
         level = np.nan
-    saturated, clipped = saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
     seen, last, free, light = 0, rows.size - 1, np.empty(rows.size, np.int64), np.empty(rows.size)
     while last >= 0 and height[last] < lowest:
@@ -396,7 +383,7 @@ def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin
     heights = ((axis[2] - free[0]) / axis[3], (axis[2] - free[seen - 1]) / axis[3]) if seen else (0.0, 0.0)
     level_and_noise = (shading.level, deviation, upward, noise, saturated, clipped)
     lens = (shading.vignetting, shading.vignetting_deviation, shading.unevenness)
-    return Sky(*level_and_noise, *lens, shading.slope, shading.slope_deviation, heights)
+    return Sky(*level_and_noise, *lens, shading.slope, shading.slope_deviation, heights, has_sun)
 
 
 class _Shading(NamedTuple):

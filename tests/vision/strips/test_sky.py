@@ -5,12 +5,12 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.light.pixel_kernels import saturation
 from fogsim.vision.strips.sky import (
     UNKNOWN_VIGNETTING,
     even_rows,
     level_at_horizon,
     pixel_noise,
-    saturation,
     sky_above,
     sky_shading,
 )
@@ -88,6 +88,17 @@ def test_saturated_and_clipped_pixels_are_counted():
     noisy = np.clip(np.rint(255.0 + noise), 0, 255).astype(np.uint8)
     least, some = saturation(linear_pixels(noisy, CAMERA), np.arange(120), 40)
     assert 0.5 < least < 0.7 < some
+
+
+def test_the_sun_is_not_the_sky_but_an_overexposed_sky_is():
+    away = np.hypot(COLS - 159.5, ROWS - CAMERA.horizon_row + 36.0)
+    sun = sky_above(photographed(140.0 + 3e4 / np.maximum(away, 1.0) ** 2 + 500.0 * (away < 20.0)), CAMERA, 3.0)
+    assert (sun.has_sun, sun.is_clipped) == (True, False)
+    assert sun.luminance == pytest.approx(150.0, abs=15.0)
+    upward = (CAMERA.horizon_row - ROWS) / CAMERA.focal_length
+    for overexposed in (250.0 * (1.0 + upward), 300.0 * (1.0 - upward), 320.0 * (1.0 - AWAY)):
+        seen = sky_above(photographed(overexposed), CAMERA, 3.0)
+        assert (seen.has_sun, seen.is_clipped) == (False, True)
 
 
 def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():

@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import gc
 import os
 import sys
 import threading
@@ -15,6 +16,8 @@ def main() -> None:
     open_standard_streams()
     print_any_text()
     leave_on_signals()
+    # Modules leave no cycles: each second of imports would take another tenth to look for them.
+    gc.set_threshold(10_000)
     try:
         from fogsim.cli.app import main as run_command_line  # noqa: PLC0415 - after signals are provided for
 

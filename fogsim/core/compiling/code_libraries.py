@@ -84,6 +84,14 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
 
     _put_off = False
 
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Take a module in and apart: its instructions name each other, which garbage collection would have to find."""
+        super().add_ir_module(ir_module)
+        if self.deferring:
+            for function in ir_module.functions:
+                for block in function.blocks:
+                    block.instructions.clear()
+
     def _optimize_functions(self, ll_module: ModuleRef) -> None:
         """Simplify what is defined in a module, lightly: it is optimised once more where it arrives."""
         if not self.deferring:

@@ -8,10 +8,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from llvmlite.binding import ffi  # type: ignore[import-untyped]
-from numba.core import base, cgutils, cpu, ir, types
+from numba.core import base, cgutils, codegen, cpu, ir, transforms, types
+from numba.core.postproc import PostProcessor, VariableLifetime
 from numba.core.runtime.context import NRTContext
 from numba.core.targetconfig import ConfigStack, TargetConfig
 from numba.core.types.functions import BaseFunction
+from numba.extending import overload
 from numba.np import arrayobj
 
 
@@ -178,6 +180,35 @@ def make_array(kind: Any) -> Any:
     return _plain_array(kind) if type(kind) is types.Array else _make_array(kind)
 
 
+_post_process = PostProcessor.run
+
+
+def post_process(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Update a function after a pass: when its variables live is worked out where it is used, seldom but for generators."""
+    function = processor.func_ir
+    if function.is_generator:
+        _post_process(processor, emit_dels, extend_lifetimes)
+        return
+    function.blocks = transforms.canonicalize_cfg(function.blocks)
+    function.variable_lifetime = VariableLifetime(function.blocks)
+    function.generator_info = None
+    if emit_dels:
+        processor._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
+def raise_mismatch(assigned: Any, assigned_to: Any) -> None:
+    """Refuse to assign an array to a slice of another shape."""
+
+
+@overload(raise_mismatch)  # type: ignore[untyped-decorator] # numba is untyped
+def _raise_mismatch(assigned: Any, assigned_to: Any) -> Callable[..., None]:  # noqa: ARG001 - their names are the kernel's
+    def refuse(assigned: Any, assigned_to: Any) -> None:  # noqa: ARG001
+        # numba's names both shapes, and compiles its strings for that: a second in each process.
+        raise ValueError("cannot assign slice from input of different size")
+
+    return refuse
+
+
 SHORTCUTS = (
     _UnobservedLock(),
     Shortcut(BaseFunction, "get_call_type", _resolve_call),
@@ -190,5 +221,8 @@ SHORTCUTS = (
     Shortcut(ir.Inst, "_rec_list_vars", variables_in),
     Shortcut(arrayobj, "basic_indexing", _index_element),
     Shortcut(arrayobj, "make_array", make_array),
+    Shortcut(arrayobj, "raise_with_shape_context", raise_mismatch),
+    Shortcut(codegen.CPUCodegen, "_check_llvm_bugs", functools.cache(codegen.CPUCodegen._check_llvm_bugs)),
+    Shortcut(PostProcessor, "run", post_process),
 )
 """All of them; each has `take`."""

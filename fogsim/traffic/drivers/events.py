@@ -188,11 +188,10 @@ class Script:
         return tuple(ChangeLane(event.vehicle, event.lanes, event.stay) for event in possible)
 
     def _is_due(self, event: Event, situation: Situation, gap: float | None) -> bool:
-        vehicle, trigger = event.vehicle, event.trigger
-        if vehicle not in situation.present:
-            return False
-        driven = 0.0 if trigger.at_position is None else situation.driven(vehicle)
-        return trigger.fires(situation.time, driven, gap, self._gaps.get(vehicle))
+        vehicle, on_the_way = event.vehicle, event.trigger.at_position is not None
+        return vehicle in situation.present and event.trigger.fires(
+            situation.time, situation.driven(vehicle) if on_the_way else 0.0, gap, self._gaps.get(vehicle)
+        )
 
     def _orders(self, situation: Situation) -> dict[str, Order]:
         orders: dict[str, Order] = {}

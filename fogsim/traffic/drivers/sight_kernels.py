@@ -35,7 +35,7 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 
 
 _X, _Y, _Z = range(3)
-_MINIMUM_GAP, BODY_CONTRAST, EYE_HEIGHT = range(3)
+_MINIMUM_GAP, _BODY_CONTRAST, _EYE_HEIGHT = range(3)
 """Columns of traits of vehicles: the driver's minimum gap [m], the body's contrast [-], the driver's eyes above the
 road [m]."""
 
@@ -74,7 +74,7 @@ def face_leaders(
     for i in range(rows.shape[1]):
         own, other, signals = traits[rows[0, i]], traits[rows[1, i]], int(read[3, i]) & 127
         facing[DISTANCE, i] = max(read[0, i] + own[_MINIMUM_GAP], NEAREST)
-        facing[CONTRAST, i], facing[STEADY, i] = other[BODY_CONTRAST], lamps[0, 0]
+        facing[CONTRAST, i], facing[STEADY, i] = other[_BODY_CONTRAST], lamps[0, 0]
         facing[INTENSITY, i], facing[BRIGHTEST, i] = lamps[0, signals], lamps[1, signals]
         facing[OWN_STEADY, i] = facing[OWN, i] = 1.0
         facing[_CLOSING, i] = abs(read[2, i] - read[1, i]) + closing.speed
@@ -85,7 +85,7 @@ def face_leaders(
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         apart = read[1, i] + read[2, i] + 2.0 * closing.speed + closing.drift
         facing[_DEEPENING, i] = closing.extinction * apart
-        start, end, height = lines[0, i], lines[1, i], own[EYE_HEIGHT]
+        start, end, height = lines[0, i], lines[1, i], own[_EYE_HEIGHT]
         x, y, z = end[_X] - start[_X], end[_Y] - start[_Y], end[_Z] - start[_Z]
         start[_Z] += height
         z += min(height, BODY_MIDDLE) - height

@@ -3,10 +3,7 @@
 import itertools
 from collections import defaultdict
 from collections.abc import Collection, Sequence
-from typing import NamedTuple, TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from fogsim.traffic.sumo.claims import LoadMark
 from fogsim.traffic.sumo.link import Api, getter, subscribed
@@ -138,14 +135,8 @@ _ROUNDING = 1e-6
 """Share of a step by which clocks may differ from a whole number of steps [-]."""
 
 
-Speed = TypeVar("Speed", float, NDArray[np.float64])
-
-
-def closing_speed_bound(speed: Speed, leader_speed: Speed, horizon: float) -> Speed:
-    """How fast the gap between two vehicles, or each of many gaps, changes at most [m/s].
-
-    Takes `speed`, `leader_speed` (n,) [m/s], `horizon` [s].
-    """
+def closing_speed_bound(speed: float, leader_speed: float, horizon: float) -> float:
+    """How fast the gap between two vehicles changes at most [m/s] (`horizon` [s])."""
     return abs(leader_speed - speed) + 0.5 * MAX_RELATIVE_ACCELERATION * horizon
 
 

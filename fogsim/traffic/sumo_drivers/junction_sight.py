@@ -14,7 +14,7 @@ from pathlib import Path
 from fogsim.core.files.xml_reader import open_unpacked
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
-from fogsim.traffic.sumo.link import Api, edge_length, vehicle_getter
+from fogsim.traffic.sumo.link import Api, edge_length, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import DueVehicles
 from fogsim.traffic.sumo_drivers.unseen import UnseenFoes
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
@@ -121,8 +121,9 @@ class JunctionSight:
         self._speed, self._position, self._lane, self._lane_position = view.getters(
             "getSpeed", "getPosition3D", "getLaneID", "getLanePosition"
         )
-        self._lane_length, self._directions = api.lane.getLength, LaneDirections(api)
-        self._lanes: dict[str, tuple[float, bool]] = {}
+        length, self._directions = getter(api, "lane", "getLength"), LaneDirections(api)
+        self._lane_length = functools.cache(lambda lane: float(length(lane)) if lane else 0.0)
+        self._is_two_way = functools.cache(self._directions.is_two_way)
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
         self._certainly_hidden = view.sight.hidden_distance(view.fog.minimum_extinction, _BRIGHTEST)
@@ -177,11 +178,8 @@ class JunctionSight:
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `_ALONG_A_LANE` (`speed` [m/s])."""
         lane = self._lane(driver)
-        if lane not in self._lanes:
-            length = float(self._lane_length(lane)) if lane else 0.0
-            self._lanes[lane] = length, self._directions.is_two_way(lane)
-        length, is_two_way = self._lanes[lane]
-        if length < _LONG_LANE or (is_two_way and self._directions.is_against(driver, lane)):
+        length = self._lane_length(lane)
+        if length < _LONG_LANE or (self._is_two_way(lane) and self._directions.is_against(driver, lane)):
             return False
         fastest = speed + _FASTEST_GAIN
         reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)

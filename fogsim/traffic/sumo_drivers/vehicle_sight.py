@@ -17,17 +17,7 @@ from fogsim.traffic.drivers.lamp_intensity import (
     uses_high_beam,
 )
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
-from fogsim.traffic.drivers.sight_kernels import (
-    AHEAD,
-    ASIDE,
-    BEARING,
-    BODY_CONTRAST,
-    END,
-    EYE_HEIGHT,
-    EYES,
-    LINE,
-    draw_lines_of_sight,
-)
+from fogsim.traffic.drivers.sight_kernels import AHEAD, ASIDE, BEARING, END, EYES, LINE, draw_lines_of_sight
 from fogsim.traffic.sumo.claims import SOLE_SESSION
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo.roster import Roster
@@ -59,6 +49,9 @@ class _SeenBody(NamedTuple):
     height: float
     missing: int  # Bits of sides on which there is no lamp
 
+
+_CONTRAST, _EYES_TO_WIDTH = 1, slice(2, 5)
+"""Columns of bodies in an array."""
 
 _OF_TARGET = 10
 """Column of lines of sight, after those that kernels draw: the target's contrast."""
@@ -245,7 +238,7 @@ class VehicleSight:
         flat = itertools.chain.from_iterable(map(self._position, both))
         read[:, :3] = np.fromiter(flat, np.float64, 6 * count).reshape(-1, 3)
         read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, both), np.float64, 2 * count))
-        read[:, 4:], lines[:, _OF_TARGET] = traits[:, EYE_HEIGHT : EYE_HEIGHT + 3], traits[count:, BODY_CONTRAST]
+        read[:, 4:], lines[:, _OF_TARGET] = traits[:, _EYES_TO_WIDTH], traits[count:, _CONTRAST]
         bodies, ends = read[count:], np.arange(1, count + 1)
         bodies[:, 4] = 0.0
         if (bodies[:, 5] > LONGEST_RIGID).any():

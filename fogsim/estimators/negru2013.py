@@ -35,10 +35,10 @@ from fogsim.vision.lines.vanishing_point import VanishingPoint, consensus_vanish
 from fogsim.vision.region.inflection import (
     FogModel,
     best_inflection,
+    inflection_with_deviation,
     printed_inflection,
-    subpixel_inflections,
 )
-from fogsim.vision.region.law import check_law, detection_limit, extinction_deviation, fog_or_clear, seen_up_to
+from fogsim.vision.region.law import block_signs, check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.profile import RoadCurve, band_profile
 from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
 from fogsim.vision.region.road_region import GrowthLimits, constant_limits
@@ -304,12 +304,13 @@ class Negru2013:
         The band is on the road from `paved` rows below the horizon downward.
         """
         apart = np.abs(curve.below_horizon) > _BETWEEN
-        curve = replace(curve, weight=curve.weight * apart)
-        rows, square = subpixel_inflections(curve, curve.luminance[:, None], printed=self._is_printed)
-        extinction = 2.0 / curve.row_distance * float(rows[0])
+        curve = curve._replace(weight=curve.weight * apart)
+        deviation_of_row = seen.horizon.standard_deviation
+        extinction, deviation, square = inflection_with_deviation(
+            curve, block_signs(), deviation_of_row, Negru2013Repair.SIGNS not in self._repairs
+        )
         if not extinction > 0.0:
             return None
-        deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
         beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
         deviation = math.hypot(deviation, _OTHER_GROUND * beside * extinction)
         if not fog_or_clear(extinction, deviation)[0] > 0.0:
@@ -321,15 +322,7 @@ class Negru2013:
             seen_up_to(curve)
             raise
         per_row = -2.0 / curve.row_distance
-        return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(float(square[0])))
-
-    @property
-    def _is_printed(self) -> bool:
-        return Negru2013Repair.SIGNS not in self._repairs
-
-    def _extinctions(self, curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows, _ = subpixel_inflections(curve, luminance, printed=self._is_printed)
-        return np.asarray(2.0 / curve.row_distance * rows)
+        return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(square))
 
     def _edges(self, road: RoadImage, slope: NDArray[np.float32]) -> Edges:
         edges = self._detector(road.luminance, slope if Negru2013Repair.FOG_DRAWS_NO_EDGES in self._repairs else None)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -386,4 +386,4 @@ def _curve(road: SeenRoad, camera: Camera, *, own_lane: bool) -> RoadCurve:
         road.image, road.region, road.horizon.row, axis, camera, own_lane=own_lane, hidden=road.hidden
     )
     # A sky that is clipped does not brighten: rows of it tell where the slope ends.
-    return replace(curve, weight=np.maximum(curve.weight, curve.luminance >= SATURATED))
+    return curve._replace(weight=np.maximum(curve.weight, curve.luminance >= SATURATED))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.exponential import exponential
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import matrix_product
-from fogsim.vision.region.law import SMALLEST
+from fogsim.vision.region.law import SMALLEST, law_fit, moved, redrawn, slants, whole_deviation
 from fogsim.vision.region.profile import RoadCurve, decreasing
 
 Floats = NDArray[np.float64]
@@ -142,7 +142,29 @@ _FEWEST_ROWS = 4.0
 """Rows that a level and a slope need at least."""
 
 
-def subpixel_inflections(curve: RoadCurve, luminance: Floats, *, printed: bool = False) -> tuple[Floats, Floats]:
+@kernel
+def inflection_with_deviation(
+    curve: RoadCurve, signs: Floats, horizon_deviation: float, printed: bool
+) -> tuple[float, float, float]:
+    """Extinction of a curve's inflection to a fraction of a row, its deviation [1/m], and the mean square that is left.
+
+    0 where there is none. Takes `signs` of `block_signs`, `horizon_deviation` [px].
+    """
+    rows, square = subpixel_inflections(curve, curve.luminance.copy().reshape(-1, 1), printed)
+    per_row = 2.0 / curve.row_distance
+    k = per_row * rows[0]
+    if not k > 0.0:
+        return 0.0, np.inf, 0.0
+    found = per_row * subpixel_inflections(curve, redrawn(curve, law_fit(curve, k).model, signs), printed)[0]
+    ends = np.empty(2)
+    for side in range(2):
+        other = moved(curve, horizon_deviation if side == 0 else -horizon_deviation)
+        ends[side] = per_row * subpixel_inflections(other, curve.luminance.copy().reshape(-1, 1), printed)[0][0]
+    return k, whole_deviation(k, found, ends[0], ends[1]), square[0]
+
+
+@kernel
+def subpixel_inflections(curve: RoadCurve, luminance: Floats, printed: bool) -> tuple[Floats, Floats]:
     """Inflections of some curves to a fraction of a row.
 
     As negru2013 section IV.B.c, but for candidates between rows as well: for each of them level and slope are those of
@@ -152,21 +174,13 @@ def subpixel_inflections(curve: RoadCurve, luminance: Floats, *, printed: bool =
     Returns v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none
     (m,). Takes `luminance` (n, m) [linear grey levels].
     """
-    light = np.ascontiguousarray(luminance)
-    return _inflections(curve.below_horizon, curve.distance, curve.weight, light, curve.row_distance, printed)
-
-
-@kernel
-def _inflections(
-    below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, printed: bool
-) -> tuple[Floats, Floats]:
-    """`subpixel_inflections` of curves over the same rows (n,)."""
+    below, weight = curve.below_horizon, curve.weight
     top = max(below[-1], 2.0 * _HIGHEST)
     step = math.log(top / _HIGHEST) / (_CANDIDATES - 1)
     at, error = _HIGHEST * np.exp(step * np.arange(_CANDIDATES)), np.full((_CANDIDATES, luminance.shape[1]), np.inf)
     used = np.flatnonzero(weight > 0.0)
     rows, weights, light = below[used], weight[used], luminance[used]
-    rates = _rates(rows, distance[used], row_distance)
+    rates = _rates(rows, slants(curve)[used])
     sums = np.zeros((2, luminance.shape[1]))
     for i in range(used.size):
         for m in range(sums.shape[1]):
@@ -183,14 +197,13 @@ def _inflections(
 
 
 @kernel
-def _rates(below: Floats, distance: Floats, row_distance: float) -> Floats:
+def _rates(below: Floats, slant: Floats) -> Floats:
     """Change of the optical depth of each row's top, middle and bottom with the inflection's row [1/px] (3, n)."""
     rates = np.empty((3, below.size))
     for i in range(below.size):
-        slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
         for j in range(3):
             end = below[i] + 0.5 * (j - 1)
-            rates[j, i] = -2.0 * slant / end if end > SMALLEST else -np.inf
+            rates[j, i] = -2.0 * slant[i] / end if end > SMALLEST else -np.inf
     return rates
 
 

@@ -3,17 +3,14 @@
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.core.linear_algebra import straight_line
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.vision.light.medians import median, quantile
-from fogsim.vision.region.profile import RoadCurve, path_lengths
+from fogsim.vision.region.profile import RoadCurve
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage
 
 Floats = NDArray[np.float64]
@@ -34,7 +31,7 @@ SMALLEST = 0.05
 """Part of a row below the horizon that counts as its least [px]."""
 
 
-class _LawFit(NamedTuple):
+class LawFit(NamedTuple):
     """Road and airlight of an extinction, by least squares over a curve."""
 
     # airlight, road: A and R [linear grey levels]
@@ -54,27 +51,24 @@ def transmittance(optical: Floats | float, below_horizon: Floats) -> Floats:
     return np.asarray((top + 4.0 * middle + bottom) / 6.0)
 
 
+@kernel
 def slants(curve: RoadCurve) -> Floats:
     """Length of the path to each row's road over the depth along the axis, 1 above the horizon [-]."""
-    lies = (curve.below_horizon > 0.0) & np.isfinite(curve.distance)
-    distance, below = np.where(lies, curve.distance, curve.row_distance), np.where(lies, curve.below_horizon, 1.0)
-    return np.asarray(distance * below / curve.row_distance)
-
-
-def law_fit(curve: RoadCurve, extinction: float) -> _LawFit:
-    """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
-    return _law_fit(curve.below_horizon, curve.distance, curve.weight, curve.luminance, curve.row_distance, extinction)
+    out = np.ones(curve.below_horizon.size)
+    for i in range(out.size):
+        if curve.below_horizon[i] > 0.0 and curve.distance[i] < np.inf:
+            out[i] = curve.distance[i] * curve.below_horizon[i] / curve.row_distance
+    return out
 
 
 @kernel
-def _law_fit(
-    below: Floats, distance: Floats, weight: Floats, luminance: Floats, row_distance: float, extinction: float
-) -> _LawFit:
+def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
+    """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
+    below, weight, luminance, slant = curve.below_horizon, curve.weight, curve.luminance, slants(curve)
     shape, total = np.empty(below.size), max(weight.sum(), 1e-9)
     mean, mean_shape = 0.0, 0.0
     for i in range(below.size):
-        slant = distance[i] * below[i] / row_distance if below[i] > 0.0 and distance[i] < np.inf else 1.0
-        shape[i] = row_transmittance(extinction * row_distance * slant, below[i])
+        shape[i] = row_transmittance(extinction * curve.row_distance * slant[i], below[i])
         mean_shape += weight[i] * shape[i] / total
         mean += weight[i] * luminance[i] / total
     square, both = 0.0, 0.0
@@ -88,7 +82,7 @@ def _law_fit(
     for i in range(below.size):
         left += weight[i] * (luminance[i] - model[i]) ** 2
     misfit = math.sqrt(left / total) / drop if drop > 0.0 else np.inf
-    return _LawFit(airlight, airlight - drop, model, misfit)
+    return LawFit(airlight, airlight - drop, model, misfit)
 
 
 @kernel
@@ -102,24 +96,29 @@ def row_transmittance(optical: float, below: float) -> float:
     return total / 6.0
 
 
-def _redrawn(curve: RoadCurve, model: Floats) -> Floats:
+@kernel
+def redrawn(curve: RoadCurve, model: Floats, signs: Floats) -> Floats:
     """Curves as the same fog over other road would make: a model, and its residuals with their signs changed at random.
 
     Residuals of neighbouring rows belong together, for patches of a road spread over several, so they change in blocks
     (wild block bootstrap: Shao 2010, J. Am. Stat. Assoc. 105, 218–235): of rows of equal ratios of distances, because
     patches farther away fill fewer rows.
 
-    Returns luminance [linear grey levels]. Takes `model` (n,).
+    Returns luminance [linear grey levels]. Takes `model` (n,), `signs` of `block_signs`.
     """
-    below = np.maximum(curve.below_horizon, 1.0)
-    log = np.log(below / below[0]) if below[0] > 0.0 else np.zeros(below.size)
-    block = np.minimum((_BLOCKS * log / max(float(log[-1]), 1e-9)).astype(np.int64), _BLOCKS - 1)
-    residual = np.where(curve.weight > 0.0, curve.luminance - model, 0.0)
-    return np.asarray(model[:, None] + residual[:, None] * _signs()[block])
+    out = np.empty((model.size, signs.shape[1]))
+    first = max(curve.below_horizon[0], 1.0)
+    whole = max(math.log(max(curve.below_horizon[-1], 1.0) / first), 1e-9)
+    for i in range(model.size):
+        block = int(_BLOCKS * math.log(max(curve.below_horizon[i], 1.0) / first) / whole)
+        residual = curve.luminance[i] - model[i] if curve.weight[i] > 0.0 else 0.0
+        for m in range(out.shape[1]):
+            out[i, m] = model[i] + residual * signs[min(block, _BLOCKS - 1), m]
+    return out
 
 
 @functools.cache
-def _signs() -> Floats:
+def block_signs() -> Floats:
     """(blocks, patterns); it is shared."""
     return np.random.default_rng(2015).choice([-1.0, 1.0], (_BLOCKS, _PATTERNS))
 
@@ -133,25 +132,44 @@ def extinction_deviation(curve: RoadCurve, extinction: float, read: Read, horizo
 
     Returns [1/m]; infinite where curves like this one give nothing. Takes `extinction` [1/m], `horizon_deviation` [px].
     """
-    by_road = _ABSORBED * spread(read(curve, _redrawn(curve, law_fit(curve, extinction).model)), extinction)
-    moved = [_read_below(curve, side * horizon_deviation, read) for side in (1.0, -1.0)]
-    by_horizon = max((abs(k - extinction) for k in moved if math.isfinite(k)), default=math.inf)
-    return math.hypot(by_road, by_horizon, _ALBEDO_DEVIATION * extinction)
+    found = read(curve, redrawn(curve, law_fit(curve, extinction).model, block_signs()))
+    lower, higher = (moved(curve, side * horizon_deviation) for side in (1.0, -1.0))
+    ends = [float(read(one, one.luminance[:, None])[0]) for one in (lower, higher)]
+    return whole_deviation(extinction, found, ends[0], ends[1])
 
 
-def _read_below(curve: RoadCurve, shift: float, read: Read) -> float:
-    below = curve.below_horizon - shift
-    distance = path_lengths(below, curve.row_distance, slants(curve))
-    moved = replace(curve, below_horizon=below, distance=distance)
-    return float(read(moved, curve.luminance[:, None])[0])
+@kernel
+def whole_deviation(extinction: float, found: Floats, lower: float, higher: float) -> float:
+    """Deviation by what curves drawn again gave (m,), and the curve with its horizon lower and higher [1/m]."""
+    by_road, by_horizon = _ABSORBED * spread(found, extinction), -1.0
+    for end in (lower, higher):
+        if np.isfinite(end):
+            by_horizon = max(by_horizon, abs(end - extinction))
+    by_horizon = by_horizon if by_horizon >= 0.0 else np.inf
+    return math.sqrt(by_road**2 + by_horizon**2 + (_ALBEDO_DEVIATION * extinction) ** 2)
 
 
+@kernel
+def moved(curve: RoadCurve, shift: float) -> RoadCurve:
+    """A curve whose horizon lies lower [px]."""
+    below, slant, distance = curve.below_horizon - shift, slants(curve), np.full(curve.weight.size, np.inf)
+    for i in range(below.size):
+        if below[i] > 0.0:
+            distance[i] = curve.row_distance * slant[i] / below[i]
+    return RoadCurve(below, curve.luminance, distance, curve.weight, curve.row_distance)
+
+
+@kernel
 def spread(values: Floats, about: float) -> float:
     """Robust standard deviation of what curves drawn again gave about what the curve itself gave (`values` (n,))."""
-    apart = np.abs(values[np.isfinite(values)] - about)
+    apart = np.sort(np.abs(values[np.isfinite(values)] - about))
     if apart.size < 2:
-        return math.inf
-    return max(1.4826 * median(apart), 0.6 * quantile(apart, 0.9))
+        return np.inf
+    place = 0.9 * (apart.size - 1)
+    below = min(int(place), apart.size - 2)
+    upper = apart[below] + (place - below) * (apart[below + 1] - apart[below])
+    middle = 0.5 * (apart[(apart.size - 1) // 2] + apart[apart.size // 2])
+    return float(max(1.4826 * middle, 0.6 * upper))
 
 
 _NEAR_HORIZON = 4.0
@@ -208,16 +226,24 @@ def check_law(curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[flo
     bright = excess > _AIRLIGHT_OFF * road.contrast and road.airlight < SATURATED
     if fit.misfit > _MAX_MISFIT or excess < -_AIRLIGHT_OFF * road.contrast or bright:
         raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
-    seen = (curve.weight > 0.0) & (curve.below_horizon > 0.0)
-    if int(seen.sum()) >= MIN_ROWS:
-        rows, light = curve.below_horizon[seen], curve.luminance[seen]
-        slope, start = straight_line(rows, light)
-        rise = abs(slope) * float(np.ptp(rows))
-        left = float(np.sqrt(np.mean((light - start - slope * rows) ** 2)))
-        by_law = float(np.sqrt(np.mean((light - fit.model[seen]) ** 2)))
-        if slope < 0.0 and left < max(_STRAIGHT * rise, _AS_STRAIGHT * by_law):
-            raise CannotTellError("it brightens evenly from row to row, as no fog does")
+    if _is_even(curve, fit.model):
+        raise CannotTellError("it brightens evenly from row to row, as no fog does")
     return fit.airlight, fit.road
+
+
+@kernel
+def _is_even(curve: RoadCurve, model: Floats) -> bool:
+    """Whether a curve brightens upward along a straight line, about as well as it follows the law."""
+    seen = (curve.weight > 0.0) & (curve.below_horizon > 0.0)
+    if seen.sum() < MIN_ROWS:
+        return False
+    rows, light = curve.below_horizon[seen], curve.luminance[seen]
+    apart, level = rows - rows.mean(), light.mean()
+    slope = (apart * (light - level)).sum() / (apart * apart).sum()
+    left = math.sqrt(((light - level - slope * apart) ** 2).mean())
+    by_law = math.sqrt(((light - model[seen]) ** 2).mean())
+    rise = abs(slope) * (rows.max() - rows.min())
+    return bool(slope < 0.0 and left < max(_STRAIGHT * rise, _AS_STRAIGHT * by_law))
 
 
 def fog_or_clear(extinction: float, deviation: float) -> tuple[float, float]:

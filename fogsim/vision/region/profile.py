@@ -1,7 +1,7 @@
 """Luminance by row: the curve that fog draws on the road."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +64,7 @@ def _isotonic_decreasing(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.repeat(means[:blocks], sizes[:blocks])
 
 
-@dataclass(frozen=True, slots=True)
-class RoadCurve:
+class RoadCurve(NamedTuple):
     """The luminance of the road by row, with what the flat world says about the rows."""
 
     below_horizon: NDArray[np.float64]  # (n,): v − v_h of each row, ascending [px]; not positive for rows of sky

@@ -49,7 +49,8 @@ def checked_estimate(method: str, value: object) -> Estimate:
     if estimate.valid:
         _check_number(who, "extinction", estimate.extinction, " [1/m]; return Estimate.invalid if there is no estimate")
         _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
-        _check_number(who, "common_deviation", estimate.common_deviation, " [-]")
+        for name in ("common_deviation", "scale_deviation"):
+            _check_number(who, name, getattr(estimate, name), " [-]")
     if not (_is_number(estimate.reach) and estimate.reach >= 0.0):
         raise InputError(f"{who}: reach must be at least 0 [m], or inf; got {shown(estimate.reach)}")
     for name, kind in (("bounds", ExtinctionBounds), ("optical_depths", OpticalDepths), ("denser", DenserFog)):

@@ -105,6 +105,14 @@ def dirty(light: Light) -> np.ndarray:
     return plain(replace(light, linear=linear))
 
 
+def glaring(light: Light) -> np.ndarray:
+    """The sun 7° up and 4° aside, and the veil of the windscreen, which falls off with the square of the angle."""
+    column = CAMERA.principal_point[0] + 0.07 * CAMERA.focal_length
+    across, up = (np.arange(CAMERA.width) - column) / CAMERA.focal_length, light.below + np.radians(7.0)
+    veil = 0.003 / np.maximum(across**2 + up**2, 1e-5)
+    return plain(replace(light, linear=light.linear + veil))
+
+
 def convex(share: float) -> Callable[[np.ndarray], np.ndarray]:
     """Skies that are level above 0.16 rad and darken down to the horizon by a share a 120th of a radian."""
     return lambda above: (1.0 - share) ** (-120.0 * np.minimum(np.maximum(above, 0.0), 0.16))
@@ -136,6 +144,7 @@ KINDS = {
     "wet": Kind(wet),
     "bonnet": Kind(bonnet),
     "dirt": Kind(dirty),
+    "glare": Kind(glaring),
     "convex sky 1": Kind(sky=convex(0.01), airlight=0.35),
     "convex sky 2": Kind(sky=convex(0.02), airlight=0.25),
     "convex sky 3": Kind(sky=convex(0.03), airlight=0.2),

@@ -1,7 +1,6 @@
 """What estimators demand of observations."""
 
 import math
-from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,19 +39,8 @@ class ObservationCheck:
         return image
 
     def kernel_image(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """As `image_of`, for FogSim's own methods, whose kernels only read it: for all of them the same object."""
-        image, frame = self.image_of(observation), observation.frame
-        for known, view in _LAST:
-            if known is frame:
-                return view
-        view = for_kernels(image)
-        if isinstance(frame, Frame):
-            _LAST.append((frame, view))
-        return view
-
-
-_LAST: deque[tuple[Frame, NDArray[np.uint8] | NDArray[np.uint16]]] = deque(maxlen=1)
-"""The frame that was asked for last, and its image."""
+        """As `image_of`, for FogSim's own methods, whose kernels only read it."""
+        return for_kernels(self.image_of(observation))
 
 
 def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -43,11 +43,12 @@ class CalibrationDeviations:
         """
         return {"pitch_deviation": self.pitch, "scale_deviation": min(self.scale, SCALE_DEVIATION)}
 
-    def left_by(self, method: str) -> float:
-        """Part of `scale` that a method's answer goes with and that is none of its parameters [-]."""
-        if "scale_deviation" in accepted_parameters(ESTIMATORS[method]):
-            return math.sqrt(self.scale**2 - self.parameters["scale_deviation"] ** 2)
-        return self.scale if method in _ON_THE_ROAD else 0.0
+
+def scale_left(deviations: CalibrationDeviations, method: str) -> float:
+    """Part of a scale's deviation that a method's answer goes with and that is none of its parameters [-]."""
+    if "scale_deviation" in accepted_parameters(ESTIMATORS[method]):
+        return math.sqrt(deviations.scale**2 - deviations.parameters["scale_deviation"] ** 2)
+    return deviations.scale if method in _ON_THE_ROAD else 0.0
 
 
 def on_any_scale(estimate: Estimate, scale: float) -> Estimate:

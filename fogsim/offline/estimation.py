@@ -9,7 +9,7 @@ import numpy as np
 from fogsim.core.parameters import accepted_parameters
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
-from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale
+from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale, scale_left
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.drive.road_scale import NightDrive
 from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
@@ -185,7 +185,7 @@ class _Bench:
         self, camera: Camera, methods: Sequence[str], night: NightDrive | None, deviations: CalibrationDeviations
     ) -> None:
         self._camera, self._night, self._deviations = camera, night, deviations
-        self._methods, self._left = tuple(methods), [deviations.left_by(name) for name in methods]
+        self._methods, self._left = tuple(methods), [scale_left(deviations, name) for name in methods]
         self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
 
     def _made(self, camera: Camera) -> list[Estimator]:

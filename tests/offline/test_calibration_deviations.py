@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.offline import Calibration, CalibrationDeviations, estimate_images, load_calibration
-from fogsim.offline.calibration_deviations import on_any_scale
+from fogsim.offline.calibration_deviations import on_any_scale, scale_left
 from fogsim.values import Estimate
 from fogsim.values.estimate import NORMAL_90_PERCENT, OpticalDepths
 
@@ -30,8 +30,8 @@ def test_an_unknown_scale_is_a_factor_of_an_interval() -> None:
 
 def test_other_distances_and_refusals_stay() -> None:
     deviations = CalibrationDeviations(focal_length=0.3, mount_height=0.4)
-    assert [deviations.left_by(one) for one in ("sign_contrast", "night_road")] == [0.0, 0.5]
-    left, given = deviations.left_by("joint_road"), deviations.parameters["scale_deviation"]
+    assert [scale_left(deviations, one) for one in ("sign_contrast", "night_road")] == [0.0, 0.5]
+    left, given = scale_left(deviations, "joint_road"), deviations.parameters["scale_deviation"]
     assert math.hypot(left, given) == pytest.approx(0.5)
     refused = Estimate.invalid("joint_road", "the road is hidden")
     assert on_any_scale(refused, 0.5) is refused

@@ -2,7 +2,6 @@
 
 import functools
 import math
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
 from fogsim.vision.light.pixel_kernels import (
     SATURATED_SHARE,
     LinearPixels,
-    Pixels,
     even_column,
     pixel_luminance,
     saturation,
@@ -319,23 +317,8 @@ the sky may be brighter then, as a deviation [-]."""
 def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     """Look at the sky in the middle two thirds of the image above the horizon.
 
-    Several methods ask for that of one image: it is read once.
-
     Returns None if there are no such rows, or something high hides the sky all along them. Takes `margin` [px].
     """
-    for pixels, known, below, sky in _LAST:
-        if pixels is image.pixels and below == margin and known == camera:
-            return sky
-    sky = _sky_above(image, camera, margin)
-    _LAST.append((image.pixels, camera, margin, sky))
-    return sky
-
-
-_LAST: deque[tuple[Pixels, Camera, float, Sky | None]] = deque(maxlen=1)
-"""The sky that was read last: of which pixels, by which camera and margin."""
-
-
-def _sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
     top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:

@@ -87,17 +87,22 @@ def _scattered(sight: _LinesOfSight, phase: NDArray[np.float64], loss: float) ->
 
 def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.float64]:
     """P: luminance scattered about a lamp, times R² over its intensity [-]; see the module (`angle` [rad])."""
-    phase = phase_function(droplets)
-    first = 1.0 - forward_share(phase)
+    phase, (first, last) = phase_function(droplets), _losses(droplets)
     sight = _lines_of_sight(depth, angle, _STEPS)
     total = _scattered(sight, phase(sight.scattering), first)
-    last = _LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
     for wide, loss in zip(_blurred_phases(droplets), (_LOSS_ONCE_SPREAD, last), strict=True):
         turned = wide(sight.scattering)
         more = _scattered(sight, turned, loss) - _scattered(sight, turned, first)
         total = total + np.maximum(more, 0.0)
         first = min(first, loss)
     return total
+
+
+@cache
+def _losses(droplets: Droplets) -> tuple[float, float]:
+    """η₁ and η₃."""
+    phase = phase_function(droplets)
+    return 1.0 - forward_share(phase), _LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
 
 
 @cache

@@ -210,9 +210,14 @@ def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDA
 
 @kernel
 def add_upsampled(
-    coarse: NDArray[np.float32], coarse_columns: int, distance: NDArray[np.float32], out: NDArray[np.float32]
+    coarse: NDArray[np.float32],
+    coarse_columns: int,
+    distance: NDArray[np.float32],
+    top: int,
+    bottom: int,
+    out: NDArray[np.float32],
 ) -> None:
-    """Add the coarse image to an image.
+    """Add the coarse image to rows of an image.
 
     Light is scattered into a line of sight about evenly up to its lamp, so of the glow of a lamp at R what is seen
     before a surface at d is the share min(1, d / R).
@@ -220,19 +225,21 @@ def add_upsampled(
     Takes `coarse` (4, m) [cd/m²], [1/m], `distance` (rows, cols) [m], `out` (rows, cols · 3) [cd/m²].
     """
     rows, columns = distance.shape
-    coarse_rows, ready = coarse.shape[1] // coarse_columns, -1
+    coarse_rows = coarse.shape[1] // coarse_columns
+    # Each coarse row is stretched once, those above the band are not.
+    ready = min(int(np.float32(top) * np.float32(coarse_rows - 1) / np.float32(max(rows - 1, 1))), coarse_rows - 2) - 1
     lights, nears = np.empty((2, 3 * columns), np.float32), np.empty((2, columns), np.float32)
     light, near = np.empty(3 * columns, np.float32), np.empty(columns, np.float32)
     seen = np.empty(3 * columns, np.float32)
-    for v in range(rows):
+    for v in range(top, bottom):
         place = np.float32(v) * np.float32(coarse_rows - 1) / np.float32(max(rows - 1, 1))
         upper = min(int(place), coarse_rows - 2)
         while ready < upper + 1:
             ready += 1
             _upsample_row(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
-        share, top = place - np.float32(upper), upper % 2
-        interpolate_rows(lights[top], lights[1 - top], share, light)
-        interpolate_rows(nears[top], nears[1 - top], share, near)
+        share, first = place - np.float32(upper), upper % 2
+        interpolate_rows(lights[first], lights[1 - first], share, light)
+        interpolate_rows(nears[first], nears[1 - first], share, near)
         for u in range(columns):
             near[u] = min(_ONE, distance[v, u] * near[u])
         repeat_channels(near, seen)

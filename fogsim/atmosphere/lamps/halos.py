@@ -54,6 +54,7 @@ from fogsim.atmosphere.lamps.lobes import (
     table_directions,
 )
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.core.jit import Bands
 from fogsim.values import Beam, Camera, CameraPose, FogField, LampLobes, LightSources, View
 from fogsim.values.pinhole import camera_axes
 
@@ -165,7 +166,7 @@ class Halos:
     """Draws lamps of other vehicles and of streets in fog."""
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
-        self._droplets = Droplets(droplets)
+        self._droplets, self._bands = Droplets(droplets), Bands()
         self._plans: dict[Camera, _Plan] = {}
 
     @cached_property
@@ -224,7 +225,11 @@ class Halos:
         add_middle_glows(plan.directions, plan.cell, plan.reach, *near)
         flat = coarse.reshape(4, -1)
         divide_by_luminance(flat)
-        add_upsampled(flat, plan.shape[1], distance, image)
+
+        def add(_: int, top: int, bottom: int) -> None:
+            add_upsampled(flat, plan.shape[1], distance, top, bottom, image)
+
+        self._bands.work(add, *distance.shape)
         core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
         core_light = np.empty_like(core)
         mean_light(light, SIDES, plan.core_angles, core_light)

@@ -1,7 +1,7 @@
 """Light of the own head lamps: on what the camera sees, and in the fog between."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from fogsim.atmosphere.lamps.veil import (
     veil_along,
     veil_rays,
 )
-from fogsim.core.jit import kernel
+from fogsim.core.jit import Bands, kernel
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, View
 from fogsim.values.pinhole import OWN_FRAME, camera_axes, ray_from_pixel
@@ -189,7 +189,8 @@ def _light_surfaces(
     places = lamps.places
     for i in range(places.shape[0]):
         _table_places(count, forward, right, places[i, 0], places[i, 1], column)
-        _table_places(count, forward, up, places[i, 0], places[i, 2], row)
+        if i == 0 or places[i, 0] != places[i - 1, 0] or places[i, 2] != places[i - 1, 2]:
+            _table_places(count, forward, up, places[i, 0], places[i, 2], row)
         _distance_weights(count, forward, right, up, places[i], length, mean, weight)
         _add_intensity(count, lamps.tables[i], row, column, weight, light)
     for u in range(count):
@@ -253,9 +254,11 @@ def add_own_light(
     step: int,
     lamps: LampGroup,
     grid: VeilGrid,
+    top: int,
+    bottom: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Add to an image what own lamps of one colour make of it.
+    """Add to rows of an image what own lamps of one colour make of it.
 
     Takes `distance` (rows, cols) [m], `response` (rows, cols · 3) [cd/m² per lx], `ray_map` (3, 3), `out` (rows, cols ·
     3) [cd/m²].
@@ -276,7 +279,7 @@ def add_own_light(
     if step == 1:
         # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
         chosen, scattered, light = length, few_scattered, few_light
-    for v in range(distance.shape[0]):
+    for v in range(top, bottom):
         lit = surfaces and _any_lit(response[v])
         if clear and not lit:
             continue
@@ -305,6 +308,12 @@ def add_own_light(
         _add_lamplight(channels, veiled, shone, response[v] if lit else no_response, out[v])
 
 
+def _add_to_band(
+    seen: tuple[_Floats, _Floats, _Floats, int, LampGroup, VeilGrid], out: _Floats, _: int, top: int, bottom: int
+) -> None:
+    add_own_light(*seen, top, bottom, out)
+
+
 _MIRROR = np.diag((1.0, -1.0, 1.0))
 """Tables of beams count to the right, the vehicle's axes to the left."""
 
@@ -326,7 +335,7 @@ class OwnLamplight:
     """Draws the light of the lamps of the camera's own vehicle."""
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
-        self._droplets = Droplets(droplets)
+        self._droplets, self._bands = Droplets(droplets), Bands()
         self._veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = {}
 
     def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
@@ -350,6 +359,9 @@ class OwnLamplight:
         response = np.zeros((0, columns, 3), np.float32) if view.lamp_response is None else view.lamp_response
         rays, ray_map = _rays(camera)
         mean, local = _extinction_on(rays, camera, pose, fog)
+        distance = np.ascontiguousarray(view.distance, dtype=np.float32)
+        returned = np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns)
+        out, step = luminance.reshape(rows, 3 * columns), piece_length(camera.focal_length)
         for group in self._groups(camera, lamps):
             grid = VeilGrid(
                 columns=rays.shape[1],
@@ -358,15 +370,8 @@ class OwnLamplight:
                 veil=self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
                 attenuation=mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
             )
-            add_own_light(
-                np.ascontiguousarray(view.distance, dtype=np.float32),
-                np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns),
-                ray_map,
-                piece_length(camera.focal_length),
-                group.light,
-                grid,
-                luminance.reshape(rows, 3 * columns),
-            )
+            add = partial(_add_to_band, (distance, returned, ray_map, step, group.light, grid), out)
+            self._bands.work(add, rows, columns)
 
     def _groups(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> list[_Group]:
         colours = dict.fromkeys(lamp.colour for lamp in lamps)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 
 import numpy as np
@@ -59,11 +59,25 @@ def blurred(phase: PhaseFunction, width: float) -> PhaseFunction:
 
     Takes `width` [rad].
     """
-    angle = np.linspace(0.0, math.pi, 361)
+    log, (place, beyond) = np.log(phase.value), _rings(width, phase.angle.tobytes())
+    slope = np.diff(log, append=log[-1]) / np.diff(phase.angle, append=np.inf)
+    around = np.exp(slope.take(place) * beyond + log.take(place))
+    return PhaseFunction(_BLURRED_ANGLES, around.mean(axis=(1, 2)))
+
+
+_BLURRED_ANGLES = np.linspace(0.0, math.pi, 361)
+_BLURRED_ANGLES.flags.writeable = False
+
+
+@lru_cache(4)
+def _rings(width: float, known: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Directions around others, by how much light is spread there: the known angle below each, and that beyond it."""
     # A ring at distance ε about direction θ lies at angles acos(cos θ cos ε − sin θ sin ε cos ψ) from the axis.
     ring = width * np.sqrt(-2.0 * np.log(1.0 - (np.arange(24) + 0.5) / 24))
-    turn = math.pi * (np.arange(24) + 0.5) / 24
+    turn, angle = math.pi * (np.arange(24) + 0.5) / 24, _BLURRED_ANGLES
     cosine = np.cos(angle)[:, None, None] * np.cos(ring)[:, None] - np.sin(angle)[:, None, None] * np.sin(ring)[
         :, None
     ] * np.cos(turn)
-    return PhaseFunction(angle, phase(np.arccos(np.clip(cosine, -1.0, 1.0))).mean(axis=(1, 2)))
+    found, angles = np.arccos(np.clip(cosine, -1.0, 1.0)), np.frombuffer(known)
+    place = np.searchsorted(angles, found, side="right") - 1
+    return place, found - angles.take(place)

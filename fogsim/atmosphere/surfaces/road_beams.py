@@ -1,6 +1,5 @@
 """Head lamps of other vehicles light the road, and what stands on it."""
 
-import dataclasses
 import math
 from functools import lru_cache
 from typing import NamedTuple
@@ -10,13 +9,11 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
-from fogsim.atmosphere.lamps.road_glow import piece_length
-from fogsim.atmosphere.surfaces.streetlight import EyeOnMap, GroundLight, Reflection, add_street_light
+from fogsim.atmosphere.surfaces.streetlight import GroundLight, Reflection, lit_by_map
 from fogsim.core.jit import kernel
 from fogsim.values import Beam, Camera, CameraPose, FogField, View
 from fogsim.values.light import RoadBeams
 from fogsim.values.luminous_intensity import luminous_intensity
-from fogsim.values.pinhole import ray_from_pixel
 
 
 class _BeamsAlike(NamedTuple):
@@ -101,22 +98,12 @@ class TrafficLight:
         ground = _map_of(pose, fog, beams)
         if self._lit.shape != view.radiance.shape:
             self._lit = np.empty(view.radiance.shape, np.float32)
-        rows, columns = view.distance.shape
-        column, row = ((np.array(pose.position[:2]) - ground.origin) / _CELL).astype(np.float32)
-        add_street_light(
-            np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
-            np.ascontiguousarray(view.distance, dtype=np.float32),
-            ray_from_pixel(camera, pose).astype(np.float32),
-            piece_length(camera.focal_length),
-            EyeOnMap(column, row, np.float32(1.0 / _CELL), np.float32(pose.position[2])),
-            ground,
-            Reflection(
-                np.full(3, 1.0 / beams.sky_illuminance, dtype=np.float32),
-                np.float32(_WHITEST * beams.sky_illuminance / math.pi),
-            ),
-            self._lit.reshape(rows, 3 * columns),
+        reflection = Reflection(
+            np.full(3, 1.0 / beams.sky_illuminance, dtype=np.float32),
+            np.float32(_WHITEST * beams.sky_illuminance / math.pi),
         )
-        return dataclasses.replace(view, radiance=self._lit)
+        place = (np.array(pose.position[:2]) - ground.origin) / _CELL
+        return lit_by_map(view, camera, pose, place, ground, reflection, self._lit)
 
 
 def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:

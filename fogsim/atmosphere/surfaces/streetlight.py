@@ -13,7 +13,7 @@ from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
-from fogsim.core.jit import kernel
+from fogsim.core.jit import Bands, kernel
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 
@@ -142,9 +142,11 @@ def add_street_light(
     eye: EyeOnMap,
     ground: GroundLight,
     reflection: Reflection,
+    top: int,
+    bottom: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Luminance of an image by the sky's light and that of street lamps.
+    """Luminance of rows of an image by the sky's light and that of street lamps.
 
     Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
@@ -159,7 +161,7 @@ def add_street_light(
     bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
     lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
     fill_channels(reflection.factor, channels)
-    for v in range(distance.shape[0]):
+    for v in range(top, bottom):
         any_light = False
         if _any_near(distance[v]):
             for u in range(columns):
@@ -174,6 +176,30 @@ def add_street_light(
         else:
             for j in range(3 * columns):
                 out[v, j] = luminance[v, j]
+
+
+def lit_by_map(
+    view: View,
+    camera: Camera,
+    pose: CameraPose,
+    place: NDArray[np.float64],
+    ground: GroundLight,
+    reflection: Reflection,
+    out: NDArray[np.float32],
+) -> View:
+    """A drawn scene with a map's light, as an image in `out` (`place` (2,) of the eye on the map [cells])."""
+    rows, columns = view.distance.shape
+    luminance = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
+    distance = np.ascontiguousarray(view.distance, dtype=np.float32)
+    ray_map, step = ray_from_pixel(camera, pose).astype(np.float32), piece_length(camera.focal_length)
+    column, row = place.astype(np.float32)
+    eye, lit = EyeOnMap(column, row, np.float32(1.0 / ground.cell), np.float32(pose.position[2])), out.reshape(rows, -1)
+
+    def add(_: int, top: int, bottom: int) -> None:
+        add_street_light(luminance, distance, ray_map, step, eye, ground, reflection, top, bottom, lit)
+
+    Bands().work(add, rows, columns)
+    return dataclasses.replace(view, radiance=out)
 
 
 _CELL = 2.0
@@ -221,23 +247,12 @@ class StreetLight:
         ground = self._about(pose, fog, lamps)
         if self._lit.shape != view.radiance.shape:
             self._lit = np.empty(view.radiance.shape, np.float32)
-        rows, columns = view.distance.shape
-        eye = np.array(pose.position[:2])
-        column, row = ((eye - ground.middle) / _CELL + 0.5 * (_CELLS - 1)).astype(np.float32)
-        add_street_light(
-            np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
-            np.ascontiguousarray(view.distance, dtype=np.float32),
-            ray_from_pixel(camera, pose).astype(np.float32),
-            piece_length(camera.focal_length),
-            EyeOnMap(column, row, np.float32(1.0 / _CELL), np.float32(pose.position[2])),
-            ground.light,
-            Reflection(
-                np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
-                np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
-            ),
-            self._lit.reshape(rows, 3 * columns),
+        place = (np.array(pose.position[:2]) - ground.middle) / _CELL + 0.5 * (_CELLS - 1)
+        reflection = Reflection(
+            np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
+            np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
         )
-        return dataclasses.replace(view, radiance=self._lit)
+        return lit_by_map(view, camera, pose, place, ground.light, reflection, self._lit)
 
     def _about(self, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> _Map:
         """The map about the camera, made again only if the camera, the lamps or the fog have moved."""

@@ -53,8 +53,14 @@ _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
 _FRAMES = 10
 """Frames of each drive."""
 
+_SHADE = 0.4
+"""Share of the light that a shadow on the road leaves in one of those images [-]."""
+
 _SKY = 1e6
 """Distance of the sky in those images [m]."""
+
+_EVEN, BANK = (120.0, _SKY), (600.0, 60.0)
+"""Visibility in those images, and where a bank of fog begins [m]."""
 
 
 def compile_command() -> None:
@@ -131,18 +137,19 @@ def _estimate_visibility() -> None:
     from fogsim.estimators import ESTIMATORS
     from fogsim.estimators.lead_contrast import fit_decay
     from fogsim.fusion import FUSIONS
-    from fogsim.values import Camera
     from fogsim.vision.uneven.uneven_kernels import denser_part, path_depths
 
     estimates: list[list[Estimate]] = []
-    for width, height in _SIZES:
-        camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+    for size in _SIZES:
+        camera = _camera(size)
         for factory in ESTIMATORS.values():
             published = [{"as_published": True}] if "as_published" in accepted_parameters(factory) else []
-            estimates += [_read(factory(camera=camera, **parameters), camera) for parameters in ({}, *published)]
+            for parameters in ({}, *published):
+                estimates.append(_read(factory(camera=camera, **parameters), camera))
+                _read(factory(camera=camera, **parameters), camera, BANK)
     for fusion in FUSIONS:
         fuse_estimates(fusion, {}, estimates)
-    _follow_a_bend(camera)
+    follow_a_bend(size)
     # Cases that need more than these images: a vehicle ahead that leaves far enough, and fog that varies for certain.
     fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
     solved = (np.array([10.0, 100.0]), np.full(5, math.log(0.03)), np.eye(5))
@@ -150,14 +157,14 @@ def _estimate_visibility() -> None:
     denser_part(*solved, 50.0)
 
 
-def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
+def read_foggy_road(
+    method: str, parameters: Mapping[str, Any], size: Sequence[int], fog: tuple[float, float] = _EVEN
+) -> "list[Estimate]":
     """Estimates of a method from synthetic images of a foggy road by day, of a width and height [px]."""
     from fogsim.estimators import ESTIMATORS
-    from fogsim.values import Camera
 
-    width, height = size
-    camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
-    return _read(ESTIMATORS[method](camera=camera, **parameters), camera)
+    camera = _camera(size)
+    return _read(ESTIMATORS[method](camera=camera, **parameters), camera, fog)
 
 
 def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Sequence[Sequence[Estimate]]") -> None:
@@ -173,19 +180,17 @@ def _restore_contrast() -> None:
     """Restore images of a foggy road with 8 and 16 bits, also with tone mapping."""
     import numpy as np
 
-    from fogsim.values import Camera
     from fogsim.vision.restoration import METHODS, restore_contrast
 
-    (width, height), *_ = _SIZES
-    camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+    camera = _camera(_SIZES[0])
     image = _foggy_road(camera, 25.0)
     for seen in (image, image.astype(np.uint16) * 257):
         for method in METHODS:
             restore_contrast(seen, camera, 0.03, method=method, tone_map=True)
 
 
-def _follow_a_bend(camera: "Camera") -> None:
-    """Lay strips along a road with curves and sags, unlike that of the images."""
+def follow_a_bend(size: Sequence[int]) -> None:
+    """Lay strips along a road with curves and sags, unlike that of the images, of a width and height [px]."""
     import numpy as np
 
     from fogsim.vision.lines.horizon import Horizon
@@ -194,13 +199,20 @@ def _follow_a_bend(camera: "Camera") -> None:
     from fogsim.vision.strips.course_geometry import course_geometry
     from fogsim.vision.strips.strip_geometry import strip_geometry
 
-    curved = np.full(PIECES, 1e-4)
+    camera, curved = _camera(size), np.full(PIECES, 1e-4)
     course = dataclasses.replace(unseen_course(camera, Horizon(camera.horizon_row, 0.3)), sag=curved, bend=curved)
     course_geometry(strip_geometry(camera, 1.0), camera, course)
 
 
-def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
-    """Run a method on images in colour and, finally, in grey."""
+def _camera(size: Sequence[int]) -> "Camera":
+    from fogsim.values import Camera
+
+    width, height = size
+    return Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+
+
+def _read(estimator: "Estimator", camera: "Camera", fog: tuple[float, float] = _EVEN) -> "list[Estimate]":
+    """Run a method on images in colour, the first with shadows, and, finally, in grey."""
     import numpy as np
 
     from fogsim.values import Frame, LeadMeasurement, Observation
@@ -208,7 +220,7 @@ def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
     estimates = []
     for index in range(4):
         distance = 25.0 + 5.0 * index
-        image = _foggy_road(camera, distance, *((600.0, 60.0) if index == 1 else ()))
+        image = _foggy_road(camera, distance, fog, 1.0 if index else _SHADE)
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
         estimates.append(estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ())))
     return estimates
@@ -288,10 +300,13 @@ def _cross_a_footway() -> None:
     walkable([PavedArea("", corners, LaneKind.FOOTWAY)], [lane])
 
 
-def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: float = _SKY) -> "NDArray[np.uint8]":
+def _foggy_road(
+    camera: "Camera", lead: float, fog: tuple[float, float] = _EVEN, shade: float = 1.0
+) -> "NDArray[np.uint8]":
     """Image of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
 
-    From `bank` [m] on, the fog is five times as dense.
+    `fog` is its visibility and where a bank begins, five times as dense [m]; `shade` is what shadows leave of the light
+    [-].
     """
     import numpy as np
 
@@ -306,10 +321,12 @@ def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: 
     marks = (np.abs(np.abs(aside) - 1.75) < 0.08) & ((ahead % 12.0 < 4.0) | (aside < 0.0))
     grain = np.random.default_rng(0).normal(0.0, 1.0, rows.shape)
     surface = np.where(marks, 150.0, np.where(np.abs(aside) < 6.0, 60.0, 45.0))
+    surface = np.where((ahead + 3.0 * aside) % 24.0 < 9.0, shade * surface, surface)
     size = camera.focal_length / lead
     foot = camera.horizon_row + camera.mount_height * size
     vehicle = (np.abs(cols - camera.principal_point[0]) < 0.9 * size) & (rows < foot) & (rows > foot - 1.4 * size)
     surface, ahead = np.where(vehicle, 20.0, surface), np.where(vehicle, lead, ahead)
+    visibility, bank = fog
     path = ahead + 4.0 * np.maximum(ahead - bank, 0.0)
     light = 200.0 + (surface - 200.0) * np.exp(-extinction_from_visibility(visibility) * path)
     grey = np.clip(light + grain, 0.0, 255.0).round().astype(np.uint8)

@@ -113,7 +113,7 @@ def read_pictures(parent: int) -> None:
     # It ends before the memory is missed, and an eighth of its time would go into finding what compilers leave.
     gc.disable()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    from fogsim.cli.compile import fuse_estimates, read_foggy_road, read_own_beams
+    from fogsim.cli.compile import BANK, follow_a_bend, fuse_estimates, read_foggy_road, read_own_beams
 
     # Modules of methods and fusions are imported while the scenario is loaded.
     for name in ("fogsim.estimators", "fogsim.fusion"):
@@ -123,11 +123,16 @@ def read_pictures(parent: int) -> None:
     wanted = json.loads(message)
     size: Sequence[int] = wanted["size"]
     estimates = [read_foggy_road(name, parameters, size) for name, parameters in wanted["methods"]]
-    if any(name in {"night_road", "gallen2014_veil"} for name, _ in wanted["methods"]):
-        read_own_beams()
     if wanted["fusion"] is not None:
         fusion, parameters = wanted["fusion"]
         fuse_estimates(fusion, parameters, estimates)
+    if any(name in {"night_road", "gallen2014_veil"} for name, _ in wanted["methods"]):
+        read_own_beams()
+    if any(name == "joint_road" for name, _ in wanted["methods"]):
+        follow_a_bend(size)
+    # What a run's first frames seldom need.
+    for name, parameters in wanted["methods"]:
+        read_foggy_road(name, parameters, size, BANK)
 
 
 def _end_with(parent: int) -> None:

@@ -190,9 +190,17 @@ def kernel(function: F) -> F:
         plain.__qualname__ = name
     compiled.shipped = shipped
     _look_elsewhere(compiled)
-    # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
-    inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
-    compiled.get_call_template, compiled.get_overload = _without_literals(inner.get_call_template), inner.get_overload
+
+    def take_in(*types: Any) -> Any:
+        # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
+        inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
+        compiled.get_call_template, compiled.get_overload = (
+            _without_literals(inner.get_call_template),
+            inner.get_overload,
+        )
+        return compiled.get_call_template(*types)
+
+    compiled.get_call_template = take_in
     return cast("F", compiled)
 
 

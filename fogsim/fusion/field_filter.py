@@ -36,13 +36,24 @@ def _curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
 
 
 @kernel
+def _interpolated(at: float, places: Floats, values: Floats) -> float:
+    """As `np.interp`, which takes half a second to compile."""
+    i = 0
+    while i < places.size and places[i] <= at:
+        i += 1
+    if not 0 < i < places.size or places[i - 1] == at:
+        return float(values[max(i - 1, 0)])
+    return float((values[i] - values[i - 1]) / (places[i] - places[i - 1]) * (at - places[i - 1]) + values[i - 1])
+
+
+@kernel
 def _cut(distance: Floats, depth: Floats, deviation: Floats, cuts: Floats, farthest: float) -> Floats:
     out, count = np.empty((cuts.size, 4)), 0
     start = reached = unsure = 0.0
     for cut in cuts:
-        end = np.interp(cut, depth, distance) if cut < depth[-1] else distance[-1]
+        end = _interpolated(cut, depth, distance) if cut < depth[-1] else distance[-1]
         if end - start >= _SHORTEST:
-            total, spread = np.interp(end, distance, depth), np.interp(end, distance, deviation)
+            total, spread = _interpolated(end, distance, depth), _interpolated(end, distance, deviation)
             more = max(total - reached, 1e-4)
             apart = math.sqrt(max(spread**2 + unsure**2 - 2.0 * _SHARED * spread * unsure, 0.0))
             out[count, 0], out[count, 1] = start, min(end, farthest)

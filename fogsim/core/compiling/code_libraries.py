@@ -76,18 +76,23 @@ _CALLED_FROM_PYTHON = "_ZN7cpython"
 """Begins the name of a function that takes Python's objects."""
 
 
+_NAMED = "named"
+"""Marks FogSim's way to keep a library, among numba's own."""
+
+
 class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is untyped
     """Compiled functions that others link; machine code is made of them when it is asked for."""
 
     # Whether what is compiled is put off so: within FogSim's kernels, and not within anybody else's
     deferring: ClassVar[bool] = False
 
-    _put_off = False
+    _put_off = _is_own = False
 
     def add_ir_module(self, ir_module: Any) -> None:
         """Take a module in and apart: its instructions name each other, which garbage collection would have to find."""
         super().add_ir_module(ir_module)
         if self.deferring:
+            self._is_own = True
             for function in ir_module.functions:
                 for block in function.blocks:
                     block.instructions.clear()
@@ -143,6 +148,26 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
                 environment = lookup_environment(variable.name)
                 if environment is not None:
                     self._codegen.set_env(variable.name, environment)
+
+    def serialize_using_object_code(self) -> Any:
+        """Machine code and the names in it; numba keeps them with all that others would link, and a load reads that."""
+        if not self._is_own:
+            return super().serialize_using_object_code()
+        parts = (self._final_module.functions, self._final_module.global_variables)
+        names = [one.name for part in parts for one in part if not one.is_declaration]
+        return self.name, _NAMED, (self._get_compiled_object(), names)
+
+    @classmethod
+    def _unserialize(cls, owner: codegen.Codegen, state: Any) -> Any:
+        name, kind, (code, names) = state
+        if kind != _NAMED:
+            return super()._unserialize(owner, state)
+        library = owner.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        owner._engine._defined_symbols.update(names)
+        return library
 
     def get_pointer_to_function(self, name: str) -> int:
         """Address of a function, whose machine code is made now if it was put off; 0 if it is not defined here."""

@@ -184,7 +184,7 @@ _post_process = PostProcessor.run
 
 
 def post_process(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
-    """Update a function after a pass: when its variables live is worked out where it is used, seldom but for generators."""
+    """Update a function after a pass: the lives of its variables are worked out where they are used."""
     function = processor.func_ir
     if function.is_generator:
         _post_process(processor, emit_dels, extend_lifetimes)

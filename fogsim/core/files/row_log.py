@@ -108,4 +108,4 @@ def read_rows(path: Path) -> Any:
     index = table["index"].to_numpy()
     least_behind = np.minimum.accumulate(index[::-1])[::-1]
     last = np.append(index[:-1] < least_behind[1:], True)[: len(index)]
-    return table.filter(pa.array(last))
+    return table if last.all() else table.filter(pa.array(last))

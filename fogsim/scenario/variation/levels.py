@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from scipy.special import ndtr, ndtri
+import scipy
 
 from fogsim.core.randomness import named_generator
 from fogsim.errors import shown, suggest
@@ -133,16 +133,16 @@ class Draws:
         """Value below which a share of the distribution between the limits lies, in `unit`."""
         low, high = (self._share_below(limit) for limit in self.limits)
         inner = min(max(low + share * (high - low), 0.0), 1.0)
-        return self._shaped(inner, float(ndtri(inner)))
+        return self._shaped(inner, float(scipy.special.ndtri(inner)))
 
     def _share_below(self, value: float) -> float:
         first, second = self.parameters
         if self.distribution == "normal":
-            return float(ndtr((value - first) / second))
+            return float(scipy.special.ndtr((value - first) / second))
         if self.is_logarithmic and value <= 0.0:
             return 0.0
         if self.distribution == "lognormal":
-            return float(ndtr(math.log(value / first) / second))
+            return float(scipy.special.ndtr(math.log(value / first) / second))
         if self.distribution == "loguniform":
             first, second, value = math.log(first), math.log(second), math.log(value)
         return min(max((value - first) / (second - first), 0.0), 1.0)

@@ -11,6 +11,7 @@ from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera, Response
 from fogsim.values.camera_response import exposure_of, respond
 from fogsim.vision.day.row_kernels import RowData
+from fogsim.vision.light.medians import median_among
 from fogsim.vision.light.pixel_kernels import even_column
 
 Floats = NDArray[np.float64]
@@ -204,7 +205,7 @@ def _apart(image: NDArray[Any], row: int, scale: float, axis: float, channel: in
         count = min(int(right - left) + 1, _MOST_COLUMNS)
         for b in range(count):
             values[b] = image[row, even_column(b, count, left - 0.5, right + 0.5), channel]
-        medians[part] = np.median(values[:count])
+        medians[part] = median_among(values[:count])
     return float(min(abs(medians[0] - medians[1]), abs(medians[0] - medians[2])))
 
 

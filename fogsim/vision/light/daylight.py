@@ -11,6 +11,7 @@ from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.medians import median_among
 from fogsim.vision.light.pixel_kernels import Pixels
 
 _BRIGHT_SHARE = 0.75
@@ -162,7 +163,7 @@ def _row_medians(luminance: NDArray[np.float32], strip: NDArray[np.int64]) -> ND
     road, out = luminance[-_ROAD_ROWS:], np.full(_ROAD_ROWS, np.nan)
     for row in range(_ROAD_ROWS):
         if strip[1, row] >= strip[0, row]:
-            out[row] = np.median(road[row, strip[0, row] : strip[1, row] + 1])
+            out[row] = median_among(road[row, strip[0, row] : strip[1, row] + 1])
     return out
 
 
@@ -176,4 +177,4 @@ def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArr
         if np.isfinite(share) and np.isfinite(beside):
             ratio[count] = share
             count += 1
-    return bool(count > 0 and np.median(ratio[:count]) > _BEAM)
+    return bool(count > 0 and median_among(ratio[:count]) > _BEAM)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import times
+from fogsim.vision.light.medians import median_among
 from fogsim.vision.strips.albedo_filter import (
     USED,
     Albedo,
@@ -194,7 +195,7 @@ def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float, d
                 before *= 1.0 - darker * darkening(bins, i, level, on, shift)[0]
             found[count] = before + (bins.luminance[strip, i] - before) / max(value, 1e-6)
             count += 1
-    return float(np.median(found[:count])) if count else 0.0
+    return median_among(found[:count]) if count else 0.0
 
 
 @kernel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.values.camera import Camera
-from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
+from fogsim.vision.light.medians import MOST_SAMPLES, median_among, sort_few
 from fogsim.vision.light.pixel_kernels import (
     SATURATED_SHARE,
     LinearPixels,
@@ -82,7 +82,7 @@ def level_at_horizon(
     drops = np.zeros(bright.size)
     count = 1
     for i in range(1, bright.size):
-        usual = max(float(np.median(drops[1:i])), 0.0) if i > 1 else 0.0
+        usual = max(median_among(drops[1:i]), 0.0) if i > 1 else 0.0
         drops[i] = bright[i - 1] - bright[i]
         twice = bright[max(i - 2, 0)] - bright[i]
         least = step * bright[i - 1]
@@ -95,12 +95,12 @@ def level_at_horizon(
         for j in range(i):
             slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
             number += 1
-    middle, slope = float(np.median(bright[:count])), 0.0
+    middle, slope = median_among(bright[:count]), 0.0
     if height[0] - height[count - 1] > _LEAST_SKY_HEIGHT:
-        slope = min(max(float(np.median(slopes[:number])), -_STEEPEST_SKY * middle), _STEEPEST_SKY * middle)
+        slope = min(max(median_among(slopes[:number]), -_STEEPEST_SKY * middle), _STEEPEST_SKY * middle)
     rest = bright[:count] - slope * height[:count]
-    level = float(np.median(rest))
-    return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
+    level = median_among(rest)
+    return level, slope, 1.4826 * median_among(np.abs(rest - level)), height[count - 1]
 
 
 @kernel
@@ -158,7 +158,7 @@ def sky_shading(
     grey levels], `noise` [linear grey levels].
     """
     cols, count = image.pixels.shape[1], _SHADING_COLS
-    level = float(np.median(bright))
+    level = median_among(bright)
     height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
     found = np.array([level, 0.0, 0.0, 0.0, 0.0])
     covariance: NDArray[np.float64] = np.eye(5)
@@ -197,7 +197,7 @@ def _scatter(
     for i in range(height.size):
         for j in range(aside.size):
             apart[i * aside.size + j] = abs(seen[i, j] - _shaded(aside[j], height[i], above_axis[i], found))
-    return math.sqrt(max((1.4826 * float(np.median(apart))) ** 2 - noise * noise, 0.0))
+    return math.sqrt(max((1.4826 * median_among(apart)) ** 2 - noise * noise, 0.0))
 
 
 @kernel

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import times
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.light.medians import median_among
 from fogsim.vision.strips.albedo_filter import (
     Albedo,
     Residuals,
@@ -302,7 +303,7 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
             if seen == 0 or rows <= 0.5:
                 continue
             # Optical depth never falls with distance.
-            top = max(top, min(float(np.median(depth[:seen])), _DEEPEST))
+            top = max(top, min(median_among(depth[:seen]), _DEEPEST))
             distance = bins.path[0, i] / rows
             cell = _before(nodes, distance)
             sums[cell, 0] += distance

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
-from fogsim.vision.light.medians import median
+from fogsim.vision.light.medians import median, median_among
 from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float32]
@@ -102,7 +102,7 @@ def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
         for j in range(i + 1, x.size):
             slopes[count] = (y[j] - y[i]) / (x[j] - x[i])
             count += 1
-    return float(np.median(slopes))
+    return median_among(slopes)
 
 
 _NOWHERE = RoadFall(*(np.zeros(0) for _ in range(3)))
@@ -150,7 +150,7 @@ def _rows(camera: Camera, nearest: float, farthest: float) -> list[tuple[slice, 
 
 @kernel
 def _median(pixels: Floats, otherwise: float) -> float:
-    return float(np.float32(np.median(pixels))) if pixels.size else otherwise
+    return float(np.float32(median_among(pixels.ravel()))) if pixels.size else otherwise
 
 
 _BLOCKS, _BRIGHT_SHARE = 12, 0.8
@@ -215,7 +215,7 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float:
                     count += 1
         if count < max(_LEAST_SEEN * part.size, 1.0):
             return np.nan
-        middle = float(np.float32(np.median(core[:count]))) if step == 0 else total / count
+        middle = float(np.float32(median_among(core[:count]))) if step == 0 else total / count
     return middle
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.vision.light.luminance import darker_by
-from fogsim.vision.light.medians import quantile
+from fogsim.vision.light.medians import median_among, quantile
 from fogsim.vision.vehicle.patch import INDEPENDENT, Patch, Placement, downsample_to, pixel_grid
 
 Floats = NDArray[np.float64]
@@ -286,7 +286,7 @@ def _line_through_airlight(
         for i in range(shown.shape[0]):
             for j in range(shown.shape[1]):
                 residual[i, j] = abs(seen[i, j] - slope * shown[i, j]) / math.sqrt(noise + t**2 * own[i, j])
-        scale = max(1.4826 * np.median(residual), 1.0)
+        scale = max(1.4826 * median_among(residual.ravel()), 1.0)
         power, both = 0.0, 0.0
         for i in range(shown.shape[0]):
             for j in range(shown.shape[1]):

@@ -1,6 +1,5 @@
 """Which vehicles are read: those near the ego, without asking all where they are in every step, or everyone."""
 
-import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -50,7 +49,6 @@ class NearbyVehicles:
         self._ego = ego
         self._radius = radius
         self._position = vehicle_getter(api, "getPosition3D")
-        self._positions = functools.partial(_positions, self._position)
         self._speed = vehicle_getter(api, "getSpeed")
         self._roster = Roster(api) if roster is None else roster
         self._far = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
@@ -136,6 +134,9 @@ class NearbyVehicles:
     @staticmethod
     def _distances(position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
         return np.asarray(np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]))
+
+    def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
+        return _positions(self._position, vehicles)
 
 
 def _positions(position: Callable[[str], Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:

@@ -81,28 +81,25 @@ class NearbyVehicles:
 
     def _drop_far(self, position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
         """Schedule those that have become far, and give the others' positions back."""
-        distance = self._distances(position, here)
-        if float(distance.max()) > self._radius:
-            is_near = distance <= self._radius
-            self._set_near(self._schedule_far(self._near, distance))
-            position, distance = position[is_near], distance[is_near]
-        wait = (self._radius - float(distance.max())) / self._highest_rate()
+        distances = self._distances(position, here)
+        if max(distances) > self._radius:
+            position = position[[distance <= self._radius for distance in distances]]
+            self._set_near(self._schedule_far(self._near, distances))
+            distances = [distance for distance in distances if distance <= self._radius]
+        wait = (self._radius - max(distances)) / self._highest_rate()
         self._all_near_until = self._roster.time + min(wait, _MAX_WAIT)
         return position
 
     def _set_near(self, near: Sequence[str]) -> None:
         self._near = tuple(sorted(near))
 
-    def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
+    def _schedule_far(self, vehicles: Sequence[str], distances: Sequence[float]) -> list[str]:
         """Those near; the others wait until they could have come near."""
-        waits = np.minimum((distance - self._radius) / self._highest_rate(), _MAX_WAIT)
-        near: list[str] = []
-        if float(waits.min()) <= 0.0:
-            is_far = waits > 0.0
-            near = list(itertools.compress(vehicles, (~is_far).tolist()))
-            vehicles, waits = list(itertools.compress(vehicles, is_far.tolist())), waits[is_far]
-        self._far.add_each(vehicles, waits.tolist(), self._roster.time)
-        return near
+        rate, radius = self._highest_rate(), self._radius
+        both = [(v, (distance - radius) / rate) for v, distance in zip(vehicles, distances, strict=True)]
+        waits = {v: min(wait, _MAX_WAIT) for v, wait in both if wait > 0.0}
+        self._far.add_each(tuple(waits), tuple(waits.values()), self._roster.time)
+        return [v for v, wait in both if wait <= 0.0]
 
     def _highest_rate(self) -> float:
         """How fast a distance from the ego changes at most, within the longest wait [m/s]."""
@@ -132,8 +129,9 @@ class NearbyVehicles:
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
 
     @staticmethod
-    def _distances(position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
-        return np.asarray(np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]))
+    def _distances(position: NDArray[np.float64], here: Sequence[float]) -> list[float]:
+        distances: list[float] = np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]).tolist()
+        return distances
 
     def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         return _positions(self._position, vehicles)

@@ -71,7 +71,9 @@ class NearbyVehicles:
         if self._removals != roster.removals:
             self._removals = roster.removals
             self._set_near([v for v in self._near if v in roster.present])
-        come_near = self._schedule_far(far, self._distances(self._positions(far), here)) if far else ()
+        # Plain numbers: mostly some ten are due, for which arrays would cost three times as much.
+        distances = [math.dist(place[:2], here[:2]) for place in map(self._position, far)]
+        come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])
         position = self._positions(self._near)
@@ -81,7 +83,7 @@ class NearbyVehicles:
 
     def _drop_far(self, position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
         """Schedule those that have become far, and give the others' positions back."""
-        distances = self._distances(position, here)
+        distances = np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]).tolist()
         if max(distances) > self._radius:
             position = position[[distance <= self._radius for distance in distances]]
             self._set_near(self._schedule_far(self._near, distances))
@@ -96,10 +98,9 @@ class NearbyVehicles:
     def _schedule_far(self, vehicles: Sequence[str], distances: Sequence[float]) -> list[str]:
         """Those near; the others wait until they could have come near."""
         rate, radius = self._highest_rate(), self._radius
-        both = [(v, (distance - radius) / rate) for v, distance in zip(vehicles, distances, strict=True)]
-        waits = {v: min(wait, _MAX_WAIT) for v, wait in both if wait > 0.0}
-        self._far.add_each(tuple(waits), tuple(waits.values()), self._roster.time)
-        return [v for v, wait in both if wait <= 0.0]
+        waits = {v: (away - radius) / rate for v, away in zip(vehicles, distances, strict=True) if away > radius}
+        self._far.add_each(tuple(waits), [min(wait, _MAX_WAIT) for wait in waits.values()], self._roster.time)
+        return [v for v in vehicles if v not in waits]
 
     def _highest_rate(self) -> float:
         """How fast a distance from the ego changes at most, within the longest wait [m/s]."""
@@ -127,11 +128,6 @@ class NearbyVehicles:
         if not new:
             return due
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
-
-    @staticmethod
-    def _distances(position: NDArray[np.float64], here: Sequence[float]) -> list[float]:
-        distances: list[float] = np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]).tolist()
-        return distances
 
     def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         return _positions(self._position, vehicles)

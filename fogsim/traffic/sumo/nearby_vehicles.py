@@ -1,6 +1,5 @@
 """Which vehicles are read: those near the ego, without asking all where they are in every step, or everyone."""
 
-import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -50,7 +49,6 @@ class NearbyVehicles:
         self._ego = ego
         self._radius = radius
         self._position = vehicle_getter(api, "getPosition3D")
-        self._positions = functools.partial(_positions, self._position)
         self._speed = vehicle_getter(api, "getSpeed")
         self._roster = Roster(api) if roster is None else roster
         self._far = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
@@ -73,7 +71,9 @@ class NearbyVehicles:
         if self._removals != roster.removals:
             self._removals = roster.removals
             self._set_near([v for v in self._near if v in roster.present])
-        come_near = self._schedule_far(far, self._distances(self._positions(far), here)) if far else ()
+        # Plain numbers: mostly some ten are due, for which arrays would cost three times as much.
+        distances = [math.dist(place[:2], here[:2]) for place in map(self._position, far)]
+        come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])
         position = self._positions(self._near)
@@ -83,28 +83,24 @@ class NearbyVehicles:
 
     def _drop_far(self, position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
         """Schedule those that have become far, and give the others' positions back."""
-        distance = self._distances(position, here)
-        if float(distance.max()) > self._radius:
-            is_near = distance <= self._radius
-            self._set_near(self._schedule_far(self._near, distance))
-            position, distance = position[is_near], distance[is_near]
-        wait = (self._radius - float(distance.max())) / self._highest_rate()
+        distances = np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]).tolist()
+        if max(distances) > self._radius:
+            position = position[[distance <= self._radius for distance in distances]]
+            self._set_near(self._schedule_far(self._near, distances))
+            distances = [distance for distance in distances if distance <= self._radius]
+        wait = (self._radius - max(distances)) / self._highest_rate()
         self._all_near_until = self._roster.time + min(wait, _MAX_WAIT)
         return position
 
     def _set_near(self, near: Sequence[str]) -> None:
         self._near = tuple(sorted(near))
 
-    def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
+    def _schedule_far(self, vehicles: Sequence[str], distances: Sequence[float]) -> list[str]:
         """Those near; the others wait until they could have come near."""
-        waits = np.minimum((distance - self._radius) / self._highest_rate(), _MAX_WAIT)
-        near: list[str] = []
-        if float(waits.min()) <= 0.0:
-            is_far = waits > 0.0
-            near = list(itertools.compress(vehicles, (~is_far).tolist()))
-            vehicles, waits = list(itertools.compress(vehicles, is_far.tolist())), waits[is_far]
-        self._far.add_each(vehicles, waits.tolist(), self._roster.time)
-        return near
+        rate, radius = self._highest_rate(), self._radius
+        waits = {v: (away - radius) / rate for v, away in zip(vehicles, distances, strict=True) if away > radius}
+        self._far.add_each(tuple(waits), [min(wait, _MAX_WAIT) for wait in waits.values()], self._roster.time)
+        return [v for v in vehicles if v not in waits]
 
     def _highest_rate(self) -> float:
         """How fast a distance from the ego changes at most, within the longest wait [m/s]."""
@@ -133,9 +129,8 @@ class NearbyVehicles:
             return due
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
 
-    @staticmethod
-    def _distances(position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
-        return np.asarray(np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]))
+    def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
+        return _positions(self._position, vehicles)
 
 
 def _positions(position: Callable[[str], Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:

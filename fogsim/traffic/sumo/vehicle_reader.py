@@ -227,7 +227,7 @@ class VehicleReader:
 
     def _slopes(self, ids: Sequence[str], heights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Slopes (n,) [°], which are not asked for while all stay on the level."""
-        if (heights == self._level).all():
+        if heights.tolist().count(self._level) == len(ids):
             return np.zeros(len(ids))
         slopes = np.fromiter(map(self._slope, ids), np.float64, len(ids))
         # A vehicle that leaves the level, or comes to it, is at another height first.

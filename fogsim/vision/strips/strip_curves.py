@@ -46,8 +46,9 @@ class StripCurves(NamedTuple):
     scatter: Floats
 
     def only(self, strips: list[int]) -> "StripCurves":
-        """Some of the strips."""
-        return StripCurves(self.luminance[strips], self.variance[strips], self.scatter[strips])
+        """Some of the strips; the first ones are not copied."""
+        which = slice(len(strips)) if strips == [*range(len(strips))] else strips
+        return StripCurves(self.luminance[which], self.variance[which], self.scatter[which])
 
 
 def strip_curves(

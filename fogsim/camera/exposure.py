@@ -1,7 +1,7 @@
 """From luminance to pixel values: metering, exposure, photon and read noise, response and quantisation."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from typing import NamedTuple
@@ -284,4 +284,5 @@ def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
     if sensor.gained_read_noise is not None:
         before = sensor.gained_read_noise
         noise = math.sqrt(before**2 + (noise**2 - before**2) * share**2)
-    return replace(sensor, saturation_luminance=saturation, full_well=sensor.full_well * share, read_noise=noise)
+    well, others = sensor.full_well * share, (sensor.bits, sensor.black_level, sensor.gained_read_noise)
+    return Sensor(saturation, well, noise, *others)

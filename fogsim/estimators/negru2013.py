@@ -19,7 +19,6 @@ from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import Confirmation
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import CannyDeriche, Edges
 from fogsim.vision.lines.horizon import (
@@ -250,8 +249,7 @@ class Negru2013:
         except CannotTellError:
             return self._no_fog(0.0, horizon, diagnostics)
         diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
-        here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
-        seen = SeenBand(road, horizon, band, band_profile(road.luminance, here))
+        seen = SeenBand(road, horizon, band, band_profile(road.luminance, band.moved(-road.first_column)))
         diagnostics["profile"] = seen.profile
         curve = narrowed_curve(seen, axis, self._camera) if ahead else road_curve(seen, self._camera)
         paved = abs(0.5 * (band.left + band.right) - axis) * self._camera.row_distance
@@ -285,8 +283,7 @@ class Negru2013:
         road = road_image(image, self._camera, self._assumed, columns, linear=linear)
         pixels = linear_pixels(road.level, self._camera)
         lowest = lowest_road_row(pixels, self._camera, road.airlight)
-        luminance = road.luminance[: lowest + 1 - road.first_row]
-        return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
+        return road.above(lowest), pixels
 
     def _whole_row(self, curve: RoadCurve, seen: SeenBand) -> FogModel | None:
         """Fog from the row of the inflection; None where there is none."""

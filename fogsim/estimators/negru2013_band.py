@@ -1,6 +1,6 @@
 """The band of road in whose rows negru2013 looks for fog (Negru & Nedevschi 2013, section IV.B.b)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ def road_band(
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
         raise CannotTellError("no vertical band crosses the road's region")
-    return replace(band, left=band.left + road.first_column, right=band.right + road.first_column)
+    return band.moved(road.first_column)
 
 
 def narrowed_curve(seen: SeenBand, axis: float, camera: Camera) -> RoadCurve:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import distance_at_depth, extinction
+from fogsim.core.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Camera, CameraPose, Fault, FogField, Lane, LaneKind, RoadSection, SignMap, TrafficState, Truth
 from fogsim.values.belief import THINNEST, FogProfile
@@ -82,9 +83,22 @@ def _way_profile(fog: FogField, way: KnownWay, place: float) -> FogProfile | Non
         return None
     stations = way.stations
     ahead = _WAY[(place + _WAY >= 0.0) & (place + _WAY <= stations[-1])]
-    at = np.stack([np.interp(place + ahead, stations, axis) for axis in way.route.T], axis=1)
-    known = np.log(np.maximum(extinction(fog, at + _EYES), THINNEST))
+    known = np.log(np.maximum(extinction(fog, _places(way.route, stations, place + ahead) + _EYES), THINNEST))
     return FogProfile(ahead, known, np.zeros(ahead.size))
+
+
+@kernel
+def _places(route: NDArray[np.float64], stations: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (m, 3) on a route at distances from its start (m,) [m], as `numpy.interp` has each of their numbers."""
+    out = np.empty((at.size, 3))
+    for i in range(at.size):
+        low = np.searchsorted(stations, at[i], "right") - 1
+        for axis in range(3):
+            out[i, axis] = route[low, axis]
+            if low + 1 < stations.size:
+                slope = (route[low + 1, axis] - route[low, axis]) / (stations[low + 1] - stations[low])
+                out[i, axis] = slope * (at[i] - stations[low]) + route[low, axis]
+    return out
 
 
 def _extinctions(

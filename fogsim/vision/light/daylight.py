@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median_among
-from fogsim.vision.light.pixel_kernels import Pixels
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, pixel_luminance
 
 _BRIGHT_SHARE = 0.75
 """Share of the sky that is no brighter than what counts as its brightness: woods and glows may cover the rest [-]."""
@@ -65,11 +65,11 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     Takes `level` (rows, cols).
     """
     view = _view_of(camera)
-    luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)
     middle, aside = camera.principal_point[0], _OVERHEAD * camera.focal_length
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
     hidden = first >= min(last, camera.width) or (lead is not None and lead.distance < _HIDES_ABOVE)
-    return _SHOWN[_lit(luminance, view.strips, 0 if hidden else first, 0 if hidden else last)]
+    pixels = linear_pixels(level, camera)
+    return _SHOWN[_lit(pixels, view.rows, view.strips, 0 if hidden else first, 0 if hidden else last)]
 
 
 _SHOWN = (
@@ -81,13 +81,14 @@ _SHOWN = (
 
 
 @kernel
-def _lit(luminance: NDArray[np.float32], strips: NDArray[np.int64], first: int, last: int) -> int:
-    """Which of `_SHOWN` the luminance of a view's rows (n, cols) shows, with columns of what is overhead, if any."""
-    lane, cols = _row_medians(luminance, strips[0]), luminance.shape[1]
-    sky = _ascending(luminance[:-_ROAD_ROWS], 0, cols, _SKY_STEP)
+def _lit(image: LinearPixels, rows: NDArray[np.int64], strips: NDArray[np.int64], first: int, last: int) -> int:
+    """Which of `_SHOWN` a view's rows (n,) show, with columns of what is overhead, if any."""
+    cols, above_road, road = image.pixels.shape[1], rows[:-_ROAD_ROWS], rows[-_ROAD_ROWS:]
+    lane = _row_medians(image, road, strips[0])
+    sky = _ascending(image, above_road, 0, cols, _SKY_STEP)
     above = _sorted_quantile(sky, _BRIGHT_SHARE)
     if last > first:
-        overhead = _ascending(luminance[:-_ROAD_ROWS], first, min(last, cols), 1)
+        overhead = _ascending(image, above_road, first, min(last, cols), 1)
         above = min(above, _sorted_quantile(overhead, _BRIGHT_SHARE))
     # The median of the rows: those that are not seen count as the brightest.
     seen, dark = 0, 0
@@ -101,19 +102,19 @@ def _lit(luminance: NDArray[np.float32], strips: NDArray[np.int64], first: int, 
         shining += 1
     if shining < _LAMPS_SHARE * sky.size or _sorted_quantile(sky, 0.5) >= _DARK_SKY:
         return 0
-    return 2 if _has_beam(lane, _row_medians(luminance, strips[1]), _row_medians(luminance, strips[2])) else 0
+    return 2 if _has_beam(lane, _row_medians(image, road, strips[1]), _row_medians(image, road, strips[2])) else 0
 
 
 @kernel
-def _ascending(rows: NDArray[np.float32], first: int, end: int, step: int) -> NDArray[np.float32]:
+def _ascending(image: LinearPixels, rows: NDArray[np.int64], first: int, end: int, step: int) -> NDArray[np.float32]:
     """Pixels in every which column from both sides inward, in ascending order: of a mirrored image the same."""
-    out, count = np.empty(rows.size, np.float32), 0
-    for row in range(rows.shape[0]):
+    out, count = np.empty(rows.size * (end - first + 1), np.float32), 0
+    for row in rows:
         for col in range(0, (end - first + 1) // 2, step):
-            out[count] = rows[row, first + col]
+            out[count] = pixel_luminance(image, row, first + col)
             count += 1
         for col in range(0, (end - first) // 2, step):
-            out[count] = rows[row, end - 1 - col]
+            out[count] = pixel_luminance(image, row, end - 1 - col)
             count += 1
     return np.sort(out[:count])
 
@@ -158,12 +159,15 @@ def _strip(
 
 
 @kernel
-def _row_medians(luminance: NDArray[np.float32], strip: NDArray[np.int64]) -> NDArray[np.float64]:
+def _row_medians(image: LinearPixels, rows: NDArray[np.int64], strip: NDArray[np.int64]) -> NDArray[np.float64]:
     """Median of each row of a strip of road, NaN where it is not seen (`strip` (2, rows))."""
-    road, out = luminance[-_ROAD_ROWS:], np.full(_ROAD_ROWS, np.nan)
-    for row in range(_ROAD_ROWS):
-        if strip[1, row] >= strip[0, row]:
-            out[row] = median_among(road[row, strip[0, row] : strip[1, row] + 1])
+    out, seen = np.full(rows.size, np.nan), np.empty(image.pixels.shape[1], np.float32)
+    for i in range(rows.size):
+        left, right = strip[0, i], strip[1, i]
+        if right >= left:
+            for col in range(left, right + 1):
+                seen[col - left] = pixel_luminance(image, rows[i], col)
+            out[i] = median_among(seen[: right - left + 1])
     return out
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.vision.light.medians import columns_apart, median, row_medians
+from fogsim.vision.light.medians import columns_apart, median
 
 Image = NDArray[np.float32]
 
@@ -99,9 +99,7 @@ class EdgeDetector:
         self._derivatives(luminance, across, down)
         slope = np.zeros(luminance.shape[0], np.float32)
         if fog_slope is not None:
-            # Fog over a dark road brightens upward, so dI/dv is negative.
-            medians = row_medians(columns_apart(down, self._of_row))
-            slope = np.clip(medians, -fog_slope, 0.0).astype(np.float32)
+            slope = _row_slopes(down, self._of_row, fog_slope)
         squared_lengths(across, down, slope, self._squares)
         high = max(_EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
         trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
@@ -132,6 +130,28 @@ def _median_size(squares: Image, step: int) -> float:
     """Median size of the gradient in the lower half, of whose squares there is a border of one pixel."""
     inside = squares[1:-1, 1:-1]
     return median(np.sqrt(columns_apart(inside[len(inside) // 2 :: step], step)))
+
+
+@kernel
+def _row_slopes(down: NDArray[np.float32], step: int, most: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Median of each row's downward gradient in columns some way apart, as far as fog can have made it (rows,).
+
+    Columns are those of `columns_apart`. Fog over a dark road brightens upward, so dI/dv is negative.
+    """
+    rows, cols = down.shape
+    slopes, seen = np.empty(rows, np.float32), np.empty(cols, np.float32)
+    for row in range(rows):
+        count = 0
+        for col in range(0, (cols + 1) // 2, step):
+            seen[count] = down[row, col]
+            count += 1
+        for col in range(0, cols // 2, step):
+            seen[count] = down[row, cols - 1 - col]
+            count += 1
+        ordered = np.sort(seen[:count])
+        middle = 0.5 * (float(ordered[(count - 1) // 2]) + float(ordered[count // 2]))
+        slopes[row] = min(max(middle, -float(most[row])), 0.0)
+    return slopes
 
 
 @kernel

@@ -53,6 +53,12 @@ class RoadImage:
         """Airlight less road [linear grey levels]."""
         return self.airlight - self.road
 
+    def above(self, lowest: int) -> "RoadImage":
+        """The same without the rows below one of the whole image."""
+        luminance = self.luminance[: lowest + 1 - self.first_row]
+        part = luminance, self.first_row, self.sky_rows, self.airlight
+        return RoadImage(*part, median(luminance[-1]), self.level, self.first_column)
+
 
 def road_image(
     image: NDArray[np.uint8] | NDArray[np.uint16],

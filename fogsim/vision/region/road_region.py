@@ -165,6 +165,10 @@ class Band:
     top: int
     bottom: int
 
+    def moved(self, columns: int) -> "Band":
+        """The same band in an image that begins so many columns before this one."""
+        return Band(self.left + columns, self.right + columns, self.top, self.bottom)
+
 
 def cumulative_limits(steps: NDArray[np.float32], seed_tolerance: float) -> GrowthLimits:
     """Limits that follow from what fog and noise allow between rows (negru2013 section IV.B.b after Hautière 2006).

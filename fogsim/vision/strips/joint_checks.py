@@ -10,7 +10,6 @@ from fogsim.core.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
-from fogsim.vision.light.medians import median
 from fogsim.vision.strips.joint_fit import EVERY, JointFit
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
@@ -76,10 +75,17 @@ def no_road(fit: JointFit, curves: StripCurves, geometry: StripGeometry, camera:
 
 def is_scattered(fit: JointFit, curves: StripCurves, geometry: StripGeometry) -> bool:
     """Whether single pixels across the own lane differ as much among themselves as road and airlight do."""
-    near = fit.used[0] & (fit.extinction * geometry.distance < 1.5)
-    if not near.any():
-        return False
-    return median(curves.scatter[0][near]) > MAX_SCATTER * (fit.airlight - fit.road)
+    return _is_scattered(
+        fit.used[0], geometry.distance, curves.scatter[0], 1.5, fit.extinction, fit.airlight - fit.road
+    )
+
+
+@kernel
+def _is_scattered(
+    used: NDArray[np.bool_], distance: Floats, scatter: Floats, depth: float, extinction: float, contrast: float
+) -> bool:
+    near = used & (extinction * distance < depth)
+    return bool(near.any() and np.median(scatter[near]) > MAX_SCATTER * contrast)
 
 
 def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.vision.strips import albedo_filter
 from fogsim.vision.strips.airlight_slopes import darkening_of_bins, slope_cost, slope_table
-from fogsim.vision.strips.albedo_filter import Albedo
+from fogsim.vision.strips.albedo_filter import Albedo, albedo_transitions
 from fogsim.vision.strips.joint_kernels import PARAMETERS, Bins, JointPrior, Solution, gauss_newton
 from fogsim.vision.strips.joint_start_kernels import darkness_by_sky, fit_constant_albedo
 from fogsim.vision.strips.strip_curves import StripCurves
@@ -228,7 +228,14 @@ def bins_of(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, ang
         darker,
         by_row,
         geometry.distance[0] * math.tan(geometry.grazing[0]),
+        albedo_changes(geometry.distance, geometry.extent, geometry.grazing),
     )
+
+
+@kernel
+def albedo_changes(distance: Floats, extent: Floats, grazing: Floats) -> Floats:
+    """How all of `ALBEDOS` change from bin to bin (n, 9): they differ in what they deviate by, not in their lengths."""
+    return albedo_transitions(distance, extent, grazing, Albedo(0.0, _PATCH_LENGTH, 0.0, _DRIFT_LENGTH, 0.0, 0.0, 0.0))
 
 
 @kernel

@@ -18,7 +18,6 @@ from fogsim.vision.strips.albedo_filter import (
     Albedo,
     Residuals,
     Whitened,
-    albedo_transitions,
     hide_behind_obstacles,
     whiten,
 )
@@ -68,6 +67,8 @@ class Bins(NamedTuple):
     darker: NDArray[np.float64]
     darker_by_row: NDArray[np.float64]
     eye: float  # Height of the eye above the road [m]
+    # (n, 9): How the albedo changes from bin to bin, see `fogsim.vision.strips.albedo_filter.albedo_transitions`
+    changes: NDArray[np.float64]
 
 
 class JointPrior(NamedTuple):
@@ -378,7 +379,7 @@ def gauss_newton(
         guess = near_road(bins, s, theta[0], theta[1], theta[2], darker)
         road[s] = min(max(guess, 0.01 * theta[1]), theta[1])
     residuals, whitened = allocated(strips, count, size + 1, bins.noise)
-    changes, unit = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo), 1.0 / bins.path[0, 0]
+    unit = 1.0 / bins.path[0, 0]
     covariance: NDArray[np.float64] = np.eye(size)
     cost, squares, number = 0.0, 0.0, 0
     for iteration in range(iterations + 1):
@@ -386,10 +387,10 @@ def gauss_newton(
             _linearise(bins, s, theta, road[s], residuals)
         # What is an outlier is settled before the last steps, so that they converge.
         reject = iteration < max(iterations - 2, 1)
-        cost = whiten(residuals, changes, albedo, prior.airlight, reject, whitened)
+        cost = whiten(residuals, bins.changes, albedo, prior.airlight, reject, whitened)
         if reject and hide_behind_obstacles(bins.noise, whitened.used):
             # Else what was seen of the bins that are now hidden would still count through the others.
-            cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
+            cost = whiten(residuals, bins.changes, albedo, prior.airlight, False, whitened)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
         squares, number = add_bins(whitened, normal, gradient)
         cost += squares + _add_prior(theta, prior, bins.eye, normal, gradient)

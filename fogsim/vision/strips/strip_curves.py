@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
-from fogsim.vision.light.medians import MOST_SAMPLES, median, median_of_few
+from fogsim.vision.light.medians import MOST_SAMPLES, median_of_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 from fogsim.vision.strips.sky import Sky, even_rows
 from fogsim.vision.strips.strip_geometry import StripGeometry
@@ -46,8 +46,9 @@ class StripCurves(NamedTuple):
     scatter: Floats
 
     def only(self, strips: list[int]) -> "StripCurves":
-        """Some of the strips."""
-        return StripCurves(self.luminance[strips], self.variance[strips], self.scatter[strips])
+        """Some of the strips; the first ones are not copied."""
+        which = slice(len(strips)) if strips == [*range(len(strips))] else strips
+        return StripCurves(self.luminance[which], self.variance[which], self.scatter[which])
 
 
 def strip_curves(
@@ -194,13 +195,22 @@ def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int
     rows = even_rows(bottom, top, _BONNET_ROWS)[::-1]
     if rows.size < 8:
         return bottom
-    level = _middle_levels(image, rows)
+    edge = _bonnet_edge(_middle_levels(image, rows), _BONNET_STEP * airlight)
+    return bottom if edge < 0 else int(rows[min(edge + 6, rows.size - 1)])
+
+
+@kernel
+def _bonnet_edge(level: Floats, least: float) -> int:
+    """The last step of more than the least from row to row (n,) that stands out; −1 without any."""
     # Three rows each side of a gap of two, since a bonnet's edge is bent.
     mean = (level[:-2] + level[1:-1] + level[2:]) / 3.0
     change = mean[5:] - mean[:-5]
-    apart = np.abs(change - median(change))
-    steps = np.flatnonzero(apart > max(_BONNET_STEP * airlight, _BONNET_OUTLIER * median(apart)))
-    return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
+    apart = np.abs(change - np.median(change))
+    least = max(least, _BONNET_OUTLIER * np.median(apart))
+    last = -1
+    for i in range(apart.size):
+        last = i if apart[i] > least else last
+    return last
 
 
 def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:

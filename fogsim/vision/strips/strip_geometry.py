@@ -44,8 +44,9 @@ class StripGeometry(NamedTuple):
         return 2.0 * self.half
 
     def only(self, strips: list[int]) -> "StripGeometry":
-        """Some of the strips."""
-        return StripGeometry(*self[:7], *(values[strips] for values in self[7:]))
+        """Some of the strips; the first ones are not copied."""
+        which = slice(len(strips)) if strips == [*range(len(strips))] else strips
+        return StripGeometry(*self[:7], *(values[which] for values in self[7:]))
 
 
 class RoadView(NamedTuple):

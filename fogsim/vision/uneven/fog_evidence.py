@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED, Albedo
-from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, bins_of
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, MORE_STEPS, albedo_changes, bins_of
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution, gauss_newton, invert
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
@@ -167,6 +167,7 @@ def thinned_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior
         bins.darker,
         bins.darker_by_row,
         bins.eye,
+        albedo_changes(rows[2], rows[3] * sizes, rows[4]),
     )
 
 

@@ -346,23 +346,14 @@ def airlight_edge(
     """
     if sky.is_clipped:
         return None
-    below = geometry.below - uneven.fit.shift
-    whole = (geometry.first == geometry.last) & (below > max(_LEAST_ROWS, horizon_deviation / _UNSURE_ROW))
-    # Behind a crest no row is farther than the one below it.
-    farther = np.diff(below, prepend=math.inf) < 0.0
-    far = np.flatnonzero(whole & farther & (geometry.distance > _NEAR_FOG))
-    reach = _ASIDE * camera.focal_length
-    columns = (
-        max(round(camera.principal_point[0] - reach), 0),
-        min(round(camera.principal_point[0] + reach), camera.width),
-    )
+    reach, middle = _ASIDE * camera.focal_length, camera.principal_point[0]
+    columns = max(round(middle - reach), 0), min(round(middle + reach), camera.width)
     alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
-    shares = airlight_shares(image, geometry.first[far], columns, sky.luminance, alike)
-    front = _front(shares)
-    if front is None:
+    least = max(_LEAST_ROWS, horizon_deviation / _UNSURE_ROW)
+    upper, lower = _front(image, geometry, uneven.fit.shift, least, columns, sky.luminance, alike)
+    if math.isnan(upper):
         return None
-    distance = camera.row_distance / below[far]
-    before, behind = float(distance[front - 2]), float(distance[front])
+    before, behind = camera.row_distance / lower, camera.row_distance / upper
     depth, near = _depth(uneven, before), _depth(uneven, _NEAR_FOG)
     if depth > _MOST_DEPTH:
         return None
@@ -371,7 +362,7 @@ def airlight_edge(
     extinction = math.log(max(contrast / alike, 1.0)) / (behind - before)
     if extinction < _DENSER * near / _NEAR_FOG:
         return None
-    edge = float(below[far[front]]) + 0.5
+    edge = upper + 0.5
     place = camera.row_distance / edge
     return place, place / edge * math.hypot(0.5, horizon_deviation), extinction
 
@@ -382,10 +373,32 @@ def _depth(uneven: UnevenFit, distance: float) -> float:
     return max(float(np.interp(distance, uneven.distance, uneven.depth)), 0.0) * beyond
 
 
-def _front(shares: np.ndarray) -> int | None:
-    """Nearest row, of those from near to far, from which on airlight is seen; None if there is no such step."""
-    for row in range(2, shares.size):
+@kernel
+def _front(
+    image: LinearPixels,
+    geometry: StripGeometry,
+    shift: float,
+    least: float,
+    columns: tuple[int, int],
+    airlight: float,
+    alike: float,
+) -> tuple[float, float]:
+    """Nearest row, of those from near to far, from which on airlight is seen, and that of ground before it.
+
+    Both below the horizon [px]; NaN if there is no such step. Takes `shift`, `least` [px].
+    """
+    below, far, count = geometry.below - shift, np.empty(geometry.below.size, np.int64), 0
+    for i in range(below.size):
+        # Behind a crest no row is farther than the one below it.
+        farther = i == 0 or below[i] < below[i - 1]
+        whole = geometry.first[i] == geometry.last[i] and below[i] > least
+        if farther and whole and geometry.distance[i] > _NEAR_FOG:
+            far[count] = i
+            count += 1
+    far = far[:count]
+    shares = airlight_shares(image, geometry.first[far], columns, airlight, alike)
+    for row in range(2, count):
         if shares[row] >= _LEAST_SHARE:
-            step = shares[row - 2] <= STEP * shares[row]
-            return row if step and shares[row:].min() >= _KEPT * shares[row] else None
-    return None
+            step = shares[row - 2] <= STEP * shares[row] and shares[row:].min() >= _KEPT * shares[row]
+            return (below[far[row]], below[far[row - 2]]) if step else (np.nan, np.nan)
+    return np.nan, np.nan

@@ -16,7 +16,6 @@ from fogsim.vision.light.medians import median_among
 from fogsim.vision.strips.albedo_filter import (
     Albedo,
     Residuals,
-    albedo_transitions,
     hide_behind_obstacles,
     whiten,
 )
@@ -247,7 +246,6 @@ def fit_uneven(
         guess = near_road(bins, s, math.exp(theta[0]), theta[cells], theta[cells + 1], 0.0)
         road[s] = min(max(guess, 0.01 * theta[cells]), theta[cells])
     residuals, whitened = allocated(strips, count, size + 1, bins.noise.copy())
-    changes = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
     covariance: NDArray[np.float64] = np.eye(size)
     step, last, least, halvings = np.zeros(size), theta.copy(), np.inf, 0
     cost, squares, number = 0.0, 0.0, 0
@@ -257,9 +255,9 @@ def fit_uneven(
             _linearise(bins, s, theta, road[s], fog.nodes, residuals)
         # What is an outlier is settled before the last steps, so that they converge.
         reject = iteration < max(iterations - 3, 1)
-        cost = whiten(residuals, changes, albedo, prior.airlight, reject, whitened)
+        cost = whiten(residuals, bins.changes, albedo, prior.airlight, reject, whitened)
         if reject and iteration >= _TOLERANT and hide_behind_obstacles(bins.noise, whitened.used):
-            cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
+            cost = whiten(residuals, bins.changes, albedo, prior.airlight, False, whitened)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
         squares, number = add_bins(whitened, normal, gradient)
         cost += squares + _add_prior(theta, prior, fog, normal, gradient)

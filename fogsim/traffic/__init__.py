@@ -30,7 +30,7 @@ def libsumo_network_traffic(setup: TrafficSetup, outputs: Path | None = None) ->
 
 
 def _libsumo(setup: TrafficSetup, outputs: Path | None) -> SumoTraffic:
-    for option in ignored_options(setup.config) if setup.config else ():
+    for option in ignored_options(setup.config, setup.step_length) if setup.config else ():
         warnings.warn(f"{setup.config}: {option}", stacklevel=3)
     return SumoTraffic(setup, LibsumoLink(OutputFolder(outputs, output_prefix(setup), not has_error_log(setup))))
 

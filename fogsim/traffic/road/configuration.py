@@ -133,10 +133,20 @@ def configured_demand(config: Path) -> _ConfiguredDemand:
     )
 
 
-def ignored_options(config: Path) -> tuple[str, ...]:
-    """Options of a SUMO configuration that `OVERRIDES` override, each with the reason."""
+def ignored_options(config: Path, step_length: float) -> tuple[str, ...]:
+    """Options of a SUMO configuration that a run of a step length [s] overrides, each with the reason."""
     root = _root(config)
-    return tuple(
+    lengths = [
+        value for value in _values(root, ("step-length",)) if value not in (repr(step_length), f"{step_length:g}")
+    ]
+    return (
+        *(f"step-length={value} is left out: clocks.traffic_step_s is {step_length:g}" for value in lengths),
+        *_unsupported(root),
+    )
+
+
+def _unsupported(root: Element) -> Iterator[str]:
+    return (
         f"{option.names[0]}={value} is left out: {option.reason}"
         for option in _UNSUPPORTED
         for value in _values(root, option.names)

@@ -15,6 +15,7 @@ _QUOTED = re.compile("['\"\u201c]([^'\"\u201c\u201d]+)['\"\u201d]")
 _PLACE = re.compile(r"\s*In file '(.*)'\s*At line/column (\d+)/\d+\.?")
 _NUMBERED = re.compile(r"\.\d+$")
 _PARTS = re.compile(r"[\s,]+")
+_NEXT = " Error: "
 _MOST_BYTES = 50_000_000  # of a file that is searched
 
 
@@ -27,7 +28,9 @@ def located(what: str, message: str, arguments: Sequence[str]) -> str:
     place = _PLACE.search(message)
     if place is not None:
         return f"{place[1]}:{place[2]}: {what}: {message[: place.start()]}{message[place.end() :]}"
-    first = message.partition(" Error: ")[0]
+    first, *others = message.split(_NEXT)
+    more = f" and {len(others) - 2} more errors" if len(others) > 2 else ""
+    message = _NEXT.join([first, *others[:2]]) + more
     ids = dict.fromkeys(_NUMBERED.sub("", one) for one in _QUOTED.findall(first))
     # The network has most ids, and the fewest faults.
     most, where = max((_most_alike(path, ids) for path in reversed(_files(arguments))), default=(0, ""), key=_number)

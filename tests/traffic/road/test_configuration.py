@@ -33,15 +33,17 @@ def test_files_are_relative_to_the_configuration(tmp_path: Path) -> None:
 def test_options_that_cannot_hold_here_are_told_with_the_reason(tmp_path: Path) -> None:
     path = config(
         tmp_path,
-        '<configuration><traci_server><remote-port value="8813"/></traci_server><random v="true"/></configuration>',
+        '<configuration><traci_server><remote-port value="8813"/></traci_server><random v="true"/>'
+        '<step-length value="1"/></configuration>',
     )
-    port, random = ignored_options(path)
+    step, port, random = ignored_options(path, 0.1)
+    assert step == "step-length=1 is left out: clocks.traffic_step_s is 0.1"
     assert port.startswith("remote-port=8813 is left out: SUMO would listen")
     assert random == "random=true is left out: a run must depend on its seed alone"
     assert OVERRIDES[:4] == ("--remote-port", "0", "--random", "false")
     assert OVERRIDES[4:6] == ("--xml-validation", "never")  # a schema may lie at any address
-    for text in ['<remote-port value="0"/>', '<random value="False"/>', "<random/>"]:
-        assert ignored_options(config(tmp_path, f"<configuration>{text}</configuration>")) == ()
+    for text in ['<remote-port value="0"/>', '<random value="False"/>', "<random/>", '<step-length value="0.1"/>']:
+        assert ignored_options(config(tmp_path, f"<configuration>{text}</configuration>"), 0.1) == ()
 
 
 def test_options_that_reach_outside_the_runs_folder_are_refused(

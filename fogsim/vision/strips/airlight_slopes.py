@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
+from fogsim.vision.light.pixel_kernels import SATURATED_SHARE
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.joint_start_kernels import darkness_of_slope
-from fogsim.vision.strips.sky import SATURATED_SHARE, Sky
+from fogsim.vision.strips.sky import Sky
 
 SKY_DEVIATION = 0.005
 """Relative deviation of the airlight at the horizon from the sky above it [-]."""

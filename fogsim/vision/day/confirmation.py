@@ -19,11 +19,12 @@ from fogsim.vision.day.second_opinion import (
     WIDEST,
     DayVerdict,
     agree,
-    has_sun,
     refused,
     stands_out,
     verdict_of,
 )
+from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.light.pixel_kernels import sun_in_sky
 from fogsim.vision.lines.horizon import Horizon, levelled
 
 PERIOD, SOON = 10.0, 1.0
@@ -35,6 +36,9 @@ are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
 _CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
+
+_SUN_HEIGHT = 0.2
+"""Height above the horizon up to which the sun is searched [rad]."""
 
 _THINNEST = extinction_from_visibility(CLEAR)
 """Extinction up to which fog counts as thin [1/m]."""
@@ -100,7 +104,7 @@ class Confirmation:
 
     def _rejection_reason(self, own: Estimate, level: NDArray[Any], day: DayVerdict, *, is_open: bool) -> str:
         """Say why an estimate does not count; empty if it does."""
-        if day.reason and has_sun(level, self._camera, math.floor(self._horizon.row)):
+        if day.reason and self._has_sun(level):
             return GLARES
         if day.shows_fog:
             least = own.extinction - NORMAL_90_PERCENT * own.standard_deviation
@@ -109,6 +113,11 @@ class Confirmation:
             return UNCONFIRMED
         shows_clear = _has_contrast(day) or self._stands_out(level, _THINNEST)
         return "" if shows_clear else NOT_CLEAR
+
+    def _has_sun(self, level: NDArray[Any]) -> bool:
+        camera, last = self._camera, math.floor(self._horizon.row)
+        rows = np.arange(max(last - math.floor(_SUN_HEIGHT * camera.focal_length), 0), last)
+        return rows.size > 0 and sun_in_sky(linear_pixels(level, camera), rows, camera.width // 6)
 
     def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
         return stands_out(level, self._camera, self._horizon, extinction)

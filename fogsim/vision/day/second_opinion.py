@@ -15,7 +15,7 @@ from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import quantile
-from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance, sun_in_sky
+from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
 from fogsim.vision.lines.horizon import Horizon
 
 _BLOCKS = 80
@@ -29,9 +29,6 @@ _BELOW_CROWNS = 2.5
 
 _SKY_HEIGHT, _BRIGHTEST = 0.5, 0.9
 """Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
-
-_SUN_HEIGHT = 0.2
-"""Height above the horizon up to which the sun is looked for [rad]."""
 
 _OWN_LANE = 0.2
 """Columns to either side of the way ahead that do not count, over the image's: vehicles have dark windows above bright
@@ -56,12 +53,6 @@ def stands_out(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction
     return share_of_far_objects(level, camera, horizon, extinction) > _MOST_FAR
 
 
-def has_sun(level: NDArray[Any], camera: Camera, last: int) -> bool:
-    """Whether the sun or a lamp shines above a row: the rest is no measure of it."""
-    rows = np.arange(max(last - math.floor(_SUN_HEIGHT * camera.focal_length), 0), last)
-    return rows.size > 0 and sun_in_sky(linear_pixels(level, camera), rows, camera.width // 6)
-
-
 def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
     """Share of the image's width in which something is seen that fog of an extinction would hide [-].
 
@@ -77,8 +68,6 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     top = max(math.floor(last - _SKY_HEIGHT * camera.height), 0)
     is_seen = first >= 0 and last > top and ground + _LEAST_ROWS < camera.height and extinction > 0.0
     if not is_seen or camera.mount_height > _BELOW_CROWNS:
-        return 0.0
-    if has_sun(level, camera, last):
         return 0.0
     pixels = linear_pixels(level, camera)
     per_block = max(camera.width // _BLOCKS, 1)

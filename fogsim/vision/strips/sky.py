@@ -333,7 +333,7 @@ def _read_sky(image: LinearPixels, rows: NDArray[np.int64], axis: Floats, margin
     """`sky_above` of rows (n,), given principal point, horizon and focal length [px]; NaN where it is hidden."""
     side, noise = image.pixels.shape[1] // 6, pixel_noise(image, rows)
     saturated, clipped = saturation(image, rows, side)
-    has_sun = sun_in_sky(image, rows, side)
+    has_sun = clipped > SATURATED_SHARE and sun_in_sky(image, rows, side)
     if has_sun:
         saturated = clipped = 0.0
     bright, share = sky_rows(image, rows, side, image.pixels.shape[1] - side, max(noise, 0.3), has_sun)

@@ -40,7 +40,6 @@ from fogsim.atmosphere.lamps.lobe_kernels import (
     Angles,
     LampShapes,
     LobeTables,
-    find_unknown,
     mean_light,
     set_glow_light,
 )
@@ -83,10 +82,11 @@ class LobeMemory:
         shapes = self._shapes(sources, chosen)
         position = np.ascontiguousarray(sources.position)
         unknown = np.zeros(self._known.shape, np.bool_)
-        if find_unknown(lamps, chosen, eye, position, shapes, self._tables, self._known, unknown):
-            self._learn(unknown)
         light = np.empty((len(lamps), self._tables.values.shape[-1]), np.float32)
-        set_glow_light(lamps, chosen, eye, position, sources.intensity, shapes, self._tables, light)
+        here = (lamps, chosen, eye, position, sources.intensity, shapes, self._tables)
+        if set_glow_light(*here, self._known, unknown, light):
+            self._learn(unknown)
+            set_glow_light(*here, self._known, unknown, light)
         return light
 
     def _shapes(self, sources: LightSources, chosen: NDArray[np.int64]) -> LampShapes:

@@ -281,8 +281,8 @@ def _of_vehicles(
     numbers = _numbers(body_names(state))
     most = len(numbers) * table.lamps.of_body.shape[1]
     found, lit = np.empty((most, _FOUND)), np.empty((2, most), np.int64)
-    turned = np.stack((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
-    size = np.stack((state.length, state.width, state.height))
+    turned = np.array((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
+    size = np.array((state.length, state.width, state.height))
     lamps = state.lamps.astype(np.int64)
     if skip is not None:
         lamps[skip] = 0

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,6 @@ from fogsim.atmosphere.lamps.lobe_kernels import (
     Angles,
     LampShapes,
     LobeTables,
-    find_unknown,
     mean_light,
     set_glow_light,
 )
@@ -62,7 +61,7 @@ from fogsim.values.pinhole import camera_axes
 class LobeMemory:
     """Light that the glows of lamps are made of.
 
-    It remembers mean intensities, some hundred microseconds' work for each kind of lamp and direction to the eye.
+    It remembers mean intensities by kind of lamp and direction to the eye.
     """
 
     def __init__(self, droplets: Droplets) -> None:
@@ -83,10 +82,11 @@ class LobeMemory:
         shapes = self._shapes(sources, chosen)
         position = np.ascontiguousarray(sources.position)
         unknown = np.zeros(self._known.shape, np.bool_)
-        if find_unknown(lamps, chosen, eye, position, shapes, self._tables, self._known, unknown):
-            self._learn(unknown)
         light = np.empty((len(lamps), self._tables.values.shape[-1]), np.float32)
-        set_glow_light(lamps, chosen, eye, position, sources.intensity, shapes, self._tables, light)
+        here = (lamps, chosen, eye, position, sources.intensity, shapes, self._tables)
+        if set_glow_light(*here, self._known, unknown, light):
+            self._learn(unknown)
+            set_glow_light(*here, self._known, unknown, light)
         return light
 
     def _shapes(self, sources: LightSources, chosen: NDArray[np.int64]) -> LampShapes:
@@ -108,12 +108,17 @@ class LobeMemory:
         return len(self._kinds) - 1
 
     def _learn(self, unknown: NDArray[np.bool_]) -> None:
-        for number, lobe in enumerate(self._kinds):
-            new = unknown[number]
-            if new.any():
-                mean = mean_intensity(lobe, self._azimuth[new], self._elevation[new], self._droplets)
-                self._tables.values[number][new] = mean.reshape(*mean.shape[:2], -1)
+        for number, a, b in np.argwhere(unknown).tolist():
+            way = float(self._azimuth[a, b]), float(self._elevation[a, b])
+            self._tables.values[number, a, b] = _mean_toward(self._kinds[number], *way, self._droplets)
         self._known |= unknown
+
+
+@lru_cache(4096)
+def _mean_toward(lobe: Beam, azimuth: float, elevation: float, droplets: Droplets) -> NDArray[np.float32]:
+    """Mean intensities that a lamp sends into its glow (depths, angles · sides), the same in every scene."""
+    mean = mean_intensity(lobe, np.array([azimuth]), np.array([elevation]), droplets)[0]
+    return np.asarray(mean.reshape(len(mean), -1), np.float32)
 
 
 _COARSE_PIXELS = 8

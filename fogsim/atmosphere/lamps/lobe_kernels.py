@@ -59,39 +59,6 @@ def _toward(x: float, y: float, z: float, forward: NDArray[np.float64]) -> tuple
 
 
 @kernel
-def find_unknown(
-    lamps: NDArray[np.float64],
-    chosen: NDArray[np.int64],
-    eye: NDArray[np.float64],
-    position: NDArray[np.float64],
-    shapes: LampShapes,
-    tables: LobeTables,
-    known: NDArray[np.bool_],
-    unknown: NDArray[np.bool_],
-) -> int:
-    """Mark the directions to the eye that are looked up but not yet in the tables; return their count.
-
-    Takes `known`, `unknown` (kinds, azimuths, elevations) bool.
-    """
-    count = 0
-    for i in range(lamps.shape[0]):
-        number = chosen[i]
-        kind = shapes.kind[number]
-        if kind < 0:
-            continue
-        x, y, z = _way(position[number], eye)
-        right, up = _toward(x, y, z, shapes.forward[number])
-        column, _ = _place(right, math.pi, tables.azimuth_fold, known.shape[1])
-        row, _ = _place(up, 0.5 * math.pi, tables.elevation_fold, known.shape[2])
-        for a in range(column, column + 2):
-            for b in range(row, row + 2):
-                if not known[kind, a, b] and not unknown[kind, a, b]:
-                    unknown[kind, a, b] = True
-                    count += 1
-    return count
-
-
-@kernel
 def set_glow_light(
     lamps: NDArray[np.float64],
     chosen: NDArray[np.int64],
@@ -100,13 +67,17 @@ def set_glow_light(
     intensity: NDArray[np.float64],
     shapes: LampShapes,
     tables: LobeTables,
+    known: NDArray[np.bool_],
+    unknown: NDArray[np.bool_],
     out: NDArray[np.float32],
-) -> None:
+) -> int:
     """Light of each lamp that its glow is made of, as the illuminance that a lamp alike in all directions would give.
 
-    Takes `chosen` (n,) int64, `eye` (3,) [m], `position`, `intensity` (all,) [m], [cd], `out` (n, angles · sides) [lx].
+    Marks the directions to the eye that are not yet in the tables and returns their count; if there are any, the light
+    is not valid. Takes `chosen` (n,) int64, `eye` (3,) [m], `position`, `intensity` (all,) [m], [cd], `known`,
+    `unknown` (kinds, azimuths, elevations) bool, `out` (n, angles · sides) [lx].
     """
-    values, log_depth = tables.values, tables.log_depth
+    values, log_depth, count = tables.values, tables.log_depth, 0
     entries, depths = out.shape[1], values.shape[3]
     for i in range(lamps.shape[0]):
         number, one = chosen[i], out[i]
@@ -118,6 +89,11 @@ def set_glow_light(
         right, up = _toward(x, y, z, shapes.forward[number])
         column, aside = _place(right, math.pi, tables.azimuth_fold, values.shape[1])
         row, above = _place(up, 0.5 * math.pi, tables.elevation_fold, values.shape[2])
+        for a in range(column, column + 2):
+            for b in range(row, row + 2):
+                if not known[kind, a, b] and not unknown[kind, a, b]:
+                    unknown[kind, a, b] = True
+                    count += 1
         log_tau, deep = math.log(max(lamps[i, DEPTH], 1e-9)), 0
         while deep < depths - 2 and log_tau > log_depth[deep + 1]:
             deep += 1
@@ -130,6 +106,7 @@ def set_glow_light(
             weight, source = np.float32(share * gain), values[kind, column + a, row + b, deep + c]
             for n in range(entries):
                 one[n] += weight * source[n]
+    return count
 
 
 class Angles(NamedTuple):

@@ -181,7 +181,7 @@ class RoadGlow:
         cosine, sine = math.cos(pose.heading), math.sin(pose.heading)
         ahead, left, up = patches.middle.T
         rise = math.sin(pose.grade)
-        place = np.stack((ahead * cosine - left * sine, ahead * sine + left * cosine, up + ahead * rise), axis=1)
+        place = np.array((ahead * cosine - left * sine, ahead * sine + left * cosine, up + ahead * rise)).T
         eye = np.asarray(pose.position, dtype=np.float64)
         dense = extinction(fog, eye + 0.5 * place)
         reached = patches.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * dense * patches.range_)
@@ -201,18 +201,12 @@ def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSou
     roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
     dense = extinction(fog, beams.position[chosen])[:, None]
     kept = np.exp(-LOSS_OF_SPREAD_LIGHT * dense * roads[0].range_)
-    flux = np.stack([road.flux for road in roads]) * kept * beams.scale[chosen, None]
+    flux = np.array([road.flux for road in roads]) * kept * beams.scale[chosen, None]
     total = flux.sum(axis=1)
-    ahead = (flux * np.stack([road.middle[:, 0] for road in roads])).sum(axis=1) / total
+    ahead = (flux * np.array([road.middle[:, 0] for road in roads])).sum(axis=1) / total
     heading = beams.heading[chosen]
-    position = beams.position[chosen] + np.stack(
-        (
-            ahead * np.cos(heading),
-            ahead * np.sin(heading),
-            ahead * np.tan(beams.grade[chosen]) - beams.height[chosen],
-        ),
-        axis=1,
-    )
+    rise = ahead * np.tan(beams.grade[chosen]) - beams.height[chosen]
+    position = beams.position[chosen] + np.array((ahead * np.cos(heading), ahead * np.sin(heading), rise)).T
     way = eye - position
     slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)
     return _shining_up(position, ROAD_ALBEDO * total / math.pi, slant, _LIT_AREA * slant)

@@ -19,6 +19,25 @@ from fogsim.values.pinhole import ray_from_pixel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
+_LIT, _SURROUNDED = np.uint8(1), np.uint8(2)
+
+
+class Beams(NamedTuple):
+    """Head lamps, whose light is added to the cells of a map that are seen."""
+
+    # (n, 9): Place (x, y) [cells] and axis (cosine, sine) [steps of the pattern a cell] on the map, lamps at the place,
+    # square of their height above the road [m²], minus the extinction [1/m], their height [m], rise of the road in a
+    # step of the pattern [m]
+    lamps: NDArray[np.float64]
+    pattern: NDArray[np.int64]  # (n,): Number of the pattern of each
+    patterns: NDArray[np.float64]  # (m, along, 2 half + 1): Horizontal illuminance by one lamp without fog [lx]
+    step: float  # Step of the patterns [m]
+    known: NDArray[np.uint8]  # (rows · cols,): Bit 1 of cells that are lit, bit 2 of those whose neighbours are, too
+
+    @classmethod
+    def none(cls) -> "Beams":
+        """No head lamp."""
+        return cls(np.zeros((0, 9)), np.zeros(0, np.int64), np.zeros((0, 2, 3)), 1.0, np.zeros(0, np.uint8))
 
 
 class GroundLight(NamedTuple):
@@ -30,6 +49,7 @@ class GroundLight(NamedTuple):
     # columns to the east
     illuminance: NDArray[np.float32]
     tops: NDArray[np.float32]
+    beams: Beams
 
 
 class EyeOnMap(NamedTuple):
@@ -96,27 +116,90 @@ def _any_near(distance: NDArray[np.float32]) -> bool:
 
 
 @kernel
+def _places_on_map(
+    count: np.uint64, points: NDArray[np.float32], eye: EyeOnMap, ground: GroundLight, places: NDArray[np.float32]
+) -> None:
+    """Columns and rows of a map (2, n) that chosen pixels see, at `points` (3, n) from the eye; -1 outside the map."""
+    last_row, last_column = np.float32(ground.tops.shape[0] - 1.001), np.float32(ground.tops.shape[1] - 1.001)
+    east, north, per_metre, x, y = points[0], points[1], eye.cells_per_metre, places[0], places[1]
+    for n in range(count):
+        column, row = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
+        is_inside = (column >= _ZERO) & (column < last_column) & (row >= _ZERO) & (row < last_row)
+        x[n], y[n] = column if is_inside else -_ONE, row
+
+
+@kernel
+def _cells_to_light(
+    count: np.uint64, places: NDArray[np.float32], columns: int, known: NDArray[np.uint8], cells: NDArray[np.uint32]
+) -> int:
+    """Find the cells about chosen pixels' places that are not lit yet (2, n); their count."""
+    x, y, found, width, before = places[0], places[1], np.uint64(0), np.uint32(columns), np.uint32(known.shape[0])
+    for n in range(count):
+        if x[n] < _ZERO:
+            continue
+        column, row = np.uint32(x[n]), np.uint32(y[n])
+        first = np.uint32(row * width + column)
+        if first == before or known[first] & _SURROUNDED:
+            continue
+        before = first
+        known[first] |= _SURROUNDED
+        for corner in range(4):
+            right, up = np.uint32(corner & 1), np.uint32(corner >> 1)
+            cell = first + right + up * width
+            if not known[cell] & _LIT:
+                known[cell] |= _LIT
+                cells[0, found], cells[1, found] = column + right, row + up
+                found += np.uint64(1)
+    return int(found)
+
+
+@kernel
+def _light_cells(cells: NDArray[np.uint32], count: int, beams: Beams, ground: GroundLight) -> None:
+    """Set the illuminance of cells by beams, and how high up what stands there is lit: as high as lamps there."""
+    illuminance, tops, step = ground.illuminance, ground.tops, beams.step
+    ahead, half = beams.patterns.shape[1] - 1, (beams.patterns.shape[2] - 1) // 2
+    for n in range(count):
+        illuminance[cells[1, n], cells[0, n]], tops[cells[1, n], cells[0, n]] = _ZERO, -np.inf
+    for i in range(beams.lamps.shape[0]):
+        lamp, pattern = beams.lamps[i], beams.patterns[beams.pattern[i]]
+        x0, y0, cosine, sine, lit, square = lamp[0], lamp[1], lamp[2], lamp[3], lamp[4], lamp[5]
+        loss, height, rise = lamp[6], lamp[7], lamp[8]
+        for n in range(count):
+            column, row = cells[0, n], cells[1, n]
+            along = (column - x0) * cosine + (row - y0) * sine
+            across = (column - x0) * sine - (row - y0) * cosine + half
+            if not (0.0 < along < ahead and 0.0 < across < 2 * half):
+                continue
+            a, b = int(along), int(across)
+            down, right = along - a, across - b
+            near = pattern[a, b] + (pattern[a, b + 1] - pattern[a, b]) * right
+            far = pattern[a + 1, b] + (pattern[a + 1, b + 1] - pattern[a + 1, b]) * right
+            way = math.sqrt(square + step**2 * (along**2 + (across - half) ** 2))
+            illuminance[row, column] += np.float32(lit * (near + (far - near) * down) * math.exp(loss * way))
+            # Light fades from the height of the lamps to a metre above it.
+            tops[row, column] = max(tops[row, column], np.float32(height + rise * along + 1.0))
+
+
+@kernel
 def _read_map(
     count: np.uint64,
-    points: NDArray[np.float32],
+    places: NDArray[np.float32],
+    above: NDArray[np.float32],
     eye: EyeOnMap,
     ground: GroundLight,
     light: NDArray[np.float32],
 ) -> bool:
-    """Illuminance of what chosen pixels see, at `points` (3, n) from the eye, none above the lamps; if there is any."""
-    illuminance, tops, eye_height = ground.illuminance, ground.tops, eye.height
-    last_row, last_column = np.float32(illuminance.shape[0] - 1.001), np.float32(illuminance.shape[1] - 1.001)
-    east, north, up, per_metre = points[0], points[1], points[2], eye.cells_per_metre
+    """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any."""
+    illuminance, tops, eye_height, x, y = ground.illuminance, ground.tops, eye.height, places[0], places[1]
     any_light = False
     for n in range(count):
-        x, y = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
         light[n] = _ZERO
-        if not (_ZERO <= x < last_column and _ZERO <= y < last_row):
+        if x[n] < _ZERO:
             continue
-        value = bilinear(illuminance, y, x)
+        value = bilinear(illuminance, y[n], x[n])
         if value > _ZERO:
-            top = tops[np.uint32(y), np.uint32(x)]
-            light[n] = value * min(max(top - (eye_height + up[n]), _ZERO), _ONE)
+            top = tops[np.uint32(y[n]), np.uint32(x[n])]
+            light[n] = value * min(max(top - (eye_height + above[n]), _ZERO), _ONE)
             any_light = True
     return any_light
 
@@ -160,6 +243,8 @@ def add_street_light(
     pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
     lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
+    beams, places = ground.beams, np.empty((2, columns), np.float32)
+    cells = np.empty((2, 4 * columns), np.uint32)
     fill_channels(reflection.factor, channels)
     for v in range(top, bottom):
         any_light = False
@@ -168,7 +253,11 @@ def add_street_light(
                 length[u] = min(distance[v, u], _FARTHEST)
             n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
             row_points(n, ray_map, v, pixel, chosen, points)
-            any_light = _read_map(n, points, eye, ground, few)
+            _places_on_map(n, points, eye, ground, places)
+            if len(beams.lamps):
+                found = _cells_to_light(n, places, ground.tops.shape[1], beams.known, cells)
+                _light_cells(cells, found, beams, ground)
+            any_light = _read_map(n, places, points[2], eye, ground, few)
         if any_light:
             spread_over_row(few, step, first, even, light)
             repeat_channels(light, lit)
@@ -279,6 +368,6 @@ def _map_of(
 ) -> _Map:
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
-    light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops)
+    light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops, Beams.none())
     _add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
     return _Map(lamps, middle, dense, light)

@@ -105,9 +105,10 @@ def road_beams(
     if not found:
         return None
     rows, heights, numbers, scales = (np.array(column) for column in zip(*found, strict=True))
-    up = np.stack((np.zeros(len(rows)), np.zeros(len(rows)), heights), axis=1)
+    position = state.position[rows]
+    position[:, 2] += heights
     return RoadBeams(
-        position=state.position[rows] + up,
+        position=position,
         heading=state.heading[rows],
         grade=state.grade[rows],
         height=heights,

@@ -210,7 +210,7 @@ class TrafficState:
 
 def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
     """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad]."""
-    pieces = np.flatnonzero(state.pieces.row == row) if state.pieces.kind else ()
+    pieces = np.flatnonzero(state.pieces.row == row) if state.pieces.kind else state.pieces.row
     if len(pieces):
         last = int(pieces[-1])
         front, heading, length = state.pieces.position[last], state.pieces.heading[last], state.pieces.length[last]

@@ -210,9 +210,9 @@ class TrafficState:
 
 def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
     """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad]."""
-    pieces = np.flatnonzero(state.pieces.row == row).tolist() if state.pieces.kind else []
-    if pieces:
-        last = pieces[-1]
+    pieces = np.flatnonzero(state.pieces.row == row) if state.pieces.kind else state.pieces.row
+    if len(pieces):
+        last = int(pieces[-1])
         front, heading, length = state.pieces.position[last], state.pieces.heading[last], state.pieces.length[last]
     else:
         front, heading, length = state.position[row], state.heading[row], state.length[row]

@@ -175,8 +175,9 @@ class UpdateSchedule:
 
     def _due_at(self, time: float) -> list[str]:
         """Those who wait with who waits until a time."""
-        following, batch = self._current + 1, self._batch
-        number = max(self._number(time), following)
+        # As `_number` does, without a call for each.
+        number, following, batch = (time / self._step + _ROUNDING) // 1.0, self._current + 1, self._batch
+        number = number if number > following else following
         return self._due[number - number % batch if number - following >= batch - 1 else number]
 
     def bring_forward(self, vehicle: str) -> None:

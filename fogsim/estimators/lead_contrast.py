@@ -1,6 +1,8 @@
 """Fog from how the contrast of the tracked vehicle ahead falls with its range."""
 
 import math
+import operator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -227,6 +229,7 @@ class LeadContrast:
         self._ranges = SmoothedRanges(self._range_deviation)
         self._track = ContrastTrack(self._ranges, self._pitch_deviation, self._window, self._frames)
         self._last: tuple[float, LeadMeasurement] | None = None
+        self._fitted: tuple[Floats, tuple[RearDetection, ...], DecayFit | None] = np.zeros(0), (), None
 
     def update(self, observation: Observation) -> Estimate:
         """Add one look at the vehicle ahead and estimate the fog from all of the track.
@@ -303,7 +306,15 @@ class LeadContrast:
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
     def _fit(self, distance: Floats) -> DecayFit | None:
-        track = self._track.detections
+        """Fit to the track; most frames leave it as it was when the frame came."""
+        track, (before, known, fit) = self._track.detections, self._fitted
+        is_known = len(known) == len(track) and all(map(operator.is_, known, track))
+        if not is_known or not np.array_equal(before, distance):
+            fit = self._fit_to(track, distance)
+            self._fitted = distance, tuple(track), fit
+        return fit
+
+    def _fit_to(self, track: Sequence[RearDetection], distance: Floats) -> DecayFit | None:
         if len(track) < _MIN_SAMPLES or [one.alike for one in track].count(True) < _MIN_ALIKE:
             return None
         looks = [(one.contrast.ratio, one.contrast.deviation, one.contrast.lever) for one in track]

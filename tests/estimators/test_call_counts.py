@@ -15,7 +15,7 @@ FRAMES, PERIOD, NEAREST, SPEED = 20, 0.1, 20.0, 5.0
 """Frames that count, their period [s], first range of the vehicle ahead [m], and how fast it leaves [m/s]."""
 
 
-@pytest.mark.parametrize(("method", "most"), [("joint_road", 900), ("lead_contrast", 1100), ("negru2013", 750)])
+@pytest.mark.parametrize(("method", "most"), [("joint_road", 630), ("lead_contrast", 1000), ("negru2013", 400)])
 def test_few_python_calls_are_made_a_frame(render, road, method: str, most: int) -> None:
     """The first run compiles what is not compiled yet; the second one counts."""
     estimator, observations = make(method, CAMERA), []

@@ -15,7 +15,7 @@ from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import quantile
-from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
+from fogsim.vision.light.pixel_kernels import LinearPixels, row_luminance
 from fogsim.vision.lines.horizon import Horizon
 
 _BLOCKS = 80
@@ -94,12 +94,13 @@ def _block_means(
     image: LinearPixels, first: int, end: int, width: int, blocks: NDArray[np.int64]
 ) -> NDArray[np.float32]:
     """Mean luminance of rows of some blocks of so many columns (rows, blocks)."""
-    means = np.empty((end - first, blocks.size), np.float32)
+    means, line = np.empty((end - first, blocks.size), np.float32), np.empty(image.pixels.shape[1], np.float32)
     for row in range(first, end):
+        row_luminance(image.pixels, image.tables, row, line)
         for i in range(blocks.size):
             total = 0.0
-            for col in range(blocks[i] * width, (blocks[i] + 1) * width):
-                total += pixel_luminance(image, row, col)
+            for value in line[blocks[i] * width : (blocks[i] + 1) * width]:
+                total += value
             means[row - first, i] = total / width
     return means
 

@@ -67,10 +67,9 @@ def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
 def part_luminance(image: LinearPixels, first: int, end: int, step: int, left: int, right: int) -> NDArray[np.float32]:
     """Luminance of every so many rows, and of columns up to the right one [linear grey levels]."""
     rows, cols = max((end - first + step - 1) // step, 0), max(right - left, 0)
-    out = np.empty((rows, cols), np.float32)
+    out, part = np.empty((rows, cols), np.float32), image.pixels[:, left : left + cols]
     for row in range(rows):
-        for col in range(cols):
-            out[row, col] = pixel_luminance(image, first + row * step, left + col)
+        row_luminance(part, image.tables, first + row * step, out[row])
     return out
 
 

@@ -173,6 +173,18 @@ def test_what_attach_is_given(libsumo: Any) -> None:
         fogsim.attach(libsumo, scenario=fogsim.load_scenario("motorway_fog_bank", alone))
 
 
+def test_settings_of_roads_and_vehicles_are_those_of_the_simulation_that_runs(libsumo: Any) -> None:
+    road, vehicles = "road={template: motorway}", "demand={same_way_vph: 500}"
+    alone: dict[str, Any] = {"ego": EGO, "visibility": 100.0}
+    for given, settings, key in (
+        (alone, [road], "road"),
+        ({"scenario": fogsim.load_scenario("patchy_fog")}, [vehicles], "demand"),
+    ):
+        with pytest.raises(InputError, match=f"attach: {key}: roads and vehicles are those of the simulation"):
+            fogsim.attach(libsumo, settings=settings, **given)
+    fogsim.attach(libsumo, scenario=fogsim.load_scenario("patchy_fog"), ego=EGO).close()
+
+
 def test_what_is_no_simulation() -> None:
     with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
         fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)

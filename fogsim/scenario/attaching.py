@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Iterable
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +18,10 @@ from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, tra
 
 _DECISION_PERIOD = 0.5
 """Time between two decisions, as far as the simulation's step allows [s]."""
+
+_FILES = tuple(f"traffic.{key}" for key in ("config", "net", "routes", "additional"))
+_OF_THE_SIMULATION = ("road", "demand", "actors", *_FILES)
+"""Keys that a simulation that runs decides itself."""
 
 
 @checked_parameters
@@ -112,6 +117,7 @@ def attach(
         If no simulation runs there.
     """
     fog = [] if visibility is None else [f"fog.visibility_m={float(visibility)!r}"]
+    given = scenario
     if scenario is not None:
         # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
         clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
@@ -120,6 +126,10 @@ def attach(
         raise InputError("attach: ego is missing: which vehicle is the ego?")
     else:
         scenario = attached_scenario(ego, [*_clocks(step_length(api)), *fog, *settings])
+    for key in _OF_THE_SIMULATION:
+        now, before = (None if one is None else attrgetter(key)(one) for one in (scenario, given))
+        if now and now != before:
+            raise InputError(f"attach: {key}: roads and vehicles are those of the simulation that runs; leave it out")
     config = scenario.run_config()
     setup = dataclasses.replace(
         config.traffic,

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
-from llvmlite.binding import ModuleRef  # type: ignore[import-untyped]
+from llvmlite.binding import ModuleRef, create_new_function_pass_manager  # type: ignore[import-untyped]
 from numba.core import caching, codegen
 from numba.core.environment import lookup_environment
 
@@ -103,9 +103,14 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
             super()._optimize_functions(ll_module)
             return
         ll_module.data_layout = self._codegen._data_layout
+        builder, passes = self._codegen._pass_builder(opt=1), create_new_function_pass_manager()
+        passes.add_sroa_pass()
+        passes.add_simplify_cfg_pass()
+        passes.add_instruction_combine_pass()
+        passes.add_simplify_cfg_pass()
+        passes.add_refprune_pass()
         for function in ll_module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager(opt=1)
                 passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
@@ -115,10 +120,9 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
             self._optimize_linked()
 
     def _optimize_linked(self) -> None:
-        """As numba does, but at level 2: level 3 makes nothing faster here, and takes longer."""
-        for options in ({"loop_vectorize": False, "slp_vectorize": False, "opt": 0, "cost": "cheap"}, {"opt": 2}):
-            passes, builder = self._codegen._module_pass_manager(**options)
-            passes.run(self._final_module, builder)
+        """As numba does, but once and at level 2: more makes nothing faster here, and takes longer."""
+        passes, builder = self._codegen._module_pass_manager(opt=2)
+        passes.run(self._final_module, builder)
 
     def _is_linked_only(self) -> bool:
         return self.deferring and not any(

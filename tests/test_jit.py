@@ -35,6 +35,19 @@ def answer(x):
     return middle(x) + FACTOR
 """
 
+CALLED_LATER = """
+from fogsim.core.jit import kernel
+from {called} import FACTOR, twice
+
+@kernel
+def answer(x):
+    return middle(x)
+
+@kernel
+def middle(x):
+    return twice(x) + FACTOR
+"""
+
 ASK = "from caller import answer; print(answer(10.0), answer.__name__, sum(answer.stats.cache_hits.values()))"
 
 
@@ -50,9 +63,12 @@ def ask(folder: Path) -> list[str]:
     return run_python("-c", ASK, environment=environment).stdout.split()
 
 
-def test_what_one_process_compiled_the_next_one_loads_until_a_source_that_is_called_changes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("caller", [CALLER, CALLED_LATER])
+def test_what_one_process_compiled_the_next_one_loads_until_a_source_that_is_called_changes(
+    tmp_path: Path, caller: str
+) -> None:
     """Neither numba's stamp of the caller's own file nor its time says that a module it calls has changed."""
-    (tmp_path / "caller.py").write_text(CALLER.format(called="called"))
+    (tmp_path / "caller.py").write_text(caller.format(called="called"))
     write(tmp_path, 2.0, 1.0)
     assert ask(tmp_path) == ["21.0", "answer", "0"]
     assert ask(tmp_path) == ["21.0", "answer", "1"]

@@ -11,7 +11,7 @@ import logging
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -232,25 +232,53 @@ def _look_elsewhere(compiled: Any) -> None:
 
 
 def _fingerprint(function: FunctionType) -> str:
-    """Digest of all that is compiled into a function besides its own source."""
-    return hashlib.sha256("\n".join(_compiled_in(function, set())).encode()).hexdigest()[:12]
+    """Digest of all that may be compiled into a function besides its own module.
+
+    What its module defines further down may be called, too: so all counts that the module has imported.
+    """
+    seen = function.__globals__
+    return _digest_of(text for name in seen for text in _compiled_in(name, seen[name], seen))
 
 
-def _compiled_in(function: FunctionType, seen: set[FunctionType]) -> Iterator[str]:
-    """Sources of the kernels that a function calls and of the modules that it names, and the constants it uses."""
-    seen.add(function)
-    for name in function.__code__.co_names:
-        value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None)
-        if called is not None and called not in seen:
-            yield _digest(called.__code__.co_filename)
-            yield from _compiled_in(called, seen)
-        elif isinstance(value, ModuleType) and value.__name__.startswith(f"{_FOGSIM}."):
+@functools.cache
+def _sources(function: FunctionType) -> str:
+    """Digest of the module of a function, which has been imported, and of all that is compiled into the function."""
+    names, known, pending = function.__globals__, {function}, [function]
+    found = [_digest(function.__code__.co_filename)]
+    for one in pending:  # grows on the way
+        for name in one.__code__.co_names:
+            called = getattr(names.get(name), "py_func", None)
+            if called is None or called.__globals__ is not names:
+                found += _compiled_in(name, names.get(name), names)
+            elif called not in known:
+                known.add(called)
+                pending.append(called)
+    return _digest_of(found)
+
+
+def _compiled_in(name: str, value: object, names: Mapping[str, Any]) -> Iterator[str]:
+    """Sources of what a module sees by a name, or its value, if kernels use that; nothing for the module's own."""
+    called = getattr(value, "py_func", None)
+    if called is not None:
+        if called.__globals__ is not names:
+            yield _sources(called)
+    elif isinstance(value, ModuleType):
+        if value.__name__.startswith(f"{_FOGSIM}."):
             yield _digest(str(value.__file__))
-        elif isinstance(value, np.ndarray):
-            yield f"{name} {value.dtype} {value.tobytes().hex()}"
-        elif isinstance(value, int | float | complex | str | tuple | np.generic):
-            yield f"{name} {value!r}"
+    elif isinstance(value, np.ndarray):
+        yield f"{name} {value.dtype} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    elif not name.startswith("__") and _is_constant(value):
+        yield f"{name} {value!r}"
+
+
+def _digest_of(texts: Iterable[str]) -> str:
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:12]
+
+
+def _is_constant(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_constant, value))
+    return isinstance(value, int | float | complex | str | np.generic)
 
 
 @functools.cache

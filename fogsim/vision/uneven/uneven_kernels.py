@@ -302,9 +302,8 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
                 continue
             # Optical depth never falls with distance.
             top = max(top, min(median_among(depth[:seen]), _DEEPEST))
-            distance = bins.path[0, i] / rows
-            cell = _before(nodes, distance)
-            sums[cell, 0] += distance
+            cell = _before(nodes, bins.path[0, i] / rows)
+            sums[cell, 0] += bins.path[0, i] / rows
             sums[cell, 1] += top
             counts[cell] += 1.0
         distance, before, known = 0.0, 0.0, False

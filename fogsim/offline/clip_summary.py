@@ -87,7 +87,7 @@ def _summary(readings: list[Reading]) -> Iterator[str]:
         yield f"at the end     no estimate: {readings[-1].reason or 'no valid estimate in the last second'}"
     if valid:
         low, middle, high = np.quantile([min(one.visibility, ENDLESS) for one in valid], (0.05, 0.5, 0.95))
-        yield f"over {length:.1f} s    median {metres(middle)}, 9 of 10 frames within {span_text(low, high)}"
+        yield f"{f'over {length:.1f} s':15}median {metres(middle)}, 9 of 10 frames within {span_text(low, high)}"
         yield f"               {_blocks(readings)}  {_NEAREST:.0f} m … {FARTHEST:.0f} m, log scale"
     yield f"valid          {len(valid)} of {len(readings)} frames"
     reasons = Counter(one.reason for one in readings if one.reason)

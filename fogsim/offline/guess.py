@@ -238,8 +238,8 @@ def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | N
     degrees = math.degrees(_ASSUMED_FIELD_OF_VIEW)
     warning = (
         f"the lens is not known: its field of view is assumed to be {degrees:g}° along the longer side, and intervals "
-        f"have room for {_FIELDS_OF_VIEW}, since every visibility goes with the focal length: look the angle from left "
-        "to right up and give it as --field-of-view"
+        f"have room for {_FIELDS_OF_VIEW}, since every visibility goes with the focal length: look up its angle from "
+        "left to right and give it as --field-of-view"
     )
     # A camera that is held upright keeps its focal length.
     focal = 0.5 * max(cols, rows) / math.tan(0.5 * _ASSUMED_FIELD_OF_VIEW)

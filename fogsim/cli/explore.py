@@ -11,6 +11,8 @@ from fogsim.cli.printing import escape, stderr, stdout
 from fogsim.cli.progress import SimulationProgress
 from fogsim.cli.scenario_options import SCENARIO_HELP, Settings, chosen_scenario
 
+_NIGHT = 0.1  # lx
+
 
 def explore_command(
     scenario: Annotated[str, typer.Argument(help=SCENARIO_HELP)],
@@ -35,8 +37,10 @@ def explore_command(
                     raise InputError(f"--at {at:g}: the run ends after {step.time:g} s ({step.ending.value})")
                 step = explorer.drive.advance()
                 progress.show(step)
-            # The first look builds the scene.
+            # The first looks by day and by night take longer than all later ones.
             explorer.answer(Question(at))
+            with contextlib.suppress(InputError):
+                explorer.answer(Question(at, chosen={"light": _NIGHT}, soon=True))
         stdout.print(f"{escape(loaded.name)}: {server.url}#{at:g}   (Ctrl-C ends)", soft_wrap=True)
         # Where there is no display, a browser would take the terminal.
         if not no_browser and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):

@@ -39,9 +39,6 @@ _HEADERS = {
 _Job = tuple[Question, Callable[[], bool], Future[dict[str, Any] | None]]
 
 
-_NIGHT = 0.1  # lx
-
-
 class PageServer(ThreadingHTTPServer):
     """Serves the page; questions wait in `jobs` until the main thread answers, as methods' time limits need."""
 
@@ -129,8 +126,6 @@ class _Handler(BaseHTTPRequestHandler):
 def serve(server: PageServer, explorer: Explorer) -> None:
     """Answer questions until interrupted; in between the drive is recorded on, so that later moments are ready."""
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    # The first look by night takes longer than all later ones.
-    server.jobs.put((Question(chosen={"light": _NIGHT}, soon=True), lambda: False, Future()))
     try:
         while True:
             try:

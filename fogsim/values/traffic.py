@@ -1,6 +1,5 @@
 """Where every vehicle and person is at one instant, and what the traffic lights show."""
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -260,8 +259,7 @@ def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np
 
     Takes `heard` [m/s].
     """
-    spoken = map(heard.get, ids, itertools.repeat(np.inf)) if heard else ()
-    return np.fromiter(spoken, np.float64)
+    return np.fromiter([heard.get(vehicle, np.inf) for vehicle in ids] if heard else (), np.float64)
 
 
 @dataclass(frozen=True, slots=True)

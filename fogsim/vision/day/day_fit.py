@@ -293,7 +293,7 @@ class _Grid:
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
-        laws = np.stack([LIGHTS.mean, LIGHTS.deviation])[:, lights]
+        laws = np.stack([LIGHTS.mean[lights], LIGHTS.deviation[lights]])
         laws[1, :, AIRLIGHT] *= _CLIPPED_AIRLIGHT if self.rows.least_airlight.any() else 1.0
         cuts = self.rows.cuts.size - 1 if lights is _ALL else 0
         out = np.empty((len(cells), len(tried), lights.size + cuts))

@@ -285,7 +285,10 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
     place = np.clip(signal, 0.0, 1.0) * (_POINTS - 1)
     low = np.minimum(place.astype(np.int64), _POINTS - 2)
     share = place - low
-    light, slope = (table[:, low] * (1.0 - share) + table[:, low + 1] * share for table in (curves.light, curves.slope))
+    light, slope = (
+        table.take(low, axis=1) * (1.0 - share) + table.take(low + 1, axis=1) * share
+        for table in (curves.light, curves.slope)
+    )
     noise = np.sqrt(_NOISE**2 + (_OF_SCATTER * scatter) ** 2 + (_OF_SLOPE * by_row) ** 2)
     clipped = signal > _CLIPPED
     level = np.maximum(np.quantile(light, _BRIGHTEST, axis=1), _LEAST_LEVEL)

@@ -334,8 +334,9 @@ def _why_not(observation: Observation, lit: Lamp, light: float) -> str:
 def _sample(own: OwnLight, extinction: Floats, *every: int) -> _Sample:
     """Extinctions, veil, road and depth of some draws and visibilities."""
     draws, places = (slice(None, None, step) for step in every)
-    veil, road = (np.ascontiguousarray(one[draws, places]) for one in (own.veil, own.road))
-    return extinction[places], veil, road, np.ascontiguousarray(own.depth[draws])
+    chosen = extinction[places], own.veil[draws, places], own.road[draws, places], own.depth[draws]
+    extinctions, veil, road, depth = map(np.ascontiguousarray, chosen)
+    return extinctions, veil, road, depth
 
 
 def _with_likely_glows(measured: Measured, sample: _Sample, variance: Floats) -> Measured:

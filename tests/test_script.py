@@ -145,3 +145,16 @@ def test_a_condition_has_no_truth_so_that_none_is_lost() -> None:
     for mistake in lossy:
         with pytest.raises(InputError, match="only in a run; use all_of, any_of and negated"):
             mistake()
+
+
+@pytest.mark.parametrize(
+    ("block", "message"),
+    [
+        (lambda: fs.Fog(visibilty_m=80), "^Fog: visibilty_m: unknown key; did you mean 'visibility_m'"),
+        (lambda: fs.Expectation(always=False), "^Expectation: always: expected a condition .*, got False$"),
+        (lambda: fs.Fog(banks=[{"start_m": 0, "end_m": 9}]), r"^Fog: banks\.0\.visibility_m: this key is missing"),
+    ],
+)
+def test_a_mistake_in_a_block_is_reported_as_in_a_file(block: Callable[[], object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        block()

@@ -40,7 +40,7 @@ class Positions:
     def on_lanes(self, position: Node, *, is_of_vehicle: bool = True) -> Spot:
         """Place of a ``Position`` on the lanes; ValueError if it has none, or a vehicle cannot stand so there."""
         one, found = self._found(position)
-        spot = found if isinstance(found, Spot) else self.lanes.at(*found)
+        spot = found if isinstance(found, Spot) else self.lanes.at(*found, one.get("roadId"), self._height(one))
         lane = spot.world[2]
         heading = self._heading(one, lane)
         if is_of_vehicle and heading is not None and math.cos(heading - lane) < ALONG:
@@ -106,6 +106,13 @@ class Positions:
             raise ValueError(f"{message}; positions are {', '.join(POSITIONS)}")
         place: Spot | Point = POSITIONS[one.tag](self, one)
         return one, place
+
+    def _height(self, node: Node) -> float | None:
+        """Height by a world position, or that of the entity to which a position is relative [m]; None if unknown."""
+        if "z" in node.attributes:
+            return node.number("z")
+        spot = self.spots.get(node.get("entityRef"))
+        return spot.height if spot else None
 
     def _place_of(self, node: Node) -> Spot:
         """Place of the entity to which an element refers; ValueError if it has none, or is elsewhere by then."""

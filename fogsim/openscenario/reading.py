@@ -134,7 +134,9 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     entries = story.timeline()
     stop = story.triggers.trigger(storyboard.one("StopTrigger"))
     way = [one for edge in route for one in lanes.lanes if one.edge == edge and one.index == 0]
-    fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
+    fog = fog_block(
+        begin.environment, np.concatenate([one.shape for one in way]), min(float(one.heights.min()) for one in way)
+    )
     if begin.environment.box and not fog["banks"]:
         root.remark("the BoundingBox of the fog lies next to the ego's route: the air is clear there")
     if ego not in {*begin.orders, *begin.aims} and any(one.tag in _CONTROLLERS for one in root.walk()):

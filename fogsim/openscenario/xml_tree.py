@@ -42,7 +42,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "SynchronizeAction@targetTolerance": "it arrives where and when it is to, within a step",
         "Wind": "even fog does not drift, and boxes of fog stand still",
         "Weather@atmosphericPressure Weather@temperature": "FogSim's light and fog do not depend on them",
-        "WorldPosition@z WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz "
+        "WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz "
         "Orientation@p Orientation@r": "these follow from the road",
         "SpeedActionDynamics@followingMode LaneChangeActionDynamics@followingMode": "dynamics are followed exactly",
         "DynamicConstraints": "FogSim's law of following has limits of its own",

@@ -10,8 +10,10 @@ from pydantic_core import ErrorDetails
 from fogsim.errors import nearest, printable, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
-from fogsim.scenario.section import MISTAKE
 from fogsim.units.quantities import UNIT_OF_SUFFIX, example_of, split_quantity
+
+MISTAKE = "parameter"
+"""Type of the errors of parameters, whose messages are complete."""
 
 _MOST_LISTED = 50
 """Maximum number of mistakes that are listed one by one."""
@@ -123,7 +125,8 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
     if isinstance(value, dict | BaseModel):
         # A message about a whole block names its values itself.
         return f"{message}; got a block of keys" if detail["type"].endswith("_type") else message
-    return f"{message}; got {shown(value)}{_plain_number(one.path, value)}"
+    got = f"got {shown(value)}"
+    return message if got in message else f"{message}; {got}{_plain_number(one.path, value)}"
 
 
 def _unknown_key(key: str, known: Sequence[str], value: object) -> str:

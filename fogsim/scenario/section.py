@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
     AfterValidator,
@@ -32,6 +32,8 @@ from fogsim.core.parameters import parameter_mistakes, paths_in
 from fogsim.core.registry import Registry
 from fogsim.core.registry.user_code import import_anything
 from fogsim.errors import InputError, is_name
+from fogsim.scenario.mistakes import MISTAKE, mistakes_in
+from fogsim.scenario.plain_yaml import dotted
 from fogsim.units.quantities import is_quantity, parse_quantity
 
 FARTHEST = 1e6
@@ -148,7 +150,21 @@ RoadEnd = Annotated[float, _endless(0.0), BeforeValidator(_infinity), AfterValid
 """A place along a road [m]; inf is where it ends."""
 
 
-class Section(BaseModel):
+class _Block(type(BaseModel)):  # type: ignore[misc] - pydantic has no public name for it
+    """Reports mistakes of blocks that are made in Python, as the files' are."""
+
+    if not TYPE_CHECKING:  # Type checkers take arguments from the fields.
+
+        def __call__(cls, *arguments: Any, **values: Any) -> Any:
+            try:
+                return super().__call__(*arguments, **values)
+            except ValidationError as error:
+                found = mistakes_in(cls, error, values)
+            lines = [": ".join((cls.__name__, *([dotted(path)] if path else []), text)) for path, text in found]
+            raise InputError("\n".join(lines))
+
+
+class Section(BaseModel, metaclass=_Block):
     """A block of a scenario file: unknown keys are errors, values never change."""
 
     # Built on first use: at import, each of a hundred blocks would be built for itself.
@@ -187,9 +203,6 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})
 """Constructor arguments that the loop passes, so that no scenario sets them."""
-
-MISTAKE = "parameter"
-"""Type of the errors of parameters, whose messages are complete."""
 
 
 class Method(Section):

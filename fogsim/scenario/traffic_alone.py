@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from fogsim.scenario.mistakes import MISTAKE
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.section import MISTAKE
 
 NO_EGO = "none"
 """Placeholder for the id of a missing ego."""

@@ -7,8 +7,8 @@ from pydantic import PlainSerializer, PlainValidator, ValidationError, WithJsonS
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fogsim.conditions import Condition, parse_condition
+from fogsim.scenario.mistakes import MISTAKE
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.section import MISTAKE
 
 _SCHEMA = {"format": "condition", "anyOf": [{"type": "string"}, {"type": "object"}, {"type": "array"}]}
 

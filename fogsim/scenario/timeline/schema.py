@@ -15,9 +15,8 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fogsim.scenario.expect.conditions import WrittenCondition
-from fogsim.scenario.mistakes import mistakes_in
+from fogsim.scenario.mistakes import MISTAKE, mistakes_in
 from fogsim.scenario.section import (
-    MISTAKE,
     Id,
     Number,
     Period,

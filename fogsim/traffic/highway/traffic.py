@@ -60,6 +60,10 @@ def _approach(one: Any, other: Any) -> float:
     return float(matrix_product(one.velocity, other.position - one.position))
 
 
+_IDM = {"DISTANCE_WANTED": (10.0, 7), "COMFORT_ACC_MAX": (3.0, 6), "COMFORT_ACC_MIN": (-5.0, -3)}
+"""Constants of highway-env's IDM, and those that its intersections set for every environment of the process."""
+
+
 class OtherRoadsError(SimulationError):
     """The environment has built other roads than before, or sends the ego another way: all has to be drawn again."""
 
@@ -120,10 +124,16 @@ class HighwayTraffic:
 
     def start(self, seed: int) -> None:
         """Reset the environment."""
+        if all(getattr(IDMVehicle, name) == changed for name, (_, changed) in _IDM.items()):
+            for name, (value, _) in _IDM.items():
+                setattr(IDMVehicle, name, value)
         self._environment.reset(seed=seed)
         if self._environment.vehicle is None:
             raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
         self._fleet = Fleet(self._environment, _driver_for(self._environment))
+        for vehicle in self._environment.road.vehicles:
+            if isinstance(vehicle, IDMVehicle):
+                vars(vehicle).update({name: getattr(vehicle, name) for name in _IDM})
         self._collisions = CollisionLog()
         self._control = control_drivers(
             self._fleet, self._drivers, self._events, seed, self._advice_deceleration, self._sight

@@ -19,6 +19,7 @@ _FARTHEST_ROUTE, _LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
 _ROUNDING = 0.01  # of places across a lane [m]
+_STOREY = 2.0  # by which the heights of a road's lanes differ at most [m]
 _NEAR_JUNCTION = 2.0
 """Distance by which a place inside a junction is moved to its end [m]."""
 
@@ -30,7 +31,7 @@ _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
 class _RoadLane:
     """A lane by edge and index from the right: length, width [m], limit [m/s] and middle (n, 2) [m].
 
-    `lowest` is the height of its lowest point [m]; `origins` are OpenDRIVE's ``road_lane``, several where they form one
+    `heights` are those of the middle's points [m]; `origins` are OpenDRIVE's ``road_lane``, several where they form one
     edge.
     """
 
@@ -40,7 +41,7 @@ class _RoadLane:
     width: float
     limit: float
     shape: NDArray[np.float64]
-    lowest: float
+    heights: NDArray[np.float64]
     origins: tuple[str, ...]
 
 
@@ -63,6 +64,12 @@ class Spot:
         left = along - (ends[piece] - lengths[piece])
         (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / lengths[piece]
         return float(x + left * dx - self.offset * dy), float(y + left * dy + self.offset * dx), math.atan2(dy, dx)
+
+    @property
+    def height(self) -> float:
+        """Height of the lane there [m]."""
+        ends = np.cumsum([0.0, *np.hypot(*np.diff(self.lane.shape, axis=0).T)])
+        return float(np.interp(self.position / self.lane.length * ends[-1], ends, self.lane.heights))
 
     def shifted(self, offset: float) -> "Spot":
         """The place so far to the left of the lane's middle [m]; ValueError if it is not in the lane."""
@@ -147,15 +154,26 @@ class OpenDriveLanes:
         self._reference(road, s)
         return self.widths[road].middle(lane, s)
 
-    def at(self, x: float, y: float, heading: float | None) -> Spot:
-        """Place on the nearest lane that leads in the direction `heading` [rad] (None for any); ValueError if none."""
+    def at(self, x: float, y: float, heading: float | None, road: str = "", z: float | None = None) -> Spot:
+        """Place on the nearest lane that leads in the direction `heading` [rad] (None for any); ValueError if none.
+
+        Of roads on top of one another it is on `road`, or on that nearest to the height z [m].
+        """
         feet = [_foot(one, x, y) for one in self.lanes]
         fit = [(d, spot) for d, spot in feet if heading is None or math.cos(spot.world[2] - heading) > 0.0]
-        distance, spot = min(fit, key=lambda one: one[0], default=(math.inf, None))
-        if spot is None or distance > 0.5 * spot.lane.width + _ROUNDING:
-            away = "" if spot is None else f"; the nearest is {distance:.1f} m away"
+        found = [(d, spot) for d, spot in fit if d <= 0.5 * spot.lane.width + _ROUNDING]
+        if not found:
+            away = f"; the nearest is {min(d for d, _ in fit):.1f} m away" if fit else ""
             raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
-        return _aside(spot, x, y)
+        on_road = [one for one in found if road in [origin.rpartition("_")[0] for origin in one[1].lane.origins]]
+        found = on_road or found
+        heights = [spot.height for _, spot in found]
+        if z is None and max(heights) - min(heights) > _STOREY:
+            several = f"at ({x:g}, {y:g}) are roads {min(heights):.1f} m and {max(heights):.1f} m high"
+            raise ValueError(f"{several}; give z, or a position on one of them")
+        level = min(heights, key=lambda height: abs(height - (z or 0.0)))
+        near = [one for one, height in zip(found, heights, strict=True) if abs(height - level) <= _STOREY]
+        return _aside(min(near, key=lambda one: one[0])[1], x, y)
 
     def nearest(self, x: float, y: float) -> Spot | None:
         """Place on the nearest lane, whatever its direction; None off the lanes."""
@@ -346,7 +364,7 @@ def _lanes(root: Element) -> Iterator[_RoadLane]:
                 width,
                 float(lane.attrib["speed"]),
                 np.array([point[:2] for point in points], dtype=np.float64) - moved,
-                min(math.fsum(point[2:]) for point in points),
+                np.array([math.fsum(point[2:]) for point in points]),
                 tuple(origins.split()),
             )
 

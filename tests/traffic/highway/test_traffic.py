@@ -44,6 +44,17 @@ def beside(vehicle: Any, ahead: float, right: float) -> Any:
     return vehicle.position + np.array((ahead, right))
 
 
+@pytest.mark.filterwarnings("ignore:.*is out of date. You should consider upgrading:DeprecationWarning")
+def test_intersections_change_the_drivers_of_no_other_environment() -> None:
+    crossing, roads = traffic_on({"initial_vehicle_count": 4}, "intersection-v1")
+    crossing.start(1)
+    traffic, environment = traffic_on({"vehicles_count": 4})
+    traffic.start(1)
+    drivers = [[v for v in one.road.vehicles if isinstance(v, IDMVehicle)] for one in (roads, environment)]
+    wanted = [{(v.DISTANCE_WANTED, v.COMFORT_ACC_MAX, v.COMFORT_ACC_MIN) for v in those} for those in drivers]
+    assert wanted == [{(7.0, 6.0, -3.0)}, {(10.0, 3.0, -5.0)}]
+
+
 def test_a_straight_road_with_y_up() -> None:
     traffic, environment = traffic_on(EMPTY)
     traffic.start(1)

@@ -113,3 +113,19 @@ def test_without_netconvert_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(netconvert.shutil, "which", lambda *_, **__: None)
     with pytest.raises(MissingDependencyError, match=r"pip install 'fogsim\[xodr\]'"):
         opendrive_net(ROAD)
+
+
+def test_of_roads_on_top_of_one_another_the_height_or_the_road_decides(tmp_path: Path) -> None:
+    lane = '<lane id="{0}_0" index="0" speed="20" length="100" shape="0,{1},{2} 100,{1},{3}">{4}</lane>'
+    origin = '<param key="origId" value="9_-1"/>'
+    levels = lane.format("street", 0, 0, 1, ""), lane.format("bridge", 0.5, 6, 8, origin)
+    edges = (f'<edge id="{name}">{one}</edge>' for name, one in zip(("street", "bridge"), levels, strict=True))
+    net = tmp_path / "two_levels.net.xml"
+    net.write_text(f'<net><location netOffset="0,0"/>{"".join(edges)}</net>', encoding="utf-8")
+    lanes = read_opendrive_lanes("", net)
+    found = [lanes.at(50.0, 0.1, None, *where).lane.edge for where in (("", 0.0), ("", 6.0), ("", 99.0), ("9", None))]
+    assert found == ["street", "bridge", "bridge", "bridge"]
+    assert lanes.at(50.0, 0.1, None, "9").height == pytest.approx(7.0)
+    assert lanes.at(50.0, -1.4, None).lane.edge == "street"
+    with pytest.raises(ValueError, match=r"are roads 0\.5 m and 7\.0 m high; give z"):
+        lanes.at(50.0, 0.1, None)

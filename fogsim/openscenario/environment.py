@@ -180,6 +180,11 @@ class Environment:
     box: Box | None = None
     illuminance: float | None = None
 
+    def then(self, later: "Environment") -> "Environment":
+        """What holds once a later one is set, which may leave out fog or light."""
+        fog, light = (self if one is None else later for one in (later.visibility, later.illuminance))
+        return Environment(fog.visibility, fog.box, light.illuminance)
+
 
 def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
     """Fog and light of an ``EnvironmentAction``; the map may give its geographic position."""
@@ -191,7 +196,8 @@ def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> E
         fog.refuse(f"visualRange: expected 1 m or more, got {visibility:g}")
     if extent:
         centre, size = extent.need("Center"), extent.need("Dimensions")
-        box = tuple(map(centre.number, "xyz")), tuple(map(size.number, ("length", "width", "height")))
+        x, y, z = map(centre.number, "xyz")
+        box = (x + lanes.moved[0], y + lanes.moved[1], z), tuple(map(size.number, ("length", "width", "height")))
     for one in weather.all("Precipitation") if weather else ():
         falls = one.number("precipitationIntensity", one.number("intensity", 0.0))
         if one.get("precipitationType") != "dry" and falls > 0.0:
@@ -208,6 +214,8 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> flo
     elevation = _elevation(time, lanes) if time else None
     if sun and sun.get("elevation"):
         elevation = sun.number("elevation")
+        if abs(elevation) > math.pi and given is None:
+            sun.refuse(f"elevation: expected an angle in radians, from -pi to pi, got {elevation:g}")
     clear = None if elevation is None else clear_sky_illuminance(elevation)
     if sun is None or given is None:
         return None if clear is None else through_clouds(clear, clouds)

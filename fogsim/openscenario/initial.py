@@ -14,6 +14,7 @@ from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
 
+_TO_OTHER_LANES = ("LaneChangeAction", "CatalogReference")
 _STRAIGHT = 1000.0  # Way of those off the lanes in the direction in which they stand [m]
 
 
@@ -28,6 +29,7 @@ class Beginning:
     effect: Effect = field(default_factory=Effect)
     aims: dict[str, float] = field(default_factory=dict)  # Speeds that vehicles come to in the beginning [m/s]
     _distances: list[tuple[str, Node]] = field(default_factory=list)
+    _changing: set[str] = field(default_factory=set)  # Who changes lane, or may: its first one decides no way
 
     def __post_init__(self) -> None:
         self.positions, self.vehicles = self.actions.positions, self.actions.vehicles
@@ -54,6 +56,10 @@ class Beginning:
     def read(self, init: Node | None, at_once: Sequence[tuple[str, Node]] = ()) -> None:
         """Read the element ``Init``, and distances that a story orders at once."""
         blocks = init.all("Actions") if init else []
+        groups = [one for one in init.above.walk() if one.tag == "ManeuverGroup"] if init and init.above else []
+        groups = [one for one in groups if any(part.tag in _TO_OTHER_LANES for part in one.walk())]
+        actors = (one for group in groups for block in group.all("Actors") for one in block.all("EntityRef"))
+        self._changing = {*self.vehicles.selected(actors)}
         for action in (one for block in blocks for one in block.all("GlobalAction")):
             self._take_global(action)
         private = self.vehicles.known(one for block in blocks for one in block.all("Private"))
@@ -82,7 +88,11 @@ class Beginning:
         elif name in self.spots:
             try:
                 front = self.fronts[name] = self._front(vehicle)
-                self.positions.ways[name] = self.lanes.route(front.lane.edge, self.effect.routes.get(name, ()))
+                wanted = self.effect.routes.get(name, ())
+                stays = name not in self._changing and "change_lane" not in self.effect.do.get(name, {})
+                self.positions.ways[name] = self.lanes.route(
+                    front.lane.edge, wanted, front.lane.index if stays else None
+                )
             except ValueError as error:
                 vehicle.node.refuse(f"{name} cannot begin where it is to: {error}")
                 del self.spots[name]
@@ -118,7 +128,8 @@ class Beginning:
                 self.vehicles.known([one])
             elif one.tag == "EnvironmentAction":
                 with one.refusing():
-                    self.environment = environment_of(one, self.positions.catalogs, self.lanes)
+                    later = environment_of(one, self.positions.catalogs, self.lanes)
+                    self.environment = self.environment.then(later)
             else:
                 self.actions.take(action, [], self.effect)
 

@@ -147,7 +147,7 @@ class Positions:
 
     def world_position(self, node: Node) -> Point:
         """The nearest lane that leads there (by `h`, where it stands), and where in it."""
-        x, y = (node.number(key) for key in "xy")
+        x, y = (node.number(key) + moved for key, moved in zip("xy", self.lanes.moved, strict=True))
         return x, y, node.number("h") if "h" in node.attributes else None
 
     def lane_position(self, node: Node) -> Spot | Point:

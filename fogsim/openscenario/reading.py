@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -224,7 +224,10 @@ def _vehicles_text(begin: Beginning, driven: str) -> str:
             }
         # What a vehicle can do is no habit of its driver.
         habit = HABITS[vehicle.category] if name == driven else (math.inf, math.inf)
-        own = _type(vehicle, begin.aims.get(name, speed), front.lane.limit if front else math.inf, *habit)
+        limits = {front.lane.limit} if front else {math.inf}
+        if name == driven:
+            limits = {one.limit for one in begin.lanes.lanes if one.edge in ways[name]}
+        own = _type(vehicle, begin.aims.get(name, speed), limits, *habit)
         own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [
@@ -237,22 +240,23 @@ def _vehicles_text(begin: Beginning, driven: str) -> str:
     return "\n".join([*lines, "</routes>", ""])
 
 
-def _type(vehicle: Vehicle, speed: float, limit: float, most: float, hardest: float) -> dict[str, object]:
-    """Attributes of a separate type, whose driver's desired speed is the initial one.
+def _type(vehicle: Vehicle, speed: float, limits: Collection[float], most: float, hardest: float) -> dict[str, object]:
+    """Attributes of a separate type, whose driver's desired speed is the initial one, whatever the limits on its way.
 
     Its driver speeds up and brakes by `most` and `hardest` at most [m/s²].
     """
+    limit, drives = min(limits), speed > _STANDS
     return {
         # Persons and obstacles are on lanes of vehicles as well as on footways.
         "vClass": "ignoring" if vehicle.body else CLASSES[vehicle.category],
         "length": f"{vehicle.length:g}",
         "width": f"{vehicle.width:g}",
         "height": f"{vehicle.height:g}",
-        "maxSpeed": f"{vehicle.top_speed:g}",
+        "maxSpeed": f"{speed if drives and len(limits) > 1 else vehicle.top_speed:g}",
         "accel": f"{min(vehicle.acceleration, most):g}",
         "decel": f"{min(vehicle.deceleration, hardest):g}",
         "emergencyDecel": f"{vehicle.deceleration:g}",
-        "speedFactor": f"{speed / limit if speed > _STANDS and math.isfinite(limit) else 1.0:.6f}",
+        "speedFactor": f"{speed / limit if drives and math.isfinite(limit) else 1.0:.6f}",
         "speedDev": "0",
         "sigma": "0",
     }

@@ -8,8 +8,8 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, HEADER, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, polyline, profile,
-    run, speed, trajectory, world, write,
+    CAR, HEADER, PERSON, ROAD, TIMED, after, begun, event, follows, group, lane, linear, motion, motion_at, on,
+    polyline, profile, run, speed, trajectory, world, write,
 )  # fmt: skip
 
 EGO = f"{lane(30)}\n{speed(10)}"
@@ -32,6 +32,15 @@ def test_a_speed_that_is_ordered_in_init_over_a_time_is_reached_then(tmp_path: P
     where = _reaches('<Position><RelativeWorldPosition entityRef="Lead" dx="5" dy="0"/></Position>', 1)
     with pytest.raises(InputError, match="where Lead is by then is not known"):
         read_openscenario(write(tmp_path, dict.fromkeys(begin, CAR), begin, stop=where))
+
+
+def test_the_ego_aims_for_its_speed_whatever_the_limits(tmp_path: Path) -> None:
+    text, file = ROAD.read_text(encoding="utf-8"), tmp_path / "limits.xodr"
+    kinds = "".join(f'<type s="{s}" type="town"><speed max="{fast}"/></type>' for s, fast in ((0, 14), (100, 30)))
+    kinds += '<type s="300" type="town"><speed max="8"/></type>'
+    file.write_text(text.replace("<planView>", f"{kinds}<planView>"), encoding="utf-8")
+    steps = run(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(20)}"}, stop=after(20.0), road=file))
+    assert [motion(step, "Ego")[2] for step in steps] == pytest.approx([20.0] * len(steps), abs=0.05)
 
 
 @pytest.mark.parametrize(("begins", "fast"), [(speed(0, linear(1)), 0.0), (profile((0, 8)), 8.0)])
@@ -143,6 +152,26 @@ def test_the_moon_is_no_share_of_the_sky(tmp_path: Path) -> None:
     file.write_text(file.read_text(encoding="utf-8").replace('illuminance="20000"', 'illuminance="0.1"'))
     with pytest.warns(match="0.1 lx would be night at a sun of 52°; read as a moon there"):
         assert read_openscenario(file).data["light"] == {"illuminance_lx": 0.1}
+
+
+def test_an_environment_leaves_what_it_does_not_name(tmp_path: Path) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, visibility=80.0)
+    light = (
+        '<Environment name="l"><Weather><Sun illuminance="9000" azimuth="0" elevation="0.9"/></Weather></Environment>'
+    )
+    action = f"<GlobalAction><EnvironmentAction>{light}</EnvironmentAction></GlobalAction>"
+    file.write_text(file.read_text(encoding="utf-8").replace("<Private ", f"{action}<Private "), encoding="utf-8")
+    data = read_openscenario(file).data
+    assert (data["fog"], data["light"]) == ({"visibility_m": 80.0}, {"illuminance_lx": 9000.0})
+
+
+def test_an_elevation_in_degrees_is_refused(tmp_path: Path) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": EGO})
+    sun = 'illuminance="20000" azimuth="0" elevation="0.9"'
+    text = file.read_text(encoding="utf-8").replace(sun, 'azimuth="0" elevation="45"')
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="elevation: expected an angle in radians, from -pi to pi, got 45"):
+        read_openscenario(file)
 
 
 def test_files_written_on_windows_name_folders_with_backslashes(tmp_path: Path) -> None:

@@ -12,7 +12,10 @@ from fogsim.core.files.readers import MAPS
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net
-from tests.openscenario.writing import CAR, ROAD, first_step, lane, motion, speed, write
+
+from tests.openscenario.writing import (  # isort: skip
+    CAR, PERSON, ROAD, after, first_step, group, lane, motion, on, run, speed, world, write,
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -40,6 +43,12 @@ def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Pa
     here = '<Position><WorldPosition x="30" y="-1.75" h="0"/></Position>'
     first = first_step(write(tmp_path, {"Ego": CAR}, {"Ego": here}, road=Path("Village")))
     assert motion(first, "Ego")[:2] == pytest.approx((33.7, -21.75))
+    # Beyond the lane, and in conditions, coordinates are the same.
+    begin = {"Ego": f"{here}\n{speed(10)}", "Ann": world(60, -9, 'h="0"')}
+    reach = group(on(f'<ReachPositionCondition tolerance="2">{world(50, -1.75)}</ReachPositionCondition>'))
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=reach + after(5.0), road=Path("Village")))
+    assert motion(steps[-1], "Ann")[:2] == pytest.approx((60.25, -29.0), abs=0.01)
+    assert steps[-1].time == pytest.approx(1.9, abs=0.11)
     with pytest.raises(InputError, match="a map that is a SUMO network has no roads; write a WorldPosition"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Village")))
 

@@ -99,3 +99,33 @@ def test_what_cannot_be_driven_is_refused(tmp_path: Path) -> None:
         file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{_on(1, 30)}\n{routing}"}, road=FORK)
         with pytest.raises(InputError, match=rf"RoutingAction/.*{told}"):
             read_openscenario(file)
+
+
+def _exit_road() -> str:
+    """The fork with a second lane on the right, which alone leads to the right, along an arc to the south."""
+    roads = FORK.read_text(encoding="utf-8").split("<road ")
+    for number in (1, 3, 5):
+        lane = roads[number].split("<right>")[1].split("</right>")[0]
+        second = lane.replace('"-1"', '"-2"')
+        first = lane.replace("driving", "none") if number == 5 else lane
+        roads[number] = roads[number].replace(lane, f"{first}{second}")
+    south = 'y="-20" hdg="-1.5707963267948966"'
+    roads[3] = roads[3].replace('y="20" hdg="1.5707963267948966"', south)
+    roads[5] = roads[5].replace('curvature="0.05"', 'curvature="-0.05"')
+    text = "<road ".join(roads)
+    return text.replace(
+        'contactPoint="start"><laneLink from="-1" to="-1"/></connection>\n</junction>',
+        'contactPoint="start"><laneLink from="-2" to="-2"/></connection>\n</junction>',
+    )
+
+
+def test_vehicles_without_a_route_go_where_their_lane_leads(tmp_path: Path) -> None:
+    (road := tmp_path / "exit.xodr").write_text(_exit_road(), encoding="utf-8")
+    exits = _on(1, 30).replace('"-1"', '"-2"')
+    ahead = '<Position><RelativeLanePosition entityRef="Other" dLane="0" dsLane="200"/></Position>'
+    begin = {"Ego": f"{_on(1, 30)}\n{speed(10)}", "Other": f"{exits}\n{speed(10)}", "Ahead": ahead}
+    steps = run(write(tmp_path, dict.fromkeys(begin, CAR), begin, stop=after(12), visibility=5000.0, road=road))
+    assert motion(steps[-1], "Ego")[:2] == pytest.approx((153.7, -1.75), abs=2.0)
+    # From 33.7 m on it is 66.3 m to the junction and 23.8 m across it; all else is driven to the south.
+    assert motion(steps[-1], "Other")[:2] == pytest.approx((114.75, -20.0 - 120.0 + 66.3 + 23.8), abs=1.0)
+    assert motion(steps[-1], "Ahead")[:2] == pytest.approx((114.75, -20.0 - 200.0 + 66.3 + 23.8), abs=0.1)

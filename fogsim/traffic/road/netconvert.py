@@ -1,6 +1,9 @@
 """SUMO's netconvert, which converts OpenDRIVE files to networks: a program of the package eclipse-sumo."""
 
+import contextlib
 import importlib.util
+import itertools
+import math
 import os
 import re
 import resource
@@ -16,7 +19,7 @@ from fogsim.errors import InputError, MissingDependencyError, shown
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 
 _USUAL_LIMIT = 130.0 / 3.6
-"""Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
+"""Speed limit of lanes for which the OpenDRIVE file has none [m/s]."""
 
 _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
 """Types of OpenDRIVE lanes for vehicles; other lanes are not in the network."""
@@ -24,6 +27,7 @@ _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit"
 _SIGNAL = {"id": "none", "type": "none", "orientation": "none", "dynamic": "no"}
 """Attributes without which netconvert reads no signal, and what they are when they say nothing."""
 
+_NEAR = 0.1  # Distance from a section's ends at which limits begin there [m]
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
 _MOST_SHOWN = 1000  # of its last messages [bytes]
@@ -73,7 +77,7 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
     with tempfile.TemporaryDirectory() as folder:
         types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
         roads = Path(folder) / "road.xodr"
-        ElementTree(_without_empty_attributes(source)).write(roads, encoding="utf-8")
+        ElementTree(_readable(source)).write(roads, encoding="utf-8")
         lines = [f'<type id="{name}" priority="1" speed="{_USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
         types.write_text(f"<types>{''.join(lines)}</types>", encoding="utf-8")
         command = [program, "--opendrive-files", str(roads), "-o", str(net), "-t", str(types)]
@@ -91,8 +95,8 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
 
 
-def _without_empty_attributes(source: Element) -> Element:
-    """The file without attributes that say nothing, at which netconvert would stop."""
+def _readable(source: Element) -> Element:
+    """The file without attributes that say nothing, at which netconvert would stop, and with limits on all lanes."""
     for element in source.iter():
         for key in [key for key, text in element.attrib.items() if not text.strip()]:
             del element.attrib[key]
@@ -101,7 +105,32 @@ def _without_empty_attributes(source: Element) -> Element:
         for speed in element.findall("speed") if element.tag == "lane" else ():
             if not speed.get("max", "").strip():
                 element.remove(speed)
+    for road in source.iter("road"):
+        _limit_lanes(road)
     return source
+
+
+def _limit_lanes(road: Element) -> None:
+    """Give a road's speed limits to its lanes without limits of their own; netconvert reads no others."""
+    limits = [(float(one.get("s", "0")), _limit(one.find("speed"))) for one in road.iterfind("type")]
+    sections = list(road.iterfind("lanes/laneSection"))
+    begins = [float(one.get("s", "0")) for one in sections]
+    for section, (begin, end) in zip(sections, itertools.pairwise((*begins, math.inf)), strict=True):
+        before = [limit for s, limit in limits if s <= begin + _NEAR]
+        inside = ((s - begin, limit) for s, limit in limits if begin + _NEAR < s < end - _NEAR)
+        here = [(0.0, before[-1] if before else {}), *inside]
+        for lane in section.iterfind("*/lane") if any(limit for _, limit in here) else ():
+            if lane.find("speed") is None:
+                usual = {"max": f"{_USUAL_LIMIT:.3f}", "unit": "m/s"}
+                lane.extend(Element("speed", {"sOffset": f"{s:g}", **(limit or usual)}) for s, limit in here)
+
+
+def _limit(speed: Element | None) -> dict[str, str]:
+    """Attributes of a speed limit; none without one, as in ``no limit``."""
+    with contextlib.suppress(ValueError):
+        if speed is not None and 0.0 < float(speed.get("max", "")) < math.inf:
+            return {key: speed.attrib[key] for key in ("max", "unit") if key in speed.attrib}
+    return {}
 
 
 def _run(command: list[str], path: Path, folder: Path) -> str:

@@ -23,6 +23,9 @@ _STOREY = 2.0  # by which the heights of a road's lanes differ at most [m]
 _NEAR_JUNCTION = 2.0
 """Distance by which a place inside a junction is moved to its end [m]."""
 
+_Links = Mapping[tuple[str, int], Sequence[tuple[str, int]]]
+"""Edge and index of lanes, and of those to which they lead."""
+
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
 """Directions of connections, in order of preference."""
 
@@ -94,9 +97,12 @@ class _RoadWidths:
             known = ", ".join(map(str, sorted(numbers))) or "none"
             raise ValueError(f"the {side} side of its road has no lane {lane!r}; it has {known}")
         sign, along = (-1 if side == "right" else 1), s - float(section.get("s", "0"))
-        widths = [
-            _polynomial(numbers[sign * i].iterfind("width"), "sOffset", along) for i in range(1, abs(int(lane)) + 1)
-        ]
+        widths: list[float] = []
+        for one in (numbers[sign * i] for i in range(1, abs(int(lane)) + 1)):
+            if one.find("width") is None and one.find("border") is not None:
+                widths.append(abs(_polynomial(one.iterfind("border"), "sOffset", along)) - math.fsum(widths))
+            else:
+                widths.append(_polynomial(one.iterfind("width"), "sOffset", along))
         t = _polynomial(self._road.iterfind("lanes/laneOffset"), "s", s)
         return t + sign * (math.fsum(widths) - 0.5 * widths[-1]) if widths else t
 
@@ -120,8 +126,9 @@ def _polynomial(elements: Iterable[Element], key: str, s: float) -> float:
 class OpenDriveLanes:
     """Lanes for vehicles and their connections.
 
-    `followers` are the next edges, the straight one first; `crossings` are the lengths of the ways to them across
-    junctions [m]; `roads` are reference lines; latitude and longitude [rad] are None if the file has none.
+    `followers` are the next edges, the straight one first, and `links` the next lanes of each lane; `crossings` are the
+    lengths of the ways to them across junctions [m]; `roads` are reference lines; latitude and longitude [rad] are None
+    if the file has none; `moved` is what the network adds to the x, y of its source [m].
     """
 
     lanes: tuple[_RoadLane, ...]
@@ -131,6 +138,8 @@ class OpenDriveLanes:
     longitude: float | None
     crossings: Mapping[tuple[str, str], float] = field(default_factory=dict)
     widths: Mapping[str, "_RoadWidths"] = field(default_factory=dict)
+    moved: tuple[float, float] = (0.0, 0.0)
+    links: _Links = field(default_factory=dict)
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
         """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
@@ -226,11 +235,14 @@ class OpenDriveLanes:
     def _neighbour(self, lane: _RoadLane, ahead: bool, route: Sequence[str]) -> tuple[_RoadLane, float]:
         """The lane of the next edge, or the one before, and the length of the way across the junction between [m]."""
         edges = self.followers.get(lane.edge, ()) if ahead else [e for e, f in self.followers.items() if lane.edge in f]
-        edge = next((one for one in edges if one in route), edges[0] if edges else "")
+        here = lane.edge, lane.index
+        linked = self.links.get(here, ()) if ahead else [there for there, to in self.links.items() if here in to]
+        near = [edge for edge, _ in linked] or edges
+        edge = next((one for one in edges if one in route), near[0] if near else "")
         lanes = [one for one in self.lanes if one.edge == edge]
         if not lanes:
             raise ValueError(f"the road {'ends' if ahead else 'begins'} before that")
-        other = min(lanes, key=lambda one: abs(one.index - lane.index))
+        other = min(lanes, key=lambda one: ((one.edge, one.index) not in linked, abs(one.index - lane.index)))
         return other, self.crossings.get((lane.edge, edge) if ahead else (edge, lane.edge), 0.0)
 
     def backwards(self, spot: Spot) -> list[tuple[float, float]]:
@@ -251,10 +263,10 @@ class OpenDriveLanes:
             position = math.inf
         return found
 
-    def route(self, edge: str, wanted: Sequence[str] = ()) -> tuple[str, ...]:
+    def route(self, edge: str, wanted: Sequence[str] = (), index: int | None = None) -> tuple[str, ...]:
         """Edges from one on through the `wanted`, and straight ahead until the road ends; ValueError without a way.
 
-        A closed road is repeated.
+        From a lane on, by its `index`, they are those to which the lane leads. A closed road is repeated.
         """
         if wanted:
             before = () if edge in wanted else self.way(edge, wanted[0])[:-1]
@@ -262,10 +274,11 @@ class OpenDriveLanes:
             return (*joined, *self.route(joined[-1])[1:])
         lengths = {one.edge: one.length for one in self.lanes}
         found, length, most = [edge], lengths[edge], _FARTHEST_ROUTE
-        while length < most and (following := self.followers.get(found[-1])):
-            most = _LONGEST_LAPS if following[0] in found else most
-            found.append(following[0])
-            length += lengths[found[-1]]
+        while length < most and (following := self.followers.get(edge)):
+            edge, index = next(iter(self.links.get((edge, -1 if index is None else index), ())), (following[0], None))
+            most = _LONGEST_LAPS if edge in found else most
+            found.append(edge)
+            length += lengths[edge]
         return tuple(found)
 
     def way(self, begin: str, end: str, *, is_fastest: bool = False) -> tuple[str, ...]:
@@ -324,16 +337,21 @@ def _aside(spot: Spot, x: float, y: float) -> Spot:
 def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     """Lanes of a network from `map_net`, and roads of its OpenDRIVE file; InputError if it has no lanes for vehicles.
 
-    A map that is a SUMO network has no roads; its coordinates are those before netconvert's offset.
+    A map that is a SUMO network has no roads; left-hand traffic is refused.
     """
     # Text that netconvert wrote just now is no data from outside.
     root = fromstring(net) if is_opendrive(opendrive) else read_tree(opendrive, "net")  # noqa: S314
+    if root.get("lefthand", "false") != "false":
+        raise InputError(f"{opendrive}: lefthand: expected a network of right-hand traffic")
     lanes = tuple(_lanes(root))
     if not lanes:
         raise InputError(f"{opendrive}: there is no lane to drive on")
     followers = _followers(root, {lane.edge for lane in lanes})
+    links = _links(root, {(lane.edge, lane.index) for lane in lanes})
     if not is_opendrive(opendrive):
-        return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root))
+        location = root.find("location")
+        x, y = map(float, ("0,0" if location is None else location.get("netOffset", "0,0")).split(","))
+        return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root), moved=(x, y), links=links)
     source = read_opendrive(opendrive)
     roads, widths = {}, {}
     for road in source.iter("road"):
@@ -343,19 +361,19 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
-    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root), widths)
+    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root), widths, links=links)
 
 
 def _lanes(root: Element) -> Iterator[_RoadLane]:
-    location = root.find("location")
-    offset = "0,0" if location is None else location.get("netOffset", "0,0")
-    moved = np.array([float(part) for part in offset.split(",")])
     for edge in root.iter("edge"):
-        for lane in edge.iter("lane") if edge.get("function") is None else ():
+        for lane in edge.iter("lane") if edge.get("function", "normal") in ("normal", "connector") else ():
             if not _is_for_cars(lane):
                 continue
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
             points = [tuple(map(float, point.split(","))) for point in lane.attrib["shape"].split()]
+            # A point that is repeated has no direction; of a lane without any, any will do.
+            points = [next(same) for _, same in itertools.groupby(points, key=lambda point: point[:2])]
+            points += [(points[0][0] + _ROUNDING, *points[0][1:])] if len(points) == 1 else []
             length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
             yield _RoadLane(
                 edge.attrib["id"],
@@ -363,7 +381,7 @@ def _lanes(root: Element) -> Iterator[_RoadLane]:
                 length,
                 width,
                 float(lane.attrib["speed"]),
-                np.array([point[:2] for point in points], dtype=np.float64) - moved,
+                np.array([point[:2] for point in points], dtype=np.float64),
                 np.array([math.fsum(point[2:]) for point in points]),
                 tuple(origins.split()),
             )
@@ -381,6 +399,17 @@ def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
         if begin in edges and end in edges:
             found.setdefault(begin, {}).setdefault(end, _TURNS.get(one.get("dir", ""), 3))
     return {begin: sorted(ends, key=lambda end: (ends[end], end)) for begin, ends in found.items()}
+
+
+def _links(root: Element, lanes: set[tuple[str, int]]) -> _Links:
+    """The lanes to which each lane leads, the straight ones, and of an edge the nearest, first."""
+    found: dict[tuple[str, int], list[tuple[int, str, int, int]]] = {}
+    for one in root.iter("connection"):
+        begin, end = (one.attrib["from"], int(one.attrib["fromLane"])), (one.attrib["to"], int(one.attrib["toLane"]))
+        if {begin, end} <= lanes:
+            order = _TURNS.get(one.get("dir", ""), 3), end[0], abs(end[1] - begin[1]), end[1]
+            found.setdefault(begin, []).append(order)
+    return {begin: [(edge, index) for _, edge, _, index in sorted(ends)] for begin, ends in found.items()}
 
 
 def _crossings(root: Element) -> dict[tuple[str, str], float]:

@@ -129,3 +129,53 @@ def test_of_roads_on_top_of_one_another_the_height_or_the_road_decides(tmp_path:
     assert lanes.at(50.0, -1.4, None).lane.edge == "street"
     with pytest.raises(ValueError, match=r"are roads 0\.5 m and 7\.0 m high; give z"):
         lanes.at(50.0, 0.1, None)
+
+
+@pytest.mark.parametrize(
+    ("written", "limits"),
+    [
+        ('<type s="0" type="town"><speed max="30" unit="mph"/></type>', {0.0: 13.4112}),
+        ('<type s="0" type="town"><speed max="15"/></type><type s="500" type="rural"/>', {0.0: 15.0, 500.0: 130 / 3.6}),
+        ('<type s="0" type="motorway"><speed max="no limit"/></type>', {0.0: 130 / 3.6}),
+        ('<type s="200" type="town"><speed max="36" unit="km/h"/></type>', {0.0: 130 / 3.6, 200.0: 10.0}),
+    ],
+)
+def test_lanes_without_limits_have_those_of_their_road(
+    tmp_path: Path, written: str, limits: dict[float, float]
+) -> None:
+    text = (ROAD.parent / "cases" / "road.xodr").read_text(encoding="utf-8")
+    file = tmp_path / "limits.xodr"
+    file.write_text(text.replace("<planView>", f"{written}<planView>"), encoding="utf-8")
+    lanes = read_opendrive_lanes(opendrive_net(file), file)
+    found = {round(float(one.shape[0, 0])): one.limit for one in lanes.lanes if one.origins == ("7_-1",)}
+    assert found == pytest.approx(limits, abs=0.01)
+
+
+def test_a_limit_of_a_lane_counts_more_than_that_of_its_road(tmp_path: Path) -> None:
+    text, file = ROAD.read_text(encoding="utf-8"), tmp_path / "limits.xodr"
+    road = '<type s="0" type="town"><speed max="10"/></type><planView>'
+    lane = '<speed sOffset="0" max="20" unit="m/s"/><width'
+    file.write_text(text.replace("<planView>", road).replace("<width", lane, 1), encoding="utf-8")
+    assert sorted(one.limit for one in read_opendrive_lanes(opendrive_net(file), file).lanes) == [10.0] * 3 + [20.0]
+
+
+def test_lanes_may_have_borders_in_place_of_widths(tmp_path: Path) -> None:
+    beyond = '<lane id="-2" type="shoulder"><border sOffset="0" a="-5.5" b="0" c="0" d="0"/></lane>'
+    text, file = (ROAD.parent / "cases" / "road.xodr").read_text(encoding="utf-8"), tmp_path / "borders.xodr"
+    file.write_text(text.replace("</right>", f"{beyond}</right>"), encoding="utf-8")
+    lanes = read_opendrive_lanes(opendrive_net(file), file)
+    assert lanes.middle("7", "-2", 50.0) == pytest.approx(-4.5)
+    assert lanes.middle("7", "-1", 50.0) == pytest.approx(-1.75)
+
+
+def test_networks_of_left_hand_traffic_are_refused_and_repeated_points_do_no_harm(tmp_path: Path) -> None:
+    lane = '<edge id="e{0}"><lane id="e{0}_0" index="0" speed="20" length="{1}" shape="{2}"/></edge>'
+    edges = lane.format(1, 100, "0,0 50,0 50,0 100,0"), lane.format(2, 0.1, "100,0 100,0")
+    net = tmp_path / "points.net.xml"
+    net.write_text(f"<net>{''.join(edges)}</net>", encoding="utf-8")
+    lanes = read_opendrive_lanes("", net)
+    assert lanes.at(70.0, 1.0, 0.0).world == pytest.approx((70.0, 1.0, 0.0))
+    assert lanes.nearest(200.0, 50.0) is None
+    net.write_text(f'<net lefthand="true">{edges[0]}</net>', encoding="utf-8")
+    with pytest.raises(InputError, match=r"points\.net\.xml: lefthand: expected a network of right-hand traffic"):
+        read_opendrive_lanes("", net)

@@ -31,6 +31,7 @@ from fogsim.units import KMH_PER_MPS
 
 _USUAL_DURATION = 120.0  # Longest simulated time of a file without a stop trigger [s]
 _LONGEST = 3600.0  # The same of one whose stop trigger is more than a time [s]
+_FOREVER = 1e6  # Later times are meant never to come [s].
 _NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
 _CONTROLLERS = ("ObjectController", "AssignControllerAction", "ActivateControllerAction")
@@ -194,7 +195,7 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
     if stop is None or not stop.condition:
         return {"duration_s": _USUAL_DURATION}
     if stop.at is not None:
-        return {"duration_s": max(stop.at, 0.1)}
+        return {"duration_s": min(max(stop.at, 0.1), _FOREVER)}
     if not stop.delay:
         return {"duration_s": _LONGEST, "end_when": stop.condition}
     timeline.append(timeline_entry(node, "stop", stop, {})[1])

@@ -14,7 +14,7 @@ from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, PERSON, ROAD, after, first_step, group, lane, motion, on, run, speed, world, write,
+    CAR, PERSON, ROAD, TIMED, after, first_step, follows, group, lane, motion, on, polyline, run, speed, world, write,
 )  # fmt: skip
 
 
@@ -51,6 +51,16 @@ def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Pa
     assert steps[-1].time == pytest.approx(1.9, abs=0.11)
     with pytest.raises(InputError, match="a map that is a SUMO network has no roads; write a WorldPosition"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Village")))
+
+
+def test_maps_may_have_coordinates_of_utm(tmp_path: Path) -> None:
+    x, y = 677000.0, 5400000.0
+    text = ROAD.read_text(encoding="utf-8").replace('x="0" y="0"', f'x="{x}" y="{y}"')
+    (road := tmp_path / "utm.xodr").write_text(text, encoding="utf-8")
+    walks = follows(polyline((0, world(x + 60, y - 9)), (5, world(x + 65, y - 9))), TIMED)
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Ann": walks}
+    steps = run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(2.0), road=road))
+    assert motion(steps[-1], "Ann")[:2] == pytest.approx((x + 62.25, y - 9.0), abs=0.11)
 
 
 def test_a_missing_map_is_told_with_what_is_there(tmp_path: Path, maps: Path) -> None:

@@ -111,6 +111,8 @@ def test_a_stop_trigger_of_a_time_is_the_duration(read: Callable[..., dict[str, 
     data = read((group, ""))
     assert data["duration_s"] == 40.0
     assert "end_when" not in data
+    # Files write such a time for none.
+    assert read((group, ""), ('value="40" rule', 'value="10000000" rule'))["duration_s"] == 1e6
     less = ('value="40" rule="greaterThan"', 'value="40" rule="lessThan"')
     assert read((group, ""), less)["end_when"] == "time < 40 s"
 

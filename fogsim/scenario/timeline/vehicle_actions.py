@@ -6,6 +6,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 
 from fogsim.errors import UnknownNameError
 from fogsim.scenario.section import (
+    Coordinate,
     Deceleration,
     Distance,
     Flag,
@@ -282,7 +283,9 @@ class DepartAction(Section):
 class PathAction(Section):
     """A vehicle, or a body, moves along a path, on the lanes or off them, whoever is there."""
 
-    points: Annotated[tuple[tuple[Place, Place] | tuple[Place, Place, Number], ...], Field(min_length=1)]
+    points: Annotated[
+        tuple[tuple[Coordinate, Coordinate] | tuple[Coordinate, Coordinate, Number], ...], Field(min_length=1)
+    ]
     """x and y of its points in the network's coordinates [m], each with a heading [deg, to the left of x] or none:
     then it faces the way that it goes."""
 

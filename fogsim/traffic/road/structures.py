@@ -39,7 +39,9 @@ class MarkedShape:
         return number_in_text(self.where, key, self.parameters[key], least, most)
 
     def corners(self) -> list[list[float]]:
-        """Coordinates of its corners [m], two or three each; InputError if it has none."""
+        """Coordinates of its corners [m], two or three each; InputError if it has none, or they are geographic."""
+        if self.attributes.get("geo", "false") not in ("false", "0"):
+            raise InputError(f"{self.where}: geo: expected corners x,y of the network [m], not longitude and latitude")
         shape = self.attributes.get("shape", "")
         corners = [
             [number_in_text(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()

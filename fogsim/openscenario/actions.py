@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from fogsim.openscenario.environment import environment_of
+from fogsim.openscenario.environment import Vehicle, environment_of
 from fogsim.openscenario.lateral import SHAPES, STEEPEST, Effect, LateralActions
 from fogsim.openscenario.positions import from_there_on
 from fogsim.openscenario.shapes import Place, positions_of, sampled, shape_of
@@ -133,9 +133,10 @@ class Actions(LateralActions):
             speed, time = self._possible(entry, "speed", actor), entry.number("time", -1.0)
             last, before = profile[-1] if profile else (0.0, speed)
             if time < 0.0:
-                way = "acceleration" if speed > before else "deceleration"
-                own: float = getattr(vehicle, way)
-                time = abs(speed - before) / (limits.number(f"max{way.capitalize()}", own) if limits else own)
+                up, down = (_most(vehicle, limits, way) for way in ("acceleration", "deceleration"))
+                if not profile and (up < vehicle.acceleration or down < vehicle.deceleration):
+                    entry.refuse("time: how long DynamicConstraints let the first one take depends on the speed then")
+                time = abs(speed - before) / (up if speed > before else down)
             # SUMO counts milliseconds.
             profile.append((last + max(time, 0.001 * bool(profile)), speed))
         effect.lasts = max(effect.lasts, profile[-1][0])
@@ -320,6 +321,15 @@ class Actions(LateralActions):
         else:
             self.positions.rerouted.add(actor)
             effect.add(actor, take_route=[*edges, *self.positions.lanes.route(edges[-1])[1:]])
+
+
+def _most(vehicle: Vehicle, limits: Node | None, way: str) -> float:
+    """How hard a vehicle speeds up (`acceleration`) or brakes (`deceleration`) within its and other limits [m/s²]."""
+    own: float = getattr(vehicle, way)
+    most = limits.number(key := f"max{way.capitalize()}", own) if limits else own
+    if limits and most <= 0.0:
+        limits.refuse(f"{key}: expected more than 0, got {most:g}")
+    return min(most, own) if most > 0.0 else own
 
 
 ACTIONS = handlers(Actions, "action")

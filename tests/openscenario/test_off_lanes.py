@@ -158,6 +158,22 @@ def test_a_profile_of_speeds_is_driven_to_the_step(tmp_path: Path) -> None:
     assert times["next"] - times["profile"] == pytest.approx(5.0, abs=0.21)
 
 
+@pytest.mark.parametrize(
+    ("first", "most", "told"),
+    [
+        ((None, 16), 3, "SpeedProfileEntry: time: how long DynamicConstraints let the first one take depends on"),
+        ((0, 10), 0, "DynamicConstraints: maxAcceleration: expected more than 0, got 0"),
+    ],
+)
+def test_a_profile_of_speeds_needs_what_gives_its_times(
+    tmp_path: Path, first: tuple[float | None, float], most: float, told: str
+) -> None:
+    drives = profile(first, (None, 20), limits=f'<DynamicConstraints maxAcceleration="{most}"/>')
+    begin = {"Ego": EGO, "Lead": f"{lane(90)}\n{speed(10)}"}
+    with pytest.raises(InputError, match=told):
+        read_openscenario(write(tmp_path, dict.fromkeys(begin, CAR), begin, {"Lead": event("e", drives, after(1.0))}))
+
+
 def test_conditions_on_values_hold_once_an_event_has_set_them(tmp_path: Path) -> None:
     file = DATA / "off_the_lanes.xosc"
     times = begun(run(file))

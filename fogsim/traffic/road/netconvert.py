@@ -113,6 +113,7 @@ def _readable(source: Element) -> Element:
 def _limit_lanes(road: Element) -> None:
     """Give a road's speed limits to its lanes without limits of their own; netconvert reads no others."""
     limits = [(float(one.get("s", "0")), _limit(one.find("speed"))) for one in road.iterfind("type")]
+    limits = [next(same) for _, same in itertools.groupby(limits, key=lambda one: one[1])]
     sections = list(road.iterfind("lanes/laneSection"))
     begins = [float(one.get("s", "0")) for one in sections]
     for section, (begin, end) in zip(sections, itertools.pairwise((*begins, math.inf)), strict=True):

@@ -31,7 +31,8 @@ def record_demonstrations(
     minari = _import_minari()
     if data_set in minari.list_local_datasets():
         raise InputError(f"data set {data_set!r} already exists: choose another id, or minari delete {data_set}")
-    env = minari.DataCollector(gymnasium.make(env_id, **arguments))
+    # Otherwise it keeps frames as JPEG, which has other contrasts.
+    env = minari.DataCollector(gymnasium.make(env_id, **arguments), jpeg_encoding=False)
     try:
         check_baseline(name, env)
         policy = baseline(name, env.action_space)

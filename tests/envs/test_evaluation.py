@@ -1,5 +1,6 @@
 """Evaluation of policies, whatever the shape of ``info``, and what it refuses."""
 
+import json
 import threading
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 import fogsim_envs
 from fogsim.errors import InputError
+from fogsim_envs.advisory import FogAdvisoryEnv
 
 FAST = "fogsim/FogAdvisoryFast-v2"
 
@@ -24,9 +26,39 @@ def test_what_evaluate_cannot_run_is_refused() -> None:
     for env, message in [
         (batch, "expected an id, a gymnasium.Env or a pettingzoo.ParallelEnv"),
         ("fogsim_envs:fogsim/FogHighway-v0", "expected version 1 or later"),
+        (gymnasium.wrappers.TimeLimit(FogAdvisoryEnv(), 2), "expected version 1 or later"),
     ]:
         with pytest.raises(InputError, match=f"env_id: {message}"):
             fogsim_envs.evaluate("none", env, [0])
+
+
+class Drive(gymnasium.Env[Any, Any]):
+    """Two steps; in the first the ego strikes somebody, and drives on."""
+
+    observation_space = action_space = gymnasium.spaces.Discrete(2)
+
+    def reset(self, **_: Any) -> tuple[int, dict[str, Any]]:
+        self._faults = ["", "ego"]
+        return 0, {}
+
+    def step(self, _: Any) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        fault = self._faults.pop()
+        return 0, 1.0, not self._faults, False, {"fault": fault, "metrics": {"least_gap_m": float("nan")}}
+
+
+def test_who_strikes_somebody_and_drives_on_has_struck() -> None:
+    assert fogsim_envs.evaluate(lambda *_: 0, Drive(), [0]).struck == 1.0
+
+
+def test_an_evaluation_is_json_whatever_is_undefined() -> None:
+    written = fogsim_envs.evaluate(lambda *_: 0, Drive(), [0]).as_json()
+    (episode,) = json.loads(written, parse_constant=pytest.fail)["episodes"]
+    assert (episode["value"], episode["time"], episode["metrics"]) == (2.0, None, {"least_gap_m": None})
+
+
+def test_arguments_are_refused_for_an_environment_that_is_there() -> None:
+    with pytest.raises(InputError, match="seed, split: only an environment that is made here, by its id, takes"):
+        fogsim_envs.evaluate("random", Drive(), seed=[3], split="test")
 
 
 class Sign:

@@ -20,7 +20,7 @@ from fogsim.simulation.advised_driving import AdvisedDriving, spread_advice
 from fogsim.simulation.ego.view_rendering import prepare_lamplight
 from fogsim.traffic import SPEED_CHOICES
 from fogsim.traffic.drivers.speed_choice import speed_share
-from fogsim.values import Command, Ending, SpeedAdvice, Step
+from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
@@ -312,19 +312,21 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         return step
 
     def _drive(self, before: Step) -> Step:
-        """The last step of a decision period, which begins after one."""
+        """The last step of a decision period, which begins after one, with all its collisions."""
         step, simulation = before, self._simulation
         if simulation is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
+        collisions: tuple[Collision, ...] = ()
         for _ in range(self._frames):
             asked = spread_advice(self._own, self._advice, before.truth.sections)
             step = self._completed(simulation.advance(self._driver.follow(asked, step)))
             if self._is_measured:
                 # What the ego's own driver chooses is no advice.
                 self._measured.update(replace(step, command=asked))
+            collisions += step.collisions
             if step.ending is not None:
                 break
-        return step
+        return replace(step, collisions=collisions)
 
     def _observe(self) -> Any:
         step, estimate = self._current, self._observed_estimate(self._current.estimates)

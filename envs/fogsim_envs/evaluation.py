@@ -16,8 +16,9 @@ from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, shown
 from fogsim.units import finite_or_none
 from fogsim_envs.advising import AdvisingEnv
-from fogsim_envs.baselines import Info, Policy, baseline, check_baseline
+from fogsim_envs.baselines import Info, Policy, baseline, check_baseline, reward_weights
 from fogsim_envs.infos import numbers_of, row_of, word_of
+from fogsim_envs.task.rewards import TaskWeights
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
@@ -212,7 +213,7 @@ def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> Epis
     if isinstance(env, gymnasium.Env):
         if isinstance(policy, str):
             check_baseline(policy, env)
-        return _episode(env, _policy(policy, env.action_space), seed, discount)
+        return _episode(env, _policy(policy, env.action_space, reward_weights(env)), seed, discount)
     return _parallel_episode(env, policy, seed, discount)
 
 
@@ -280,9 +281,9 @@ class _Plain:
         return np.asarray(self._function(observation, info))
 
 
-def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
+def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any], weights: TaskWeights | None) -> Policy:
     if isinstance(policy, str):
-        return baseline(policy, action_space)
+        return baseline(policy, action_space, weights)
     if isinstance(policy, Predictor):
         return _Predicting(policy)
     if callable(policy):
@@ -290,9 +291,9 @@ def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
     raise InputError(f"policy: expected a callable, an agent with predict(), or a baseline's name; got {policy!r}")
 
 
-def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
+def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any], weights: TaskWeights | None = None) -> Policy:
     """A policy for one of several episodes or agents at once, which has a memory of its own."""
-    one = _policy(policy, action_space)
+    one = _policy(policy, action_space, weights)
     if one is not policy:
         return one
     try:
@@ -347,7 +348,7 @@ def _batch_episodes(
     if isinstance(policy, Predictor):
         together, policies = _Predicting(policy, len(seeds)), []
     else:
-        policies = [_own_policy(policy, envs.single_action_space) for _ in seeds]
+        policies = [_own_policy(policy, envs.single_action_space, reward_weights(envs)) for _ in seeds]
         for one, seed in zip(policies, seeds, strict=True):
             one.reset(seed)
     observations, infos = envs.reset(seed=list(seeds))

@@ -2,7 +2,7 @@
 
 import json
 import threading
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import pytest
@@ -10,6 +10,7 @@ import pytest
 import fogsim_envs
 from fogsim.errors import InputError
 from fogsim_envs.advisory import FogAdvisoryEnv
+from fogsim_envs.task import TaskWeights
 
 FAST = "fogsim/FogAdvisoryFast-v2"
 
@@ -44,6 +45,35 @@ class Drive(gymnasium.Env[Any, Any]):
     def step(self, _: Any) -> tuple[int, float, bool, bool, dict[str, Any]]:
         fault = self._faults.pop()
         return 0, 1.0, not self._faults, False, {"fault": fault, "metrics": {"least_gap_m": float("nan")}}
+
+
+class Foggy(Drive):
+    """A drive in which only time is paid for."""
+
+    action_space = gymnasium.spaces.Discrete(39)
+    reward_weights = TaskWeights(overdriving=0.0)
+
+    def __init__(self) -> None:
+        self.actions: list[int] = []
+
+    def reset(self, **options: Any) -> tuple[int, dict[str, Any]]:
+        return super().reset(**options)[0], self._seen
+
+    def step(self, action: Any) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        self.actions.append(int(action))
+        state, reward, terminated, truncated, info = super().step(action)
+        return state, reward, terminated, truncated, info | self._seen
+
+    _seen: ClassVar = {"truth": {"visibility_m": 200.0, "visibility_ahead_m": 40.0}, "speed_limit_mps": 36.0}
+
+
+def test_the_oracle_goes_by_the_weights_of_the_reward() -> None:
+    env = Foggy()
+    fogsim_envs.evaluate("oracle", env, [0])
+    env.reward_weights = TaskWeights()
+    fogsim_envs.evaluate("oracle", env, [0])
+    freely, carefully = env.actions[0], env.actions[-1]
+    assert (freely, carefully < freely) == (3 * 12, True)
 
 
 def test_who_strikes_somebody_and_drives_on_has_struck() -> None:

@@ -169,7 +169,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         )
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._is_measured, self._measured = metrics, RunMetrics()
-        self._weights = reward_weights or TaskWeights()
+        self.reward_weights = reward_weights or TaskWeights()
         self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
         self._simulation: Simulation | None = None
@@ -294,7 +294,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         before = self._step
         self._step = self._drive(before)
         self._show()
-        terms = task_terms(before, self._step, self._way, self._weights, self._standard)
+        terms = task_terms(before, self._step, self._way, self.reward_weights, self._standard)
         truncated = self._step.ending is Ending.TIME
         terminated = self._step.ending is not None and not truncated
         return self._observe(), float(sum(terms.values())), terminated, truncated, self._info(terms)

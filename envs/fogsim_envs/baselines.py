@@ -132,14 +132,21 @@ BASELINES: Registry[Callable[..., Policy]] = Registry(
 """Baselines by name."""
 
 
-def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
-    """Make a baseline for an environment."""
+def baseline(name: str, action_space: spaces.Space[Any], weights: TaskWeights | None = None) -> Policy:
+    """Make a baseline for an environment that pays by some weights."""
     if isinstance(action_space, spaces.Discrete) and action_space.n != math.prod(ACTION_LEVELS):
         # Who has signs has PettingZoo, without which that room cannot be imported.
         from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415
 
         return make(SIGN_BASELINES, name, action_space)
-    return make(BASELINES, name, action_space)
+    known = {"weights": weights} if name == "oracle" else {}
+    return make(BASELINES, name, action_space, **known)
+
+
+def reward_weights(env: Any) -> TaskWeights | None:
+    """Weights by which an environment or a batch pays; None where they are not the task's."""
+    weights = getattr(env.unwrapped, "reward_weights", None)
+    return weights if isinstance(weights, TaskWeights) else None
 
 
 def check_baseline(name: str, env: gymnasium.Env[Any, Any]) -> None:

@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import InputError
-from fogsim.scenario import Scenario
+from fogsim.scenario import Scenario, build
 from fogsim.scenario.loading import clock_settings
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.loop import DriversFog
@@ -46,6 +46,7 @@ def _scenario(config: Mapping[str, Any], visibility: float, overrides: Iterable[
     period = step * max(1.0, simulation // policy)
     plain = {**config, "simulation_frequency": simulation, "policy_frequency": policy}
     scenario = highway_scenario(plain, visibility, [*clock_settings(step, period, period), *overrides])
+    build.check_frames(scenario, "FogCameraWrapper")
     if not math.isclose(scenario.clocks.camera_period_s, period):
         raise InputError(
             f"clocks.camera_period_s: there is a frame at the end of each step of the environment, {period:g} s by its "

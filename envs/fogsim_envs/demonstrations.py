@@ -12,7 +12,7 @@ import gymnasium
 
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, shown
-from fogsim_envs.baselines import BASELINES, baseline, check_baseline
+from fogsim_envs.baselines import BASELINES, baseline, check_baseline, reward_weights
 
 _DATA_SET = re.compile(r"([-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")
 """Ids that Minari takes; it checks them only when all episodes have been driven."""
@@ -31,10 +31,11 @@ def record_demonstrations(
     minari = _import_minari()
     if data_set in minari.list_local_datasets():
         raise InputError(f"data set {data_set!r} already exists: choose another id, or minari delete {data_set}")
-    env = minari.DataCollector(gymnasium.make(env_id, **arguments))
+    # Otherwise it keeps frames as JPEG, which has other contrasts.
+    env = minari.DataCollector(gymnasium.make(env_id, **arguments), jpeg_encoding=False)
     try:
         check_baseline(name, env)
-        policy = baseline(name, env.action_space)
+        policy = baseline(name, env.action_space, reward_weights(env))
         for seed in range(episodes):
             policy.reset(seed)
             observation, info = env.reset(seed=seed)

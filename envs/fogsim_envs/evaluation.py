@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, shown
-from fogsim_envs.baselines import Info, Policy, baseline, check_baseline
+from fogsim.units import finite_or_none
+from fogsim_envs.advising import AdvisingEnv
+from fogsim_envs.baselines import Info, Policy, baseline, check_baseline, reward_weights
 from fogsim_envs.infos import numbers_of, row_of, word_of
+from fogsim_envs.task.rewards import TaskWeights
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
@@ -111,8 +114,17 @@ class Evaluation:
         return (float(gained.mean()), *bootstrap_interval(gained))
 
     def as_json(self) -> str:
-        """All of it as JSON."""
-        return json.dumps(asdict(self))
+        """All of it as JSON; null where something is undefined."""
+        return json.dumps(_plain(asdict(self)), allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
+    return finite_or_none(value) if isinstance(value, float) else value
 
 
 @checked_parameters
@@ -145,8 +157,8 @@ def evaluate(
     Raises
     ------
     InputError
-        If there are no seeds, the discount is none, the environment is of version 0, or a baseline that advises speeds
-        is given for FogDrive.
+        If there are no seeds, the discount is none, the environment is of version 0, arguments are given for one that
+        is made already, or a baseline that advises speeds is given for FogDrive.
     """
     given: Iterable[Any] = seeds
     numbers = tuple(int(seed) if isinstance(seed, np.integer) else seed for seed in given)
@@ -155,11 +167,7 @@ def evaluate(
     if discount == 0.0:
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
-        if not isinstance(env_id, gymnasium.Env) and not hasattr(env_id, "possible_agents"):
-            raise InputError(
-                f"env_id: expected an id, a gymnasium.Env or a pettingzoo.ParallelEnv, got {shown(env_id)}; "
-                "evaluate runs an id of a batch by itself"
-            )
+        _check_made(env_id, arguments)
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
     if env_id.rpartition(":")[2].startswith(_BATCH):
         return summarise(_batch_episodes(policy, env_id, numbers, discount, arguments))
@@ -170,12 +178,29 @@ def evaluate(
         env.close()
 
 
+def _check_made(env: Any, arguments: Mapping[str, Any]) -> None:
+    """Refuse what is no environment for `evaluate`, and arguments that came too late for it."""
+    if not isinstance(env, gymnasium.Env) and not hasattr(env, "possible_agents"):
+        raise InputError(
+            f"env_id: expected an id, a gymnasium.Env or a pettingzoo.ParallelEnv, got {shown(env)}; "
+            "evaluate runs an id of a batch by itself"
+        )
+    if isinstance(getattr(env, "unwrapped", None), AdvisingEnv):
+        raise _of_version_0(env)
+    if arguments:
+        raise InputError(f"{', '.join(arguments)}: only an environment that is made here, by its id, takes arguments")
+
+
+def _of_version_0(env: object) -> InputError:
+    return InputError(
+        f"env_id: expected version 1 or later, since version 0 has no split of episodes, got {shown(env)}"
+    )
+
+
 def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
     name = env_id.rpartition(":")[2]
     if name.startswith("fogsim/") and name.endswith("-v0"):
-        raise InputError(
-            f"env_id: expected version 1 or later, since version 0 has no split of episodes, got {env_id!r}"
-        )
+        raise _of_version_0(env_id)
     if name != _CORRIDOR:
         return gymnasium.make(env_id, **{"split": "test", "metrics": True, **arguments})
     # It needs PettingZoo, an extra.
@@ -188,7 +213,7 @@ def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> Epis
     if isinstance(env, gymnasium.Env):
         if isinstance(policy, str):
             check_baseline(policy, env)
-        return _episode(env, _policy(policy, env.action_space), seed, discount)
+        return _episode(env, _policy(policy, env.action_space, reward_weights(env)), seed, discount)
     return _parallel_episode(env, policy, seed, discount)
 
 
@@ -256,9 +281,9 @@ class _Plain:
         return np.asarray(self._function(observation, info))
 
 
-def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
+def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any], weights: TaskWeights | None) -> Policy:
     if isinstance(policy, str):
-        return baseline(policy, action_space)
+        return baseline(policy, action_space, weights)
     if isinstance(policy, Predictor):
         return _Predicting(policy)
     if callable(policy):
@@ -266,9 +291,9 @@ def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
     raise InputError(f"policy: expected a callable, an agent with predict(), or a baseline's name; got {policy!r}")
 
 
-def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
+def _own_policy(policy: AnyPolicy, action_space: gymnasium.Space[Any], weights: TaskWeights | None = None) -> Policy:
     """A policy for one of several episodes or agents at once, which has a memory of its own."""
-    one = _policy(policy, action_space)
+    one = _policy(policy, action_space, weights)
     if one is not policy:
         return one
     try:
@@ -285,7 +310,7 @@ class _Sums:
 
     def __init__(self, discount: float) -> None:
         self._discount, self._weight = discount, 1.0
-        self.value, self.steps, self.cost, self.collisions = 0.0, 0, 0.0, 0.0
+        self.value, self.steps, self.cost, self.collisions, self.strikes = 0.0, 0, 0.0, 0.0, 0
         self.terms: dict[str, float] = {}
 
     def add(self, reward: float, info: Info) -> None:
@@ -294,6 +319,7 @@ class _Sums:
         self.steps += 1
         self.cost += float(info.get("cost", 0.0))
         self.collisions += float(info.get("collisions", 0.0))
+        self.strikes += word_of(info, "fault") == "ego"
         for name, term in numbers_of(info, "reward_terms").items():
             self.terms[name] = self.terms.get(name, 0.0) + float(term)
 
@@ -311,7 +337,7 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: 
         observation, reward, terminated, truncated, info = env.step(policy(observation, info))
         sums.add(float(reward), info)
         over = terminated or truncated
-    return sums.result(seed, info, word_of(info, "fault") == "ego")
+    return sums.result(seed, info, sums.strikes > 0)
 
 
 def _batch_episodes(
@@ -322,7 +348,7 @@ def _batch_episodes(
     if isinstance(policy, Predictor):
         together, policies = _Predicting(policy, len(seeds)), []
     else:
-        policies = [_own_policy(policy, envs.single_action_space) for _ in seeds]
+        policies = [_own_policy(policy, envs.single_action_space, reward_weights(envs)) for _ in seeds]
         for one, seed in zip(policies, seeds, strict=True):
             one.reset(seed)
     observations, infos = envs.reset(seed=list(seeds))
@@ -341,7 +367,7 @@ def _batch_episodes(
             info = row_of(ends, i)
             sums[i].add(rewards[i], info)
             if terminated[i] or truncated[i]:
-                results[i] = sums[i].result(seeds[i], info, word_of(info, "fault") == "ego")
+                results[i] = sums[i].result(seeds[i], info, sums[i].strikes > 0)
     return [results[i] for i in range(len(seeds))]
 
 

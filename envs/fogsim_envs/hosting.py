@@ -27,6 +27,9 @@ TIMEOUT = 60.0
 Timeout = Annotated[float, Range(0.0, math.inf, "s")]
 """Time that a child process may give no sign of life [s]; `checked_timeout` refuses 0."""
 
+_START_TIMEOUT = 600.0
+"""The same, at least, for one that begins: it imports everything before it gives a sign [s]."""
+
 _CLOSE_TIMEOUT = 10.0
 _LONGEST_TIMEOUT = 1e6
 
@@ -146,12 +149,12 @@ class _Host:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
         theirs.close()
-        self._ask("open", self._scenario)
+        self._ask("open", self._scenario, _START_TIMEOUT)
 
-    def _ask(self, verb: str, argument: object) -> object:
+    def _ask(self, verb: str, argument: object, least_timeout: float = 0.0) -> object:
         try:
             self._connection.send((verb, argument))
-            answer = self._hear()
+            answer = self._hear(None if self._timeout is None else max(self._timeout, least_timeout))
         except (EOFError, OSError) as error:
             self._abandon()
             raise SimulationError("the child process that ran the simulation has ended") from error
@@ -163,14 +166,14 @@ class _Host:
             raise answer
         return answer
 
-    def _hear(self) -> object:
-        """Wait for an answer as long as there are signs of life."""
-        while self._connection.poll(self._timeout):
+    def _hear(self, timeout: float | None) -> object:
+        """Wait for an answer as long as there are signs of life (`timeout` [s])."""
+        while self._connection.poll(timeout):
             sign, answer = self._connection.recv()
             if sign == "done":
                 return answer
         raise SimulationError(
-            f"the child process that runs the simulation has given no sign of life for {self._timeout:g} s, and was "
+            f"the child process that runs the simulation has given no sign of life for {timeout:g} s, and was "
             "ended: it was stopped, or the computer has no time for it; the time is set by timeout=…"
         )
 

@@ -123,7 +123,8 @@ def test_what_does_not_fit_is_refused(signs: FogCorridorEnv) -> None:
         signs.reset(options={"overrides": ["drivers.signs.at_m=[300]"]})
     with pytest.raises(InputError, match=r"drivers\.advised: signs"):
         parallel_env(overrides=("drivers.advised=equipped", "drivers.equipped_share=0.5"))
-    signs.agents = []
+    with pytest.raises(InputError, match=r"over within its first decision period.* \(time, after 20 s\)"):
+        signs.reset(options={"overrides": ["duration_s=20"]})
     with pytest.raises(ResetNeeded):
         signs.step({})
 

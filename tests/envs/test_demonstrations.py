@@ -1,19 +1,31 @@
-"""Demonstrations: what is wrong is refused before episodes are driven, not after."""
+"""Demonstrations: what is wrong is refused before episodes are driven, and frames are kept as they are."""
 
 import sys
 from types import SimpleNamespace
+from typing import Any
 
+import gymnasium
 import pytest
 
 from fogsim.errors import InputError
 from fogsim_envs.demonstrations import main, record_demonstrations
 
-_MINARI = SimpleNamespace(list_local_datasets=lambda: {"there/one-v1": {}}, DataCollector=lambda env: env)
+
+class Collector(gymnasium.Wrapper[Any, Any, Any, Any]):
+    def __init__(self, env: gymnasium.Env[Any, Any], *, jpeg_encoding: bool = True) -> None:
+        super().__init__(env)
+        self.is_lossy = jpeg_encoding
+
+    def create_dataset(self, **_: Any) -> "Collector":
+        return self
+
+
+_MINARI = SimpleNamespace(list_local_datasets=lambda: {"there/one-v1": {}}, DataCollector=Collector)
 
 
 @pytest.fixture(autouse=True)
 def minari(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An extra that may be missing here; its collector is not reached."""
+    """An extra that may be missing here."""
     monkeypatch.setitem(sys.modules, "minari", _MINARI)
 
 
@@ -37,3 +49,7 @@ def test_an_environment_that_is_none(
         main()
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_frames_are_kept_without_loss() -> None:
+    assert not record_demonstrations("random", "Pendulum-v1", 1, "there/pendulum-v1").is_lossy

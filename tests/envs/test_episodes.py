@@ -59,3 +59,23 @@ def test_distributions_survive_the_json_of_a_specification() -> None:
     read = type(spec).from_json(spec.to_json())
     source = gymnasium.make(read).unwrapped._source
     assert (source._given_fog, source._scenes) == (given["fog_distribution"], given["scenario_distribution"])
+
+
+def test_what_may_be_drawn_may_be_arrays() -> None:
+    arrays: Any = {"lanes": np.array([2, 3]), "demand": np.array([300.0])}
+    both = ScenarioDistribution(lanes=(2, 3), demand=(300.0,)), ScenarioDistribution(**arrays)
+    assert len({one.draw(np.random.default_rng(1)) for one in both}) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: FogDistribution(visibility=(100.0, 50.0)), "FogDistribution.visibility"),
+        (lambda: ScenarioDistribution(light={"noon": 1.0}), "unknown name 'noon'"),
+        (lambda: ScenarioDistribution(scripts={"lead": 0.0}), "not all 0"),
+        (lambda: ScenarioDistribution(lanes=()), "at least one"),
+    ],
+)
+def test_distributions_that_are_none(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()

@@ -157,6 +157,8 @@ def test_bad_arguments() -> None:
     env.close()
     with pytest.raises(InputError, match="environment of highway-env"):
         FogCameraWrapper(gymnasium.make("CartPole-v1"))
+    with pytest.raises(InputError, match="FogCameraWrapper needs frames, and renderer: none draws none"):
+        FogCameraWrapper(gymnasium.make("highway-v0", config=FEW), overrides=["renderer=none", "estimators=[]"])
 
 
 @pytest.mark.parametrize(("name", "config"), [("highway-v0", FEW), ("roundabout-v1", {})])

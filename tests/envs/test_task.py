@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -17,10 +18,14 @@ from gymnasium.wrappers import FlattenObservation
 import fogsim_envs
 from fogsim.advice.agent import AGENT_STATE, agent_state, clipped, scaled_visibility
 from fogsim.errors import InputError
+from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.scenario import load_scenario
 from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Estimate, Leader, SignSighting, Step
-from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
+from fogsim_envs.advising import AdvisingEnv
+from fogsim_envs.rewards import RewardWeights
+from fogsim_envs.spaces import action_space
+from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
 from fogsim_envs.task.fast import _WITHOUT_FRAMES, FAST_FOG, FAST_ROAD, FAST_SCENARIO
 from fogsim_envs.task.observation import (
@@ -285,20 +290,6 @@ def test_a_night_that_may_come_is_prepared(light: dict[str, float], prepared: bo
     assert EpisodeSource(None, ScenarioDistribution(light=light), None, (), "train").may_be_dark is prepared
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: FogDistribution(visibility=(100.0, 50.0)), "FogDistribution.visibility"),
-        (lambda: ScenarioDistribution(light={"noon": 1.0}), "unknown name 'noon'"),
-        (lambda: ScenarioDistribution(scripts={"lead": 0.0}), "not all 0"),
-        (lambda: ScenarioDistribution(lanes=()), "at least one"),
-    ],
-)
-def test_distributions_that_are_none(make: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()
-
-
 def test_a_drive_at_the_limit_is_worth_forty(step: Step) -> None:
     clear = dataclasses.replace(step.truth, extinction=0.0, extinction_ahead=0.0)
     before = dataclasses.replace(_at(step, 36.0), truth=clear, speed_limit=36.0, command=Command())
@@ -334,6 +325,26 @@ def test_who_strikes_pays(step: Step) -> None:
     assert fault(strikes) == "ego"
     assert task_terms(before, strikes, WAY, WEIGHTS)["collision"] == -WEIGHTS.collision
     assert not fault(before)
+
+
+def test_a_collision_in_any_frame_of_a_decision_period_counts(fast: gymnasium.Env[Any, Any], step: Step) -> None:
+    hit = Collision(step.time, step.traffic.ids[step.ego], "lead", 5.0)
+    frames = [_moved(step, 0.0, 0.1 * n, collisions=(hit,) if n == 2 else ()) for n in (1, 2, 3)]
+
+    def env(**others: Any) -> Any:
+        left = iter(frames)
+        simulation = SimpleNamespace(advance=lambda _: next(left))
+        return SimpleNamespace(_simulation=simulation, _frames=3, _advice=fast.unwrapped._advice, **others)
+
+    driver = SimpleNamespace(follow=lambda asked, _: asked)
+    after = FogAdvisoryV1Env._drive(
+        env(_own=Command(), _driver=driver, _completed=lambda one: one, _is_measured=False), step
+    )
+    assert (after.time, fault(after)) == (frames[-1].time, "ego")
+    task = {"_weights": RewardWeights(), "_standard": DEFAULT_STANDARD, "_show": lambda _: None}
+    spaces = {"spec": None, "action_space": action_space(continuous=False), "_continuous": False}
+    *_, info = AdvisingEnv.step(env(_step=step, **task, **spaces), NO_ADVICE)
+    assert (info["collisions"], info["reward_terms"]["collision"]) == (1, -50.0)
 
 
 def test_overdriving_and_conflicts_by_hand(step: Step) -> None:

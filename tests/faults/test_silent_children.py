@@ -54,6 +54,10 @@ def test_a_child_that_is_killed_is_told(hosted: HostedLoop) -> None:
         hosted.advance(Command())
 
 
+def test_a_child_that_begins_has_longer_for_its_imports() -> None:
+    HostedLoop(BLIND, timeout=0.01).close()
+
+
 def test_neither_the_working_directory_nor_forks_touch_a_child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "contextlib.py").write_text("raise ImportError('of the working directory')")
     monkeypatch.chdir(tmp_path)

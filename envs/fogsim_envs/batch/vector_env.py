@@ -111,8 +111,8 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
                 f"scenario_distribution.demand: expected at most {MOST_DEMAND:g} vehicles/h, since at most "
                 f"{OTHERS - 1} vehicles are in traffic, got {most:g}; fogsim/FogAdvisoryFast-v2 takes more"
             )
-        weights = reward_weights or TaskWeights()
-        self._weights = np.array([getattr(weights, name) for name in TERMS])
+        self.reward_weights = reward_weights or TaskWeights()
+        self._weights = np.array([getattr(self.reward_weights, name) for name in TERMS])
         table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()

@@ -207,7 +207,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         Raises
         ------
         InputError
-            If an option is unknown or does not fit, or the scenario has another number of signs.
+            If an option is unknown or does not fit, or the scenario has another number of signs or is over at once.
         """
         known = {name: value for name, value in (options or {}).items() if name != "options"}
         if "driver" in known:
@@ -217,7 +217,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         rng = self._rng if seed is None and self._rng is not None else np.random.default_rng(seed)
         run_seed, drawn = self._source.draw(rng, choice)
         scenario = drawn.scenario
-        self._road, self._rng = self._checked_road(scenario), rng
+        self._road, self._rng, self.agents = self._checked_road(scenario), rng, []
         self._simulation, self._step = begin_traffic(self._simulation, scenario, run_seed, self._timeout)
         self._loops = InductionLoops(
             loop_places(self._road.starts, self._road.length), self._road.axis, scenario.traffic.along
@@ -227,8 +227,13 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self._frames = build.periods(scenario).decision_frames
         self._standard, self._duration = advice_standard(scenario), scenario.duration_s
         self._shown = (math.inf,) * len(self.possible_agents)
-        self.agents = list(self.possible_agents)
         self._move()
+        if self._step.ending is not None:
+            raise InputError(
+                "reset(): the scenario is over within its first decision period, in which the signs are dark "
+                f"({self._step.ending.value}, after {self._step.time:g} s); give it a longer duration_s"
+            )
+        self.agents = list(self.possible_agents)
         self.drawn = drawn.episode.as_info()
         return self._observe(), self._infos(dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0))
 
@@ -295,13 +300,13 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         command = Command(stretches=stretch_advices(sections, self._shown, Display.MESSAGE_SIGN))
         reward = CorridorReward(self._weights, self._standard)
         for _ in range(self._frames):
+            if self._step.ending is not None:
+                break
             before = self._step.time
             self._step, _ = self._simulation.advance(command)
             elapsed = self._step.time - before
             self._loops.count(self._step.traffic, elapsed)
             reward.add(self._step, elapsed)
-            if self._step.ending is not None:
-                break
         self._collisions = reward.collisions
         return reward.terms()
 

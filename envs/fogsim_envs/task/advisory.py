@@ -20,7 +20,7 @@ from fogsim.simulation.advised_driving import AdvisedDriving, spread_advice
 from fogsim.simulation.ego.view_rendering import prepare_lamplight
 from fogsim.traffic import SPEED_CHOICES
 from fogsim.traffic.drivers.speed_choice import speed_share
-from fogsim.values import Command, Ending, SpeedAdvice, Step
+from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
@@ -169,7 +169,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         )
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._is_measured, self._measured = metrics, RunMetrics()
-        self._weights = reward_weights or TaskWeights()
+        self.reward_weights = reward_weights or TaskWeights()
         self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
         self._simulation: Simulation | None = None
@@ -294,7 +294,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         before = self._step
         self._step = self._drive(before)
         self._show()
-        terms = task_terms(before, self._step, self._way, self._weights, self._standard)
+        terms = task_terms(before, self._step, self._way, self.reward_weights, self._standard)
         truncated = self._step.ending is Ending.TIME
         terminated = self._step.ending is not None and not truncated
         return self._observe(), float(sum(terms.values())), terminated, truncated, self._info(terms)
@@ -312,19 +312,21 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         return step
 
     def _drive(self, before: Step) -> Step:
-        """The last step of a decision period, which begins after one."""
+        """The last step of a decision period, which begins after one, with all its collisions."""
         step, simulation = before, self._simulation
         if simulation is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
+        collisions: tuple[Collision, ...] = ()
         for _ in range(self._frames):
             asked = spread_advice(self._own, self._advice, before.truth.sections)
             step = self._completed(simulation.advance(self._driver.follow(asked, step)))
             if self._is_measured:
                 # What the ego's own driver chooses is no advice.
                 self._measured.update(replace(step, command=asked))
+            collisions += step.collisions
             if step.ending is not None:
                 break
-        return step
+        return replace(step, collisions=collisions)
 
     def _observe(self) -> Any:
         step, estimate = self._current, self._observed_estimate(self._current.estimates)

@@ -274,7 +274,7 @@ class ScenarioDistribution:
         for name, known in (("light", _LIGHT), ("scripts", SCRIPTS), ("drivers", SPEED_CHOICES)):
             _check_weights(f"ScenarioDistribution.{name}", getattr(self, name), list(known))
         for name in ("lanes", "demand", "truck_shares"):
-            if not getattr(self, name):
+            if not len(getattr(self, name)):
                 raise InputError(f"ScenarioDistribution.{name}: expected at least one value to choose from, got none")
 
     @property

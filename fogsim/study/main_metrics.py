@@ -80,7 +80,7 @@ def unknown_metrics(names: Iterable[str]) -> list[str]:
     return [
         f"unknown metric {name!r}; {suggest(name, known)}"
         for name in names
-        if name not in known and not (name.startswith(f"{METHODS_KEY}.") and name.count(".") == 2)
+        if name not in known and not (name.startswith(f"{METHODS_KEY}.") and name.count(".") >= 2)
     ]
 
 

@@ -106,6 +106,14 @@ def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
         override(scenario, ["renderer=none", "estimators=[]", "expect.a.never=belief.error > 20 %"])
 
 
+def test_metrics_of_own_methods(tmp_path: Path) -> None:
+    own = 'class Own:\n    method = "own:Own"\n    def __init__(self, camera): ...\n    def reset(self): ...\n'
+    (tmp_path / "own.py").write_text(f"{own}    def update(self, observation): ...\n", encoding="utf-8")
+    settings = ["estimators=['own:Own']", "expect.a.metric=estimators.own:Own.valid_share >= 0.5"]
+    scenario = override(load(tmp_path, "  a: {never: ego.collision}\n"), settings)
+    assert [clause.expected for clause in clauses_of(scenario.expect)][-1] == "estimators.own:Own.valid_share >= 0.5"
+
+
 def test_metrics_in_their_units(tmp_path: Path) -> None:
     for written, value in [
         ("traffic_delay_share <= 5 %", 0.05),

@@ -53,7 +53,7 @@ _WANTED: Mapping[str, Mapping[str, bool]] = {
 
 _TIMES = re.compile(r"\s*(\d+)\s*times?\s*\Z")
 
-_METRIC = re.compile(r"\s*([A-Za-z_][\w.]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
+_METRIC = re.compile(r"\s*([A-Za-z_][^\s<>=!]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
 
 
 _SHARE = (0.0, 1.0)

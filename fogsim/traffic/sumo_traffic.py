@@ -115,7 +115,7 @@ class SumoTraffic:
         self._begun, self._end = 0.0, math.inf
         self._route: RoutePosition | None = None
         self._mark, self._teleported = 0, False
-        self._seen: TrafficSnapshot | None = None
+        self._last: TrafficSnapshot | None = None
         self._roads = LoadedRoads(setup.net, setup.additional)
         self._signals: SignalReader | None = None
 
@@ -174,7 +174,7 @@ class SumoTraffic:
             # What stands next to the roads hides vehicles in clear air, too.
             self._run = replace(self._run, perception=self._perception(self._run, ClearAir()))
         self._command = _NO_ADVICE
-        self._route, self._mark, self._teleported, self._seen = None, 0, False, None
+        self._route, self._mark, self._teleported, self._last = None, 0, False, None
         try:
             check_step_length(api, setup.step_length)
             check_microscopic(api)
@@ -348,12 +348,12 @@ class SumoTraffic:
         run.roster.update()
         if teleported or ego is None or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
-            self._route, seen, self._seen = None, self._seen, None
-            if seen is None or not run.collisions.includes(ego):
+            self._route, last, self._last = None, self._last, None
+            if last is None or not run.collisions.includes(ego):
                 return None
             # A collision took it: it is shown once more where it was.
             self._teleported = teleported
-            return replace(seen, state=replace(seen.state, time=run.roster.time), collisions=run.collisions.take())
+            return replace(last, state=replace(last.state, time=run.roster.time), collisions=run.collisions.take())
         new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
@@ -361,7 +361,7 @@ class SumoTraffic:
         row = state.ids.index(ego)
         route_position, route_length = self._route.update(state.position[row], state.lane[row])
         state = self._shown(run, state)
-        self._seen = TrafficSnapshot(
+        self._last = TrafficSnapshot(
             state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
@@ -372,7 +372,7 @@ class SumoTraffic:
             signal_ahead=run.lights.shown_to(ego),
             is_ended=run.roster.time >= self._end,
         )
-        return self._seen
+        return self._last
 
     @_translates_errors
     def observe_network(self) -> NetworkSnapshot:

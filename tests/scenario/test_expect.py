@@ -90,6 +90,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
         ("a: {metric: minimum_gab_m < 3}", "unknown metric 'minimum_gab_m'; did you mean 'minimum_gap_m'?"),
         ("a: {metric: minimum_gap_m}", "expect.a.metric: expected a key of metrics.json"),
         ("a: {metric: minimum_gap_m < 3 kg}", "the unit 'kg' does not fit"),
+        ("a: {metric: ending != colision}", "unknown value 'colision' of ending; did you mean 'collision'?"),
         ("a: {metric: minimum_gap_m < few}", "expected a number after <, got 'few'"),
         ("a: 3", "expect.a: "),
     ]:

@@ -25,6 +25,7 @@ from fogsim.scenario.drivers_schema import DriversSection as Drivers
 from fogsim.scenario.expect.schema import Expectation
 from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
 from fogsim.scenario.loading import load_cases
+from fogsim.scenario.plain_yaml import Dumper
 from fogsim.scenario.roads.schema import ActorSection as Actor
 from fogsim.scenario.roads.schema import DemandSection as Demand
 from fogsim.scenario.roads.schema import Road
@@ -135,7 +136,7 @@ def to_yaml(
     if verdict is not None:
         data["verdict"] = verdict.model_dump(mode="json", exclude_unset=True)
     try:
-        text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+        text: str = yaml.dump(data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=120)
     except yaml.representer.RepresenterError as error:
         plain = "numbers, text, true, false, lists and mappings, as .tolist() makes of an array"
         raise InputError(f"vary: expected {plain}; got {shown(repr(error.args[-1]))}") from None

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,6 +80,17 @@ def test_shipped_scenarios_come_out_as_they_went_in(tmp_path):
                 named = data["traffic"].pop(key, [])
                 data[key] = [(folder / one).resolve() for one in ([named] if isinstance(named, str) else named)]
         assert there == here
+
+
+def test_names_that_look_like_numbers_stay_names(tmp_path: Path) -> None:
+    actors = {
+        "ego": fs.Actor(lane="right", speed_kmh=90),
+        "08": fs.Actor(type="truck", ahead_of="ego", gap_m=400, speed_kmh=80),
+        "1e3": fs.Actor(ahead_of="08", gap_m=60, speed_kmh=80),
+    }
+    road = fs.Road(template="motorway", length_m=3000, lanes=2)
+    scenario = fs.Scenario(name="numbers", road=road, actors=actors, fog=fs.Fog(visibility_m=150))
+    assert load_scenario(fs.write(scenario, tmp_path / "numbers.yaml")).actors["1e3"].ahead_of == "08"
 
 
 def test_conditions_by_operators():

@@ -49,7 +49,7 @@ class ExpectationWatch:
             watch.look(moment)
 
     def findings(self, metrics: Mapping[str, object]) -> tuple[Finding, ...]:
-        """What came of each clause in the steps so far, in their order."""
+        """What came of each clause in the steps so far, in their order; metrics by keys as in `RunSummary.flat`."""
         found = []
         for clause, watch in self._watches:
             verdict, sight, came, reason = watch.result(metrics)
@@ -323,7 +323,7 @@ class _MetricWatch:
         """Take in nothing: metrics are there at the end."""
 
     def result(self, metrics: Mapping[str, object]) -> Result:
-        value = _found(metrics, self._clause.metric)
+        value = metrics.get(self._clause.metric)
         if not isinstance(value, int | float | str):
             return _open(f"{self._clause.metric} has no value in this run")
         came = f"{self._clause.metric} = {value if isinstance(value, str) else f'{value:.6g}'}"
@@ -339,11 +339,3 @@ class _MetricWatch:
         if holds is None:
             return _open(f"{came} does not compare with {operand!r}", came)
         return _passed(None, came) if holds else _failed(None, came)
-
-
-def _found(metrics: Mapping[str, object], key: str) -> object:
-    """A metric by its key; None if there is none."""
-    found: object = metrics
-    for part in key.split("."):
-        found = found.get(part) if isinstance(found, Mapping) else None
-    return found

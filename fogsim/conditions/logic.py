@@ -52,12 +52,15 @@ def compared(value: Value, relation: str, operand: Value) -> bool | None:
     return _COMPARE[relation](number, operand) if isinstance(operand, int | float) else None
 
 
-def passed(before: Value, now: Value, how: str, operand: Value) -> bool | None:
-    """Whether a signal ``falls below``, ``rises above``, ``becomes`` or ``changes`` between steps; None if unknown."""
+def passed(before: tuple[Value, Value], now: tuple[Value, Value], how: str) -> bool | None:
+    """Whether a signal ``falls below``, ``rises above``, ``becomes`` or ``changes`` between steps; None if unknown.
+
+    Takes the signal and its operand, which may be another signal, at either step.
+    """
     if how == "changes":
-        return _without_count(before) != _without_count(now)
+        return _without_count(before[0]) != _without_count(now[0])
     relation = {"falls below": "<", "rises above": ">", "becomes": "=="}[how]
-    earlier, later = compared(before, relation, operand), compared(now, relation, operand)
+    earlier, later = compared(before[0], relation, before[1]), compared(now[0], relation, now[1])
     return None if earlier is None or later is None else later and not earlier
 
 

@@ -40,7 +40,7 @@ class Watch:
         self.condition = condition
         self._parts = tuple(dict.fromkeys(parts_of(condition)))
         self._signals = signals_of(condition)
-        self._before: dict[Edge, Value] = {}
+        self._before: dict[Edge, tuple[Value, Value]] = {}
         self._since: dict[Held, float] = {}
         self._earlier: dict[Delayed, deque[tuple[float, bool | None]]] = {}
         self._history = History()
@@ -94,14 +94,12 @@ class Watch:
                 return self.values[right]
 
     def _passed(self, edge: Edge) -> bool | None:
-        now = self.values[edge.left]
-        if now is None:
+        now = self.values[edge.left], None if edge.right is None else self._operand(edge.right)
+        if now[0] is None or (now[1] is None and edge.right is not None):
             return None
         before = self._before.get(edge)
         self._before[edge] = now
-        if before is None:
-            return False
-        return passed(before, now, edge.how, None if edge.right is None else self._operand(edge.right))
+        return False if before is None else passed(before, now, edge.how)
 
     def _held(self, part: Held, inside: bool | None, time: float, duration: float) -> bool | None:
         if not inside:

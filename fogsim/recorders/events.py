@@ -1,7 +1,6 @@
 """What happens in a run, one row each: what the script does, collisions, faults, warnings, traffic lights, the end."""
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,7 +59,6 @@ class EventRecorder:
         self._log: RowLog | None = None
         self._faults: frozenset[str] = frozenset()
         self._warning: DriverWarning | None = None
-        self._last = -math.inf
         self._shown: dict[tuple[str, str], SignalColour] = {}
         self._open = True
 
@@ -68,7 +66,7 @@ class EventRecorder:
         """Add the events of a step."""
         rows = [self._row(step, event) for event in self._events(step)]
         self._warning = step.command.warning
-        self._faults, self._last = frozenset(fault.name for fault in step.truth.faults), step.traffic.time
+        self._faults = frozenset(fault.name for fault in step.truth.faults)
         if self._log is None:
             self._log = RowLog(self._path.with_name(EVENT_LOG), self._schema)
         if rows:
@@ -79,8 +77,7 @@ class EventRecorder:
         for begun in step.begun:
             how = "script_ends" if begun.is_over else "script_begins"
             yield _Event(begun.time, how, begun.name, begun.what, begun.who, begun.why)
-        # The step that ends a run may show once more what was last seen.
-        for hit in step.collisions if step.traffic.time > self._last else ():
+        for hit in step.collisions:
             who = (hit.collider, hit.victim)
             yield _Event(step.time, "collision", f"{hit.collider} hit {hit.victim}", f"{hit.impact_speed:.3f}", who)
         now = frozenset(fault.name for fault in step.truth.faults)

@@ -84,7 +84,7 @@ class Curves:
         self.truth.append(finite_or_none(step.truth.visibility_ahead))
         for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
             quantiles.append(step.belief.visibility_quantile(share))
-        self.collisions.extend(hit.time for hit in step.collisions)
+        self.collisions.extend(map(step.time_of, step.collisions))
         self.warning.append(step.command.warning)
         self.ahead.add(step)
         self._add_estimates(step)

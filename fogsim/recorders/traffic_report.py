@@ -61,7 +61,7 @@ class TrafficCurves:
         self.advised.append(int(np.isfinite(step.traffic.advised_speed).sum()))
         self.metered.append(finite_or_none(step.truth.visibility))
         self.least.append(least_visibility(step))
-        self.collisions.extend(hit.time for hit in step.collisions)
+        self.collisions.extend(map(step.time_of, step.collisions))
 
 
 class TrafficReportRecorder(StepReport[TrafficStep]):

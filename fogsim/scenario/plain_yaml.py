@@ -77,6 +77,16 @@ _Loader.add_implicit_resolver(
 _Loader.add_constructor("tag:yaml.org,2002:int", _whole_number)
 
 
+class Dumper(yaml.SafeDumper):
+    """Quotes texts that this or the older version of YAML would read as something else, such as 08."""
+
+
+Dumper.yaml_implicit_resolvers = {
+    first: [*yaml.SafeDumper.yaml_implicit_resolvers.get(first, ()), *_Loader.yaml_implicit_resolvers.get(first, ())]
+    for first in {*yaml.SafeDumper.yaml_implicit_resolvers, *_Loader.yaml_implicit_resolvers}
+}
+
+
 def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
     """Plain data of a YAML text, and the line of each key and list entry.
 

@@ -300,7 +300,8 @@ class ClosedLoop:
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)
-            step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK, begun=())
+            seen = dataclasses.replace(self._step, collisions=(), begun=())
+            step = dataclasses.replace(seen, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             step = self._complete_step(index, snapshot, command)
         step = dataclasses.replace(step, begun=begun) if begun else step

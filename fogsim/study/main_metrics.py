@@ -46,7 +46,10 @@ DELAY_METRICS = (
 
 
 OF_THE_BELIEF = frozenset(
-    key for metric in ("belief", "belief_ahead", "dense_fog_known") for key in definitions_of(metric)
+    key
+    for metric in ("belief", "belief_ahead", "dense_fog_known", "equipped")
+    for key in definitions_of(metric)
+    if key != "equipped_vehicles_mean"
 )
 """Metrics of what is believed of the fog; without a camera, they are those of its prior."""
 
@@ -80,7 +83,7 @@ def unknown_metrics(names: Iterable[str]) -> list[str]:
     return [
         f"unknown metric {name!r}; {suggest(name, known)}"
         for name in names
-        if name not in known and not (name.startswith(f"{METHODS_KEY}.") and name.count(".") == 2)
+        if name not in known and not (name.startswith(f"{METHODS_KEY}.") and name.count(".") >= 2)
     ]
 
 

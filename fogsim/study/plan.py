@@ -7,7 +7,7 @@ import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,14 +18,14 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError, UnknownNameError, shown, suggest
 from fogsim.scenario import Scenario, build, catalogue, scenario_from_config
-from fogsim.scenario.document import Document, read_document
+from fogsim.scenario.document import Document, apply_overrides, read_document, read_scenario_document
 from fogsim.scenario.expect.conditions import refuse
-from fogsim.scenario.loading import CountWatch, scenario_reader
+from fogsim.scenario.loading import CountWatch, scenario_file, scenario_reader
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
-from fogsim.scenario.variation import grid_mistake
+from fogsim.scenario.variation import grid_mistake, read_variation
 from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
@@ -294,9 +294,23 @@ def _loader(document: Document, written: StudyFile, may_import: MayImport) -> Ca
     name = str(written.scenario)
     beside = folder / name
     try:
-        return scenario_reader(beside if beside.exists() else name, may_import=may_import)
+        path = scenario_file(beside if beside.exists() else name)
+        _refuse_cases(read_scenario_document(path), written.settings)
+        return scenario_reader(path, may_import=may_import)
     except InputError as error:
         raise InputError(f"{document.where(('scenario',))}: scenario: {error}") from error
+
+
+def _refuse_cases(document: Document, settings: Iterable[str]) -> None:
+    """Raise InputError for a scenario with several cases, since a study would run only the first."""
+    varied = [setting for setting in settings if setting.lstrip().startswith("vary")]
+    cases = read_variation(replace(document, data=apply_overrides(document.data, varied))).cases
+    if len(cases) > 1:
+        names = ", ".join(cases[0].values)
+        raise InputError(
+            f"{document.where(('vary',))}: vary: a study runs a single case, and {names} make {len(cases)}; write "
+            "factors and seeds in their place"
+        )
 
 
 def _scenario(

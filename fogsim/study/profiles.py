@@ -54,7 +54,7 @@ class RunProfiles:
             x, y = next((place for place in places if place is not None), (math.nan, math.nan))
             self._collision_count += 1
             if len(self._collisions) < MOST_COLLISIONS:
-                self._collisions.append((hit.time, x, y, hit.impact_speed, hit.collider, hit.victim))
+                self._collisions.append((step.time_of(hit), x, y, hit.impact_speed, hit.collider, hit.victim))
 
     def add(self, span: TrafficSpan) -> None:
         """Add all vehicles of a span of steps that `update` has received."""

@@ -11,7 +11,7 @@ from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
-from fogsim.scenario.variation import NONE_FAILS, Case, Verdict
+from fogsim.scenario.variation import NONE_FAILS, Case, NoSuchCaseError, Verdict
 from fogsim.scenario.written_form import deciding
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
@@ -111,10 +111,13 @@ def collect(
     InputError
         A line for each mistake of all files.
     """
-    tests, mistakes = [], []
+    tests, mistakes, without_case = [], [], []
     for file in files:
         try:
             loaded = load_cases(file, settings, case, watch=watch, may_import=may_import, is_test=True)
+        except NoSuchCaseError as error:
+            without_case.append(str(error))
+            continue
         except InputError as error:
             mistakes.append(str(error))
             continue
@@ -129,6 +132,8 @@ def collect(
             # A selection of cases shows no rate; none of them may fail.
             verdict = loaded.variation.verdict if whole else NONE_FAILS
             tests.append(FogTest(file, name, lines, tuple(_runs(file, loaded)), verdict))
+    if len(without_case) == len(files):
+        mistakes = without_case
     if mistakes:
         raise InputError("\n".join(mistakes))
     return tests

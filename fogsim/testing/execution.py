@@ -55,8 +55,9 @@ def check_case(
                     coverage.update(instant)
                 ending = instant.ending
             summary = of_traffic.summary()
-    findings = watch.findings(summary.to_json())
-    found = {"findings": [finding_to_json(one) for one in findings], "metrics": summary.flat(), "ending": ending}
+    metrics = summary.flat()
+    findings = watch.findings(metrics)
+    found = {"findings": [finding_to_json(one) for one in findings], "metrics": metrics, "ending": ending}
     return found if coverage is None else {**found, "coverage": coverage.document(scenario.name, findings)}
 
 

@@ -146,6 +146,10 @@ class CollisionLog:
                 self._pairs.add(pair)
                 self._pending.append(collision)
 
+    def includes(self, vehicle: str | None) -> bool:
+        """Whether a vehicle is in a collision that has not been asked for."""
+        return any(vehicle in (one.collider, one.victim) for one in self._pending)
+
     def take(self) -> tuple[Collision, ...]:
         """Collisions since the last call."""
         pending, self._pending = tuple(self._pending), []

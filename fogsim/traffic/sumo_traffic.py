@@ -111,12 +111,11 @@ class SumoTraffic:
         self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
-        self._seed = 0
-        self._command = _NO_ADVICE
+        self._seed, self._command = 0, _NO_ADVICE
         self._begun, self._end = 0.0, math.inf
         self._route: RoutePosition | None = None
-        self._mark = 0
-        self._teleported = False
+        self._mark, self._teleported = 0, False
+        self._last: TrafficSnapshot | None = None
         self._roads = LoadedRoads(setup.net, setup.additional)
         self._signals: SignalReader | None = None
 
@@ -175,7 +174,7 @@ class SumoTraffic:
             # What stands next to the roads hides vehicles in clear air, too.
             self._run = replace(self._run, perception=self._perception(self._run, ClearAir()))
         self._command = _NO_ADVICE
-        self._route, self._mark, self._teleported = None, 0, False
+        self._route, self._mark, self._teleported, self._last = None, 0, False, None
         try:
             check_step_length(api, setup.step_length)
             check_microscopic(api)
@@ -349,27 +348,31 @@ class SumoTraffic:
         run.roster.update()
         if teleported or ego is None or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
-            self._route = None
-            return None
+            self._route, last, self._last = None, self._last, None
+            if last is None or not run.collisions.includes(ego):
+                return None
+            # A collision took it: it is shown once more where it was.
+            self._teleported = teleported
+            return replace(last, state=replace(last.state, time=run.roster.time), collisions=run.collisions.take())
         new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
         state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
-        off_lanes = bool(state.off_lanes[row])
         route_position, route_length = self._route.update(state.position[row], state.lane[row])
         state = self._shown(run, state)
-        return TrafficSnapshot(
+        self._last = TrafficSnapshot(
             state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
-            speed_limit=math.inf if off_lanes else run.api.lane.getMaxSpeed(state.lane[row]),
+            speed_limit=math.inf if state.off_lanes[row] else run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.leaders.of_ego(ego),
             collisions=run.collisions.take(),
             signal_ahead=run.lights.shown_to(ego),
             is_ended=run.roster.time >= self._end,
         )
+        return self._last
 
     @_translates_errors
     def observe_network(self) -> NetworkSnapshot:

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.units import visibility_from_extinction
+from fogsim.units import clock_time, visibility_from_extinction
 from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.command import Command, SpeedAdvice, Stretch
@@ -273,6 +273,16 @@ class TrafficStep:
     begun: tuple[Begun, ...] = ()
     waiting: int = 0
     cohort: Cohort | None = None
+
+    def time_of(self, collision: Collision) -> float:
+        """Time of a collision since the run began [s]: its own is by the clock of the traffic simulation.
+
+        Parameters
+        ----------
+        collision : Collision
+            One of this step.
+        """
+        return clock_time(self.time + collision.time - self.traffic.time)
 
 
 @dataclass(frozen=True, slots=True)

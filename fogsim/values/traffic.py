@@ -307,7 +307,7 @@ class Collision:
     Attributes
     ----------
     time : float
-        Instant [s].
+        Instant, by the clock of `TrafficState` [s].
     collider, victim : str
         Their ids.
     impact_speed : float

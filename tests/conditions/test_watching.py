@@ -29,6 +29,13 @@ def test_passing_a_value() -> None:
     assert over("ego.speed falls below 20 m/s", [5, 4]) == [False, False]
 
 
+def test_a_signal_passes_another_one_whichever_of_both_moves() -> None:
+    watch = Watch(parse_condition("ego.speed rises above advice"))
+    advised = 33.0, 33.0, 15.0, 15.0, 33.0, 20.0
+    found = [watch.update(make_step(i, time=0.5 * i, speed=25.0, advised=one)) for i, one in enumerate(advised)]
+    assert found == [False, False, True, False, False, True]
+
+
 def test_one_signal_in_two_tests_is_read_once() -> None:
     both = "ego.speed falls below 20 m/s and not ego.speed falls below 20 m/s"
     assert over(both, [25, 15, 25]) == [False, False, False]

@@ -90,6 +90,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
         ("a: {metric: minimum_gab_m < 3}", "unknown metric 'minimum_gab_m'; did you mean 'minimum_gap_m'?"),
         ("a: {metric: minimum_gap_m}", "expect.a.metric: expected a key of metrics.json"),
         ("a: {metric: minimum_gap_m < 3 kg}", "the unit 'kg' does not fit"),
+        ("a: {metric: ending != colision}", "unknown value 'colision' of ending; did you mean 'collision'?"),
         ("a: {metric: minimum_gap_m < few}", "expected a number after <, got 'few'"),
         ("a: 3", "expect.a: "),
     ]:
@@ -104,6 +105,14 @@ def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
     scenario = load(tmp_path, "  a: {never: ego.collision}\n")
     with pytest.raises(InputError, match=r"belief\.error needs frames"):
         override(scenario, ["renderer=none", "estimators=[]", "expect.a.never=belief.error > 20 %"])
+
+
+def test_metrics_of_own_methods(tmp_path: Path) -> None:
+    own = 'class Own:\n    method = "own:Own"\n    def __init__(self, camera): ...\n    def reset(self): ...\n'
+    (tmp_path / "own.py").write_text(f"{own}    def update(self, observation): ...\n", encoding="utf-8")
+    settings = ["estimators=['own:Own']", "expect.a.metric=estimators.own:Own.valid_share >= 0.5"]
+    scenario = override(load(tmp_path, "  a: {never: ego.collision}\n"), settings)
+    assert [clause.expected for clause in clauses_of(scenario.expect)][-1] == "estimators.own:Own.valid_share >= 0.5"
 
 
 def test_metrics_in_their_units(tmp_path: Path) -> None:

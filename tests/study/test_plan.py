@@ -216,11 +216,22 @@ def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:
         ("[advice=none]", "[advice=none, 'timeline=[{when: belief.visibility < 9 m, do: {fog: {visibility_m: 50}}}]']"),
         ("seeds: 3", "metrics: [belief_coverage_share]"),
         ("seeds: 3", "metrics: [estimators.joint_road.coverage_share]"),
+        ("seeds: 3", "metrics: [equipped_belief_coverage_share]"),
     ],
 )
 def test_what_goes_by_the_camera_has_its_frames(tmp_path: Path, place: str, needs_frames: str) -> None:
     text = STUDY.replace("duration_s=2]", "lighting=low_beam]").replace(place, needs_frames)
     assert {run.scenario.renderer for run in load_study(written(tmp_path, text)).runs} == {"auto"}
+
+
+def test_a_scenario_of_several_cases_is_refused_unless_one_is_chosen(tmp_path: Path) -> None:
+    varied = STUDY.replace("motorway_fog_bank", "patchy_fog").replace(
+        "fog.visibility_m", "fog.patches.correlation_length_m"
+    )
+    with pytest.raises(InputError, match=r"mine\.yaml:2: scenario: .*a single case, and strength, run make 4; write"):
+        load_study(written(tmp_path, varied))
+    chosen = varied.replace("duration_s=2]", "duration_s=2, 'vary={strength: [0.4], run: 1 seed}']")
+    assert {run.scenario.fog.patches.strength for run in load_study(written(tmp_path, chosen)).runs} == {0.4}
 
 
 def test_cells_that_nothing_distinguishes_are_named(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ def step(index: int, road: TrafficState, **about: float) -> Step:
     """One second a step; the ego is the first vehicle, which started where its route does."""
     place = float(np.hypot(*road.position[0, :2]))
     made = make_step(index, time=float(index), route_position=place, **about)
-    return dataclasses.replace(made, traffic=road, ego=0)
+    return dataclasses.replace(made, traffic=dataclasses.replace(road, time=made.time), ego=0)
 
 
 def drive() -> list[Step]:

@@ -62,6 +62,13 @@ def test_cases_and_expectations_are_those_that_are_asked_for(write: Write) -> No
     assert collect([file], keywords=parse_keywords("night")) == []
 
 
+def test_files_without_the_case_are_left_out_unless_none_has_it(write: Write) -> None:
+    files = [write("a.fog.yaml", SWEPT), write("b.fog.yaml")]
+    assert [test.path for test in collect(files, case="visibility=60 m")] == files[:1]
+    with pytest.raises(InputError, match=r"varies no visibilty.*\n.*varies no visibilty"):
+        collect(files, case="visibilty=60 m")
+
+
 def test_a_run_has_another_key_when_anything_changes(write: Write) -> None:
     def keys(text: str) -> set[str]:
         return {run.key for test in collect([write("a.fog.yaml", text)]) for run in test.runs}

@@ -144,7 +144,7 @@ class FramePanel:
         self._speed = StripChart(
             (_RIGHT - _LEFT, 70), _SPEED_AXIS, (Curve(ADVICE, (1,)), Curve(TEXT, (0,))), "speed and advice [km/h]"
         )
-        self._collision: Collision | None = None
+        self._collision: tuple[float, Collision] | None = None
         self._reports: list[FogReport] = []
         self._background = _draw_background()
 
@@ -189,9 +189,9 @@ class FramePanel:
 
     def _draw_banners(self, draw: ImageDraw.ImageDraw, step: Step) -> None:
         if step.collisions:
-            self._collision = step.collisions[-1]
-        if self._collision is not None and step.time - self._collision.time <= _BANNER_TIME:
-            hit = self._collision
+            self._collision = step.time_of(step.collisions[-1]), step.collisions[-1]
+        if self._collision is not None and step.time - self._collision[0] <= _BANNER_TIME:
+            _, hit = self._collision
             own = step.traffic.ids[step.ego] in {hit.collider, hit.victim}
             text = f"COLLISION   {hit.collider} → {hit.victim}   {_kmh(hit.impact_speed):.0f} km/h"
             _draw_banner(draw, 0, text, ALARM if own else AMBER)

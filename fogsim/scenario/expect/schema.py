@@ -23,12 +23,13 @@ from fogsim.conditions import (
 )
 from fogsim.conditions.logic import compared
 from fogsim.conditions.parsing import OPERATORS
-from fogsim.errors import shown
+from fogsim.errors import shown, suggest
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Flag, Id, Section, Time, Whole
 from fogsim.units import clock_time
 from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
+from fogsim.values import Ending
 
 _CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
 
@@ -53,7 +54,7 @@ _WANTED: Mapping[str, Mapping[str, bool]] = {
 
 _TIMES = re.compile(r"\s*(\d+)\s*times?\s*\Z")
 
-_METRIC = re.compile(r"\s*([A-Za-z_][\w.]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
+_METRIC = re.compile(r"\s*([A-Za-z_][^\s<>=!]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
 
 
 _SHARE = (0.0, 1.0)
@@ -227,6 +228,8 @@ def metric_check(name: str, written: str) -> MetricCheck:
     if match is None:
         raise ValueError(f"expected a key of metrics.json, one of {' '.join(OPERATORS)} and a value")
     key, relation, value = match.groups()
+    if key == "ending" and value not in (endings := [one.value for one in Ending]):
+        raise ValueError(f"unknown value {shown(value)} of ending; {suggest(value, endings)}")
     if not is_quantity(value):
         if relation not in ("==", "!="):
             raise ValueError(f"expected a number after {relation}, got {shown(value)}")

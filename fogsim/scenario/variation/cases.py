@@ -282,6 +282,10 @@ def _put(value: Any, values: Mapping[str, Value]) -> Any:
     return _PLACE.sub(lambda found: "$" if found[0] == "$$" else value_text(values[_names(found[0])[0]]), value)
 
 
+class NoSuchCaseError(InputError):
+    """A file has no case with the values that were asked for."""
+
+
 def chosen_cases(variation: Variation, wanted: str, where: object, seed: int | None = None) -> tuple[Case, ...]:
     """Cases that match comma-separated ``name=value`` pairs, as in `Case.label`; all cases for "".
 
@@ -300,7 +304,7 @@ def chosen_cases(variation: Variation, wanted: str, where: object, seed: int | N
             fitting = [_case(variation.varied, {**case.values, name: value}) for case in others]
         if not fitting:
             known = dict.fromkeys(value_text(case.values[name]) for case in cases)
-            raise InputError(f"--case {wanted}: {where} has no {name}={text}; {suggest(text, known)}")
+            raise NoSuchCaseError(f"--case {wanted}: {where} has no {name}={text}; {suggest(text, known)}")
         cases = fitting
     return tuple(cases if seed is None else (replace(case, seed=seed) for case in cases))
 
@@ -313,7 +317,7 @@ def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:
         if not equals or not name:
             raise InputError(f"--case {shown(wanted)}: expected name=value, with commas between, got {shown(part)}")
         if name not in known:
-            raise InputError(f"--case {wanted}: {where} varies no {name}; {suggest(name, known)}")
+            raise NoSuchCaseError(f"--case {wanted}: {where} varies no {name}; {suggest(name, known)}")
         pairs[name] = text
     return pairs
 

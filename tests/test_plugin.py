@@ -185,6 +185,13 @@ def test_settings_of_roads_and_vehicles_are_those_of_the_simulation_that_runs(li
     fogsim.attach(libsumo, scenario=fogsim.load_scenario("patchy_fog"), ego=EGO).close()
 
 
+def test_a_camera_period_other_than_the_simulations_step_is_refused(libsumo: Any) -> None:
+    slower = ["clocks.camera_period_s=1", "clocks.decision_period_s=1"]
+    with pytest.raises(InputError, match=r"clocks\.camera_period_s: there is a frame at each step .*, 0\.5 s"):
+        fogsim.attach(libsumo, ego=EGO, visibility=100.0, settings=slower)
+    fogsim.attach(libsumo, ego=EGO, visibility=100.0, settings=["clocks.decision_period_s=1"]).close()
+
+
 def test_what_is_no_simulation() -> None:
     with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
         fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)

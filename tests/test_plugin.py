@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -209,6 +210,31 @@ def test_a_simulation_that_is_lost(connection: Any) -> None:
     with pytest.raises(SimulationError, match="SUMO to which FogSim is attached is lost"):
         session.observe()
     session.close()
+
+
+def test_an_interruption_in_a_message_is_what_ends_a_session(connection: Any) -> None:
+    """Its answer is then taken for that to FogSim's next message."""
+    session, real = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=BLIND), connection._socket
+
+    def interrupted(_: int) -> bytes:
+        raise KeyboardInterrupt
+
+    def loop() -> None:
+        with session:
+            connection.simulationStep()
+            session.advise(session.observe())
+            connection._socket = SimpleNamespace(send=real.send, recv=interrupted)
+            try:
+                connection.simulationStep()
+            finally:
+                connection._socket = real
+
+    with pytest.raises(KeyboardInterrupt):
+        loop()
+    with pytest.raises(SimulationError, match="the session is closed"):
+        session.observe()
+    real.close()
+    connection._socket = None
 
 
 def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -> None:

@@ -140,12 +140,14 @@ class AttachedSession:
     def _end(self) -> None:
         if not self._closed and not self._started and self._looked:
             warnings.warn(self._traffic.absence(), stacklevel=2)
-        if not self._closed and self._started:
-            # No one is left to be held in a simulation that has ended first.
-            with contextlib.suppress(SimulationError):
-                self._traffic.release()
-        self._closed = True
-        self._equipment.close()
+        try:
+            if not self._closed and self._started:
+                # No one is left to be held in a simulation that has ended first.
+                with contextlib.suppress(SimulationError):
+                    self._traffic.release()
+        finally:
+            self._closed = True
+            self._equipment.close()
 
     def __enter__(self) -> Self:
         return self
@@ -156,4 +158,6 @@ class AttachedSession:
         if error is None:
             self.close()
         else:
-            self._end()
+            # The error counts: after a message that was broken off, traci fails in odd ways.
+            with contextlib.suppress(Exception):
+                self._end()

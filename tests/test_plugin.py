@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,13 @@ def test_settings_of_roads_and_vehicles_are_those_of_the_simulation_that_runs(li
     fogsim.attach(libsumo, scenario=fogsim.load_scenario("patchy_fog"), ego=EGO).close()
 
 
+def test_a_camera_period_other_than_the_simulations_step_is_refused(libsumo: Any) -> None:
+    slower = ["clocks.camera_period_s=1", "clocks.decision_period_s=1"]
+    with pytest.raises(InputError, match=r"clocks\.camera_period_s: there is a frame at each step .*, 0\.5 s"):
+        fogsim.attach(libsumo, ego=EGO, visibility=100.0, settings=slower)
+    fogsim.attach(libsumo, ego=EGO, visibility=100.0, settings=["clocks.decision_period_s=1"]).close()
+
+
 def test_what_is_no_simulation() -> None:
     with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
         fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)
@@ -202,6 +210,31 @@ def test_a_simulation_that_is_lost(connection: Any) -> None:
     with pytest.raises(SimulationError, match="SUMO to which FogSim is attached is lost"):
         session.observe()
     session.close()
+
+
+def test_an_interruption_in_a_message_is_what_ends_a_session(connection: Any) -> None:
+    """Its answer is then taken for that to FogSim's next message."""
+    session, real = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=BLIND), connection._socket
+
+    def interrupted(_: int) -> bytes:
+        raise KeyboardInterrupt
+
+    def loop() -> None:
+        with session:
+            connection.simulationStep()
+            session.advise(session.observe())
+            connection._socket = SimpleNamespace(send=real.send, recv=interrupted)
+            try:
+                connection.simulationStep()
+            finally:
+                connection._socket = real
+
+    with pytest.raises(KeyboardInterrupt):
+        loop()
+    with pytest.raises(SimulationError, match="the session is closed"):
+        session.observe()
+    real.close()
+    connection._socket = None
 
 
 def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -> None:

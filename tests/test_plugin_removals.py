@@ -1,13 +1,16 @@
 """Vehicles that the user's own loop takes away, in simulations to which FogSim is attached."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import fogsim
 from fogsim.simulation.plugin import AttachedSession
-from fogsim.values import Step
+from fogsim.values import Command, EgoControl, Lamp, Step
+from tests.helpers.attached import libsumo_in_town
+from tests.traffic.common import NET, QUIET
 
 BLIND = ("renderer=none", "estimators=[]")
 EGO = "veh3"
@@ -103,3 +106,52 @@ def test_an_ego_that_is_put_back_begins_its_route_anew(api: Any, own: AttachedSe
         api.simulationStep()
         after = own.observe()
     assert after.route_position == pytest.approx(60.0, abs=6.0)
+
+
+def test_an_ego_that_is_put_back_is_driven_and_lit_as_before(api: Any, own: AttachedSession) -> None:
+    def modes() -> tuple[int, int]:
+        return api.vehicle.getSpeedMode("mine"), api.vehicle.getLaneChangeMode("mine")
+
+    command, usual = Command(lamps=Lamp.REAR_FOG, control=EgoControl(0.0)), modes()
+    for number in range(12):
+        api.simulationStep()
+        step = own.observe()
+        if step is not None:
+            own.advise(step, command)
+        if number == 5:
+            api.vehicle.remove("mine")
+        if number == 7:
+            api.vehicle.add("mine", "mine")
+    assert (*modes(), api.vehicle.getParameter("mine", "fogsim-lamps")) == (0, 0, "rear_fog")
+    own.close()
+    assert modes() == usual
+
+
+STANDS = '<stop lane="approach_0" endPos="700" duration="900"/>'
+"""Before a car that sees this vehicle from 95 m, and could stop within 65 m and a second."""
+
+
+def test_drivers_go_on_in_the_fog_when_the_ego_has_left(tmp_path: Path) -> None:
+    vehicles = '<vType id="t" sigma="0" maxSpeed="20" lcStrategic="-1" lcSpeedGain="0"/>'
+    vehicles += '<route id="way" edges="approach bank"/>'
+    for name, place, stop in (("wreck", 699, STANDS), ("car", 250, "")):
+        start = f'depart="0" departLane="0" departPos="{place}" departSpeed="{0 if stop else 20}"'
+        vehicles += f'<vehicle id="{name}" type="t" route="way" {start}>{stop}</vehicle>'
+    vehicles += '<trip id="ego" from="approach" to="approach" depart="0" departPos="850" departLane="2"/>'
+    (tmp_path / "mine.rou.xml").write_text(f"<routes>{vehicles}</routes>", encoding="utf-8")
+    options = ("--step-length", "0.5", "--collision.action", "warn", "--collision.mingap-factor", "0")
+    hits, looks = 0, []
+    with libsumo_in_town(["-n", str(NET), "-r", str(tmp_path / "mine.rou.xml"), *options, *QUIET]) as api:
+        settings = (*BLIND, "drivers.speed_choice=unaffected")
+        with fogsim.attach(api, ego="ego", visibility=100.0, settings=settings) as session:
+            for _ in range(80):
+                api.simulationStep()
+                step = session.observe()
+                if step is not None:
+                    session.advise(step)
+                looks.append(step is not None)
+                hits += len(api.simulation.getCollisions())
+        assert looks[0]
+        assert sum(looks) < 10
+        assert hits == 0
+        assert (api.vehicle.getSpeed("car"), api.vehicle.getLanePosition("car")) == pytest.approx((0.0, 692.5), abs=2.0)

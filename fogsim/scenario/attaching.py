@@ -117,19 +117,23 @@ def attach(
         If no simulation runs there.
     """
     fog = [] if visibility is None else [f"fog.visibility_m={float(visibility)!r}"]
-    given = scenario
+    given, step = scenario, step_length(api)
     if scenario is not None:
         # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
-        clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
+        clocks = _clocks(step, scenario.clocks.decision_period_s)
         scenario = override(scenario, [*clocks, *fog, *settings], others_add_vehicles=True)
     elif ego is None:
         raise InputError("attach: ego is missing: which vehicle is the ego?")
     else:
-        scenario = attached_scenario(ego, [*_clocks(step_length(api)), *fog, *settings])
+        scenario = attached_scenario(ego, [*_clocks(step), *fog, *settings])
     for key in _OF_THE_SIMULATION:
         now, before = (None if one is None else attrgetter(key)(one) for one in (scenario, given))
         if now and now != before:
             raise InputError(f"attach: {key}: roads and vehicles are those of the simulation that runs; leave it out")
+    if not math.isclose(scenario.clocks.camera_period_s, step):
+        raise InputError(
+            f"attach: clocks.camera_period_s: there is a frame at each step of the simulation, {step:g} s; leave it out"
+        )
     config = scenario.run_config()
     setup = dataclasses.replace(
         config.traffic,
@@ -137,6 +141,7 @@ def attach(
         net=None if net is None else Path(net),
         additional=(),
         config=None,
+        sight=config.traffic.sight if drivers else None,
     )
     return AttachedSession(config, AttachedTraffic(setup, api), drivers, seed)
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import math
 import warnings
 from types import TracebackType
 from typing import Self
@@ -52,13 +53,15 @@ class AttachedSession:
         """Take in what the last simulation step has brought; to be called after each.
 
         Returns the finished instant, its time counted from the first; None while the ego is not on the road. An ego
-        that is teleported is off the road at least once.
+        that is teleported is off the road at least once. Until it is back the last command, if there was any, stays in
+        force, and the other drivers go on in the fog.
         """
         if self._closed:
             raise SimulationError("the session is closed")
         self._looked = True
+        now = math.nan
         if self._started:
-            self._traffic.look()
+            now = self._traffic.look()
         elif self._traffic.ego_is_there():
             self._traffic.start(self._seed)
             self._started = True
@@ -66,6 +69,9 @@ class AttachedSession:
             return None
         snapshot = self._traffic.observe()
         if snapshot is None:
+            if self._last is not None:
+                self._drivers_fog.set_time(self._elapsed(now))
+                self._traffic.obey(self._command)
             return None
         if not self._equipped:
             body = snapshot.state.types[snapshot.ego]
@@ -134,12 +140,14 @@ class AttachedSession:
     def _end(self) -> None:
         if not self._closed and not self._started and self._looked:
             warnings.warn(self._traffic.absence(), stacklevel=2)
-        if not self._closed and self._started:
-            # No one is left to be held in a simulation that has ended first.
-            with contextlib.suppress(SimulationError):
-                self._traffic.release()
-        self._closed = True
-        self._equipment.close()
+        try:
+            if not self._closed and self._started:
+                # No one is left to be held in a simulation that has ended first.
+                with contextlib.suppress(SimulationError):
+                    self._traffic.release()
+        finally:
+            self._closed = True
+            self._equipment.close()
 
     def __enter__(self) -> Self:
         return self
@@ -150,4 +158,6 @@ class AttachedSession:
         if error is None:
             self.close()
         else:
-            self._end()
+            # The error counts: after a message that was broken off, traci fails in odd ways.
+            with contextlib.suppress(Exception):
+                self._end()

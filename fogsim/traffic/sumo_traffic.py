@@ -1,5 +1,6 @@
 """Traffic by SUMO, wherever it runs."""
 
+import contextlib
 import functools
 import math
 import warnings
@@ -149,7 +150,7 @@ class SumoTraffic:
             reader=reader(api, setup.ego, setup.reading_radius, roster),
             lane_changes=changes,
             speeds=speeds,
-            driving=EgoDriving(api, setup.ego, setup.step_length),
+            driving=EgoDriving(api, setup.ego, setup.step_length, session),
             lamps=LampPublisher(api),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
@@ -270,18 +271,14 @@ class SumoTraffic:
     @_translates_errors
     def advance(self, command: Command) -> None:
         """Move by one traffic step; see `Traffic.advance`."""
-        run = self._running
-        self._obey(run, command)
+        self.obey(command)
         self._link.step()
-        self._read_step(run)
+        self.look()
 
     @_translates_errors
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step of a simulation that another program steps."""
-        self._obey(self._running, command)
-
-    def _obey(self, run: _Run, command: Command) -> None:
-        self._command = command
+        """Put a command in force for the next step."""
+        run, self._command = self._running, command
         orders = self._play_script(run, command)
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
             orders.pop(self._setup.ego, None)
@@ -290,11 +287,6 @@ class SumoTraffic:
         run.lamps.publish(lamps, run.roster.present)
         run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command, lamps)
-
-    @_translates_errors
-    def look(self) -> None:
-        """Read the last step of a simulation that another program steps."""
-        self._read_step(self._running)
 
     def _play_script(self, run: _Run, command: Command) -> dict[str, Order]:
         run.roster.update()
@@ -322,7 +314,7 @@ class SumoTraffic:
     def _step(self, run: _Run) -> None:
         self._update_drivers(run, _NO_ADVICE, self._published_lamps())
         self._link.step()
-        self._read_step(run)
+        self.look()
 
     def _update_drivers(self, run: _Run, command: Command, lamps: Mapping[str, Lamp]) -> None:
         if run.perception is not None:
@@ -330,7 +322,10 @@ class SumoTraffic:
         if run.drivers is not None:
             run.drivers.update(command)
 
-    def _read_step(self, run: _Run) -> None:
+    @_translates_errors
+    def look(self) -> float:
+        """Read the last step; return its time [s]."""
+        run = self._running
         run.collisions.add(run.reader.collisions())
         run.roster.update()
         if self._link.shared:
@@ -339,6 +334,7 @@ class SumoTraffic:
         self._teleported |= self._setup.ego in run.roster.teleported
         run.lanes.update()
         run.persons.look()
+        return run.roster.time
 
     @_translates_errors
     def observe(self) -> TrafficSnapshot | None:
@@ -428,9 +424,13 @@ class SumoTraffic:
         seen, _ = run.roster.entered_since(0)
         return run.script.unplayed({*seen, *seen_before}, run.roster.present, self._setup.keep_lane)
 
-    def _release(self) -> None:
+    @_translates_errors
+    def release(self) -> None:
         """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""
         run = self._running
+        if not run.mark.is_there():
+            # In a simulation that was loaded since, other vehicles have the same names.
+            return
         run.roster.reload()
         run.driving.apply(None, run.roster.present)
         run.speeds.release(run.roster.present)
@@ -442,7 +442,10 @@ class SumoTraffic:
             run.drivers.release()
 
     def close(self) -> None:
-        """End the simulation; see `Traffic.close`."""
+        """End the simulation, or leave it to its other clients; see `Traffic.close`."""
+        if self._run is not None and self._link.shared:
+            with contextlib.suppress(SimulationError):
+                self.release()
         was_running, self._run = self._run is not None, None
         self._link.end()
         left_out = [one for one in self._link.warnings() if LEFT_OUT.search(one)]

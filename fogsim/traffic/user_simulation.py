@@ -110,13 +110,6 @@ class AttachedTraffic(SumoTraffic):
                 return f"the ego {self.ego!r} did not appear while FogSim was attached: it is a person; name a vehicle"
         return f"the ego {self.ego!r} did not appear while FogSim was attached; {describe_seen(self.ego, self._seen)}"
 
-    def release(self) -> None:
-        """Give every vehicle back what was changed about it."""
-        with self._attached.translated_errors():
-            # In a simulation that was loaded since, other vehicles have the same names.
-            if self._running.mark.is_there():
-                self._release()
-
 
 def step_length(api: Api) -> float:
     """Step of a simulation that runs [s]."""

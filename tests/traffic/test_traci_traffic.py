@@ -5,6 +5,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -131,6 +132,57 @@ def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: l
                 traffic.start(2)
     for here, there in zip(in_process, seen, strict=True):
         assert equal(here.state, there.state)
+
+
+def test_who_goes_on_finds_every_vehicle_as_it_was(sumo_process: Callable) -> None:
+    """FogSim has left the simulation to another client."""
+    setup = replace(SETUP, sight=DriverSight(10_000.0), drivers=DriverSetup(too_fast))
+    left, looked = threading.Event(), threading.Event()
+    during: set[str] = set()
+    after: set[str] = set()
+
+    def look(api: Api) -> None:
+        found = {
+            key
+            for key in ("ignored", "maxSpeed", "laneChangeMode", "lcSpeedGain")
+            for vehicle in api.vehicle.getIDList()
+            if api.vehicle.getParameter(vehicle, f"fogsim.{key}")
+        }
+        if left.is_set():
+            after.update(found)
+            looked.set()
+        else:
+            during.update(found)
+
+    with sumo_process(command_line(SETUP, 1), clients=2) as (port, _):
+        traffic = traci_traffic(setup, TraciLink(HOST, port, order=1))
+        with stepping(traffic, port, 2, look):
+            traffic.enter_fog(FOG)
+            drive(traffic, 1)
+            traffic.close()
+            left.set()
+            assert looked.wait(60)
+    assert during == {"ignored", "maxSpeed", "laneChangeMode", "lcSpeedGain"}
+    assert not after
+
+
+def test_a_message_that_was_broken_off_ends_the_connection(link: TraciLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its answer would be taken for that to the next one, and SUMO would make the step of both."""
+    traffic = traci_traffic(SETUP, link)
+    traffic.start(1)
+
+    def interrupted(*_: object) -> bytes:
+        raise KeyboardInterrupt
+
+    limited = link._connection._socket
+    real = limited._socket
+    with monkeypatch.context() as patch:
+        patch.setattr(limited, "_socket", SimpleNamespace(sendall=real.sendall, recv=interrupted))
+        with pytest.raises(KeyboardInterrupt):
+            traffic.advance(Command())
+    with pytest.raises(SimulationError, match="was broken off before its answer: connect again"):
+        traffic.advance(Command())
+    traffic.close()
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -188,6 +188,11 @@ class Claims:
         values[self._session] = value
         self._put_in_force(vehicle, now, values)
 
+    def hold(self, vehicle: str, value: float) -> None:
+        """Claim a value that the attribute does not have."""
+        if self._attribute.read(self._vehicles, vehicle) != value:
+            self.claim(vehicle, value)
+
     def withdraw(self, vehicle: str) -> None:
         """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force."""
         # Before anything else is asked: mostly there is none.

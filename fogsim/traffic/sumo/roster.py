@@ -18,13 +18,14 @@ _GETTERS = {
 """Getters, and their variables in SUMO's TraCI protocol."""
 
 _CHECK_PERIOD = 1.0
-"""Time after which the vehicles are counted [s], should somebody have removed one by hand."""
+"""Time after which the vehicles are counted where that is a message [s], should somebody have removed one by hand."""
 
 
 class Roster:
     """Keeps the set of vehicles on the road by which have entered and left in the last step.
 
-    All ids are asked for at first, when steps were missed, and when once a second their number is another.
+    All ids are asked for at first, when steps were missed, and when their number is another: SUMO reports those that a
+    calibrator removes a step late, and those that are removed by hand not at all.
 
     Parameters
     ----------
@@ -68,7 +69,6 @@ class Roster:
         now = self._now()
         if now == self.time:
             return
-        self._check_mark(often=True)
         self.teleported = self._teleporting()
         # Lists of changes are of one step only: after a jump of time they are incomplete.
         if not 0.0 < now - self.time < 1.5 * self._step:
@@ -83,14 +83,18 @@ class Roster:
         self._leave(self.teleported)
         self._enter(self._returned())
         self._leave(self._arrived())
-        if now - self._checked >= _CHECK_PERIOD:
+        if not self._remote or now - self._checked >= _CHECK_PERIOD:
             self._checked = now
             self._check_mark()
-            self.check_count()
+            self._recount()
 
     def check_count(self) -> None:
-        """Notice vehicles removed by hand, which SUMO does not report; asks for all ids if there are any."""
-        self._check_mark(often=True)
+        """Notice vehicles that are gone without a report; asks for all ids if there are any."""
+        if not self._remote:
+            self._check_mark()
+        self._recount()
+
+    def _recount(self) -> None:
         if self._count() != len(self.present):
             self.reload()
 
@@ -102,9 +106,9 @@ class Roster:
         self._leave(self.present.difference(ids))
         self._enter(ids)
 
-    def _check_mark(self, *, often: bool = False) -> None:
-        """Check that the simulation is still the same; often only where that is no message to another process."""
-        if self._mark is not None and not (often and self._remote):
+    def _check_mark(self) -> None:
+        """Check that the simulation is still the same."""
+        if self._mark is not None:
             self._mark.check()
 
     def _enter(self, vehicles: Sequence[str]) -> None:

@@ -138,17 +138,24 @@ class _LimitedSocket:
         self._socket = connected
         self._timeout = timeout
         self._where = where
+        # Parts of an answer that are to come: its length, and the rest.
+        self._missing = 0
         connected.settimeout(timeout if timeout < _LONGEST_TIMEOUT else None)
 
     def recv(self, size: int) -> bytes:
         """Wait for up to `size` bytes."""
         try:
-            return self._socket.recv(size)
+            received = self._socket.recv(size)
         except TimeoutError as error:
             raise self._timed_out() from error
+        self._missing -= len(received) == size
+        return received
 
     def send(self, message: bytes) -> None:
         """Send a whole message; with a time limit, a plain ``send`` may stop half-way."""
+        if self._missing:
+            raise SimulationError(f"a message to SUMO {self._where} was broken off before its answer: connect again")
+        self._missing = 2
         try:
             self._socket.sendall(message)
         except TimeoutError as error:

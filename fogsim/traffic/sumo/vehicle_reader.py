@@ -50,6 +50,10 @@ _MARGIN = 50.0
 """SUMO gathers vehicles by the lanes near the ego; this much more radius leaves none out [m]."""
 
 
+_TURNS = {"junction": 0.5 * math.pi, "junctionPedestrian": 0.5 * math.pi, "frontal": math.pi}
+"""About the angle between the ways of two that collide, by SUMO's types of collisions; 0 of the others [rad]."""
+
+
 class _DynamicState(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
 
@@ -244,12 +248,10 @@ class VehicleReader:
         return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
 
     def _impact_speed(self, hit: Any) -> float:
-        """Size of the difference of two velocities [m/s]; along one road, of two speeds."""
-        if hit.type != "junction":
-            return abs(float(hit.colliderSpeed - hit.victimSpeed))
-        vehicle, turn = self._api.vehicle, 0.5 * math.pi
-        # Those that SUMO has removed already show no headings: ways cross at about a right angle.
-        if {hit.collider, hit.victim}.issubset(vehicle.getIDList()):
+        """Size of the difference of two velocities [m/s]."""
+        vehicle, turn = self._api.vehicle, _TURNS.get(hit.type, 0.0)
+        # Those that SUMO has removed already show no headings.
+        if turn and {hit.collider, hit.victim}.issubset(vehicle.getIDList()):
             turn = math.radians(vehicle.getAngle(hit.collider) - vehicle.getAngle(hit.victim))
         return math.hypot(hit.colliderSpeed - hit.victimSpeed * math.cos(turn), hit.victimSpeed * math.sin(turn))
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from fogsim.errors import SimulationError
 from fogsim.traffic.appearance import TRAINS, body_kind
 from fogsim.traffic.setup import ANY_EGO
+from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, SPEED_MODE, Claims
 from fogsim.traffic.sumo.link import Api, edge_length, getter, has_lane, is_off_lanes
 from fogsim.values import EgoControl
 
@@ -103,11 +104,13 @@ _STAY = 1.0  # [s]
 class EgoDriving:
     """Drives the ego by commands; without any, SUMO's driver takes over again (`step_length` [s])."""
 
-    def __init__(self, api: Api, ego: str | None, step_length: float) -> None:
+    def __init__(self, api: Api, ego: str | None, step_length: float, session: str) -> None:
         self._api = api
         self._ego = ego
         self._step_length = step_length
-        self._modes: tuple[int, int] | None = None
+        # Apart from the session's other claims.
+        self._modes = tuple(Claims(api, mode, f"{session} control") for mode in (SPEED_MODE, LANE_CHANGE_MODE))
+        self._is_driven = False
         self._last: EgoControl | None = None
         self._planned_from: float | None = None
 
@@ -118,15 +121,15 @@ class EgoDriving:
         """
         ego, vehicles = self._ego, self._api.vehicle
         if ego is None or ego not in present:
+            self._planned_from = None
             return False
         if control is None:
             self._release(ego)
             return False
-        if self._modes is None:
-            self._modes = int(vehicles.getSpeedMode(ego)), int(vehicles.getLaneChangeMode(ego))
-            vehicles.setSpeedMode(ego, _NO_CHECKS)
-            vehicles.setLaneChangeMode(ego, _NO_CHECKS)
-            self._planned_from = None
+        for modes in self._modes:
+            # Another vehicle may have come under the ego's name.
+            modes.hold(ego, _NO_CHECKS)
+        self._is_driven = True
         now, acceleration = float(vehicles.getSpeed(ego)), control.acceleration
         if control.brakes_with_driver and acceleration < 0.0:
             acceleration = min(acceleration, self._planned_by_driver(ego))
@@ -146,9 +149,8 @@ class EgoDriving:
         return (planned - self._planned_from) / self._step_length
 
     def _release(self, ego: str) -> None:
-        if self._modes is not None:
-            speed_mode, change_mode = self._modes
-            self._api.vehicle.setSpeedMode(ego, speed_mode)
-            self._api.vehicle.setLaneChangeMode(ego, change_mode)
+        if self._is_driven:
+            for modes in self._modes:
+                modes.withdraw(ego)
             self._api.vehicle.setSpeed(ego, _SUMO_DRIVES)
-        self._modes = self._last = None
+        self._is_driven, self._last, self._planned_from = False, None, None

@@ -75,7 +75,9 @@ class LampPublisher:
     def publish(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
         """Publish the lamps that have changed."""
         for vehicle, lit in lamps.items():
-            if lit != self._published.get(vehicle) and vehicle in present:
+            if vehicle not in present:
+                self._published.pop(vehicle, None)
+            elif lit != self._published.get(vehicle):
                 self._api.vehicle.setParameter(vehicle, _LAMPS_PARAMETER, lamp_names(lit))
                 self._published[vehicle] = lit
 

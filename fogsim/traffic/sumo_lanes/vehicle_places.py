@@ -84,8 +84,8 @@ class SumoVehiclePlaces:
         return self._directions.is_against(vehicle, self._lane(vehicle))
 
     def _ego_route(self) -> tuple[str, ...]:
-        """Edges of the ego's route; of its last one when it has left the road."""
-        if self._ego is not None and (self._ego in self._roster.present or not self._route[1]):
+        """Edges of the ego's route; of its last one when it has left the road, none if it was not looked at before."""
+        if self._ego is not None and self._ego in self._roster.present:
             route = self._api.vehicle.getRouteID(self._ego)
             if route != self._route[0]:
                 self._route = (route, tuple(self._api.vehicle.getRoute(self._ego)))
@@ -94,6 +94,8 @@ class SumoVehiclePlaces:
     def _find_pieces(self, stretch: Stretch) -> list[_Piece]:
         """What of a road lies on a stretch of it."""
         edges = stretch.edges or self._ego_route()
+        if not edges:
+            return []
         if edges not in self._roads:
             check_edges(stretch, frozenset(self._api.edge.getIDList()))
             self._roads[edges] = tuple(self._pieces_along(edges, must_follow=bool(stretch.edges)))

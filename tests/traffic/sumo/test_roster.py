@@ -1,5 +1,7 @@
 """The roster is the set of vehicles on the road; they are updated in time and once."""
 
+from pathlib import Path
+
 import pytest
 
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
@@ -23,6 +25,25 @@ def test_the_roster_is_who_is_on_the_road(link: LibsumoLink) -> None:
             api.vehicle.remove(min(roster.present))
     assert roster.present < came
     assert roster.removals > 0
+
+
+def test_vehicles_that_a_calibrator_removes_are_gone_at_once(link: LibsumoLink, tmp_path: Path) -> None:
+    """SUMO has them arrive a step later, and until then they are at -1e9 m and as fast."""
+    calibrated = tmp_path / "calibrated.add.xml"
+    none_left = f'period="60" output="{tmp_path}/out.xml"><route id="on" edges="bank exit"/>'
+    none_left += '<flow route="on" begin="0" end="90" vehsPerHour="0" speed="20" type="DEFAULT_VEHTYPE"/>'
+    calibrated.write_text(
+        f'<additional><calibrator id="none" edge="bank" pos="0" {none_left}</calibrator></additional>', encoding="utf-8"
+    )
+    api = link.begin([*CROWD, "--additional-files", str(calibrated)])
+    roster, slowest = Roster(api), 0.0
+    for _ in range(900):
+        link.step()
+        roster.update()
+        assert roster.present == set(api.vehicle.getIDList())
+        slowest = min([slowest, *map(api.vehicle.getSpeed, roster.present)])
+    assert slowest == 0.0
+    assert roster.removals > 10
 
 
 def test_who_is_scheduled_is_due_in_time_and_once() -> None:

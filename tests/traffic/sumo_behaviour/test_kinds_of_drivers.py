@@ -74,7 +74,7 @@ def test_headways_grow_and_are_given_back(tmp_path: Path) -> None:
         traffic.enter_fog(even(VISIBILITY))
         gap_after(traffic, 3.0)
         assert conduct()[0] == pytest.approx(2.0)
-        traffic._release()
+        traffic.release()
         assert conduct() == (1.2, 1.0, pytest.approx(55.56, abs=0.01))
 
 

@@ -12,6 +12,7 @@ from fogsim.metrics.following import find_following
 from fogsim.scenario import scenario_from_config
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
 from fogsim.traffic.sumo_lanes.street import LightsAhead
@@ -35,8 +36,8 @@ def routes(lorry: float, ego: float, oncoming: str = "") -> str:
 ONCOMING = '<vehicle id="oncoming" type="car" route="back" depart="1" departPos="250" departSpeed="5"/>'
 
 
-def config(folder: Path, demand: str, net: str = "overtaking.net.xml") -> Path:
-    return configured(folder, CASES / net, demand)
+def config(folder: Path, demand: str, *options: str, net: str = "overtaking.net.xml") -> Path:
+    return configured(folder, CASES / net, demand, *options)
 
 
 def steps_of(path: Path, ego: str = "ego", *settings: str) -> Iterator[Step]:
@@ -116,7 +117,7 @@ def test_nobody_follows_who_comes_along_the_oncoming_lane(tmp_path: Path) -> Non
 
 def test_lights_are_as_far_away_as_the_way_to_them(tmp_path: Path) -> None:
     met = 0
-    with simulation(config(tmp_path, routes(200.0, 150.0), "overtaking_lights.net.xml")) as (link, api):
+    with simulation(config(tmp_path, routes(200.0, 150.0), net="overtaking_lights.net.xml")) as (link, api):
         for _ in range(24):
             link.step()
             if "ego" not in api.vehicle.getIDList():
@@ -145,3 +146,22 @@ def test_the_leader_of_one_that_overtakes_is_one_that_overtakes(tmp_path: Path) 
                 assert Leaders(api).of_ego(ahead) is None
                 met += 1
     assert met > 0
+
+
+@pytest.mark.parametrize("action", ["warn", "remove"])
+def test_vehicles_that_meet_head_on_collide_with_both_speeds(tmp_path: Path, action: str) -> None:
+    """Whether or not SUMO has removed them before they can be asked for their headings."""
+    path = config(tmp_path, routes(80.0, 20.0, ONCOMING), f'<collision.action value="{action}"/>')
+    with simulation(path) as (link, api):
+        reader, hits, get = VehicleReader(api, None, 1000.0), [], api.vehicle
+        for number in range(50):
+            link.step()
+            for vehicle in {"ego", "oncoming"}.intersection(get.getIDList()):
+                get.setSpeedMode(vehicle, 0)
+                get.setSpeed(vehicle, 12.0)
+                get.setLaneChangeMode(vehicle, 0)
+            if 4 <= number < 12:
+                get.changeLane("ego", 1, 5.0)
+            hits += reader.collisions()
+    assert (hits[0].collider, hits[0].victim) == ("ego", "oncoming")
+    assert hits[0].impact_speed == pytest.approx(24.0)

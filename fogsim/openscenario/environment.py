@@ -71,10 +71,13 @@ class Vehicles(dict[str, Vehicle]):
         super().__init__()
         self.selections: dict[str, list[Node]] = {}
 
+    def members(self, nodes: Iterable[Node]) -> list[Node]:
+        """References to entities, with those of its members in place of each to a selection."""
+        return [part for one in nodes for part in self.selections.get(one.get("entityRef"), [one])]
+
     def selected(self, nodes: Iterable[Node]) -> list[str]:
         """Names of the entities to which elements refer, those of selections one by one; unknown ones are refused."""
-        each = [part for one in nodes for part in self.selections.get(one.get("entityRef"), [one])]
-        self.known(each)
+        self.known(each := self.members(nodes))
         return list(dict.fromkeys(one.get("entityRef") for one in each))
 
     @property

@@ -112,7 +112,7 @@ class Triggers:
         if test is None or test.tag not in CONDITIONS:
             raise NodeError(test or node, "FogSim has no such condition")
         rule, phrase = triggering.word("triggeringEntitiesRule", ("any", "all")), []
-        for one in triggering.some("EntityRef"):
+        for one in self.positions.vehicles.members(triggering.some("EntityRef")):
             with test.refusing():
                 vehicle = self.positions.vehicles.of(one)
                 phrase.append(CONDITIONS[test.tag](self, test, vehicle))

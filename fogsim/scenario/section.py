@@ -28,7 +28,6 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
-from fogsim.core.files.readers import FARTHEST as MAP_FARTHEST
 from fogsim.core.parameters import parameter_mistakes, paths_in
 from fogsim.core.registry import Registry
 from fogsim.core.registry.user_code import import_anything
@@ -80,8 +79,8 @@ Length = Annotated[Number, Field(ge=0.001, le=FARTHEST)]
 Place = Annotated[Number, Field(ge=-FARTHEST, le=FARTHEST)]
 """A height, or a place along a road [m]."""
 
-Coordinate = Annotated[Number, Field(ge=-MAP_FARTHEST, le=MAP_FARTHEST)]
-"""An x or y of a network [m]."""
+Coordinate = Annotated[Number, Field(ge=-1e7, le=1e7)]
+"""An x or y of a network [m]; those of UTM reach so far."""
 
 SpeedKmh = Annotated[Number, Field(ge=0, le=500)]
 """A speed [km/h]."""

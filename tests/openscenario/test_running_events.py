@@ -9,7 +9,7 @@ from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, over, polyline, run, speed,
+    CAR, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, over, polyline, run, speed,
     state, world, write,
 )  # fmt: skip
 
@@ -116,13 +116,15 @@ def test_an_event_is_skipped_while_another_of_its_maneuver_runs(tmp_path: Path) 
 def test_the_entities_of_a_selection_all_act(tmp_path: Path) -> None:
     entities = {"Ego": CAR, "Far": CAR, "Next": CAR}
     begin = {name: f"{lane(20 + 40 * n)}\n{speed(10)}" for n, name in enumerate(entities)}
-    file = write(tmp_path, entities, begin, {"both": event("fast", speed(13), after(1.0))}, stop=after(4.0))
+    too = event("too", speed(11), group(on('<SpeedCondition value="12" rule="greaterThan"/>', "both")))
+    story = {"both": event("fast", speed(13), after(1.0)), "Ego": too}
+    file = write(tmp_path, entities, begin, story, stop=after(4.0))
     text = file.read_text(encoding="utf-8")
     chosen = '<EntitySelection name="both"><Members>{}</Members></EntitySelection></Entities>'
     members = '<EntityRef entityRef="Far"/><EntityRef entityRef="Next"/>'
     file.write_text(text.replace("</Entities>", chosen.format(members)), encoding="utf-8")
     steps = run(file)
-    assert [motion_at(steps, 3.5, name)[2] for name in entities] == pytest.approx([10.0, 13.0, 13.0], abs=0.1)
+    assert [motion_at(steps, 3.5, name)[2] for name in entities] == pytest.approx([11.0, 13.0, 13.0], abs=0.1)
     kind = '<ByType objectType="vehicle"/>'
     file.write_text(text.replace("</Entities>", chosen.format(kind)), encoding="utf-8")
     with pytest.raises(InputError, match="expected EntityRef inside, got 'ByType'"):

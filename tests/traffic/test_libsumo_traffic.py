@@ -1,15 +1,19 @@
 """SUMO in process: reading, obeying, scripting, refusing."""
 
 import math
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fogsim.errors import SimulationError, SimulationRunningError
 from fogsim.traffic import BrakeEvent, LampFailureEvent, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
+from fogsim.traffic.sumo import libsumo_link
 from fogsim.values import Command, Lamp, SpeedAdvice
 from tests.traffic.common import SETUP, driven, running, seen
 
@@ -89,6 +93,21 @@ def test_a_process_has_one_simulation_until_it_is_closed(traffic: Traffic) -> No
     traffic.close()
     with pytest.raises(SimulationError, match="not been started, or is closed"):
         traffic.observe()
+
+
+def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[object] = []
+
+    def start(arguments: object) -> None:
+        time.sleep(0.05)
+        begun.append(arguments)
+
+    sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, TraCIException=RuntimeError)
+    monkeypatch.setattr(libsumo_link, "load_libsumo", lambda: sumo)
+    with ThreadPoolExecutor(3) as threads:
+        asked = [threads.submit(libsumo_link.LibsumoLink().begin, ()) for _ in range(3)]
+    assert [type(one.exception()) for one in asked].count(SimulationRunningError) == 2
+    assert len(begun) == 1
 
 
 def test_what_cannot_be_begun_is_told_and_leaves_nothing_running(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import io
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator, Sequence
 from types import ModuleType
 
@@ -13,6 +14,8 @@ from fogsim.errors import MissingDependencyError, SimulationError, SimulationRun
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.load_errors import located
 from fogsim.traffic.sumo.output_folder import OutputFolder
+
+_BEGINNING = threading.Lock()
 
 
 def load_libsumo() -> ModuleType:
@@ -43,6 +46,11 @@ class LibsumoLink:
 
     def begin(self, arguments: Sequence[str]) -> Api:
         """Start SUMO here, or load it again; see `SumoLink.begin`."""
+        # Of threads that begin together, each would find none running, and the last one's would replace the others'.
+        with _BEGINNING:
+            return self._begin(arguments)
+
+    def _begin(self, arguments: Sequence[str]) -> Api:
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
             raise SimulationRunningError(

@@ -125,7 +125,7 @@ def test_what_has_not_begun_is_told_with_the_reason() -> None:
     assert unplayed.vehicles == ("ego",)
 
 
-def test_what_has_begun_at_another_time_is_not_told() -> None:
+def test_what_has_begun_at_another_time_is_not_reported() -> None:
     timeline = timeline_of(
         scenario("{when: lead.present, repeat: each, do: {lead: {change_lane: {lanes: 1}}}}"),
     )

@@ -125,6 +125,18 @@ def test_what_has_not_begun_is_told_with_the_reason() -> None:
     assert unplayed.vehicles == ("ego",)
 
 
+def test_what_has_begun_at_another_time_is_not_reported() -> None:
+    timeline = timeline_of(
+        scenario("{when: lead.present, repeat: each, do: {lead: {change_lane: {lanes: 1}}}}"),
+    )
+    due = timeline.due(step(0.0, lead=100.0))
+    assert timeline.begun(due, due.actions.traffic) == ()
+    assert timeline.unplayed(step(0.0, lead=100.0)).events
+    timeline.due(step(0.1, ego=0.0))
+    assert timeline.begun(timeline.due(step(0.2, lead=110.0)), ())
+    assert not timeline.unplayed(step(0.2, lead=110.0)).events
+
+
 CUT_IN = (
     "{name: slow_down, when: {'gap(ego, lead)': '< 500 m'}, do: {"
     "lead: [{brake: {to: 36 km/h, deceleration: 6 m/s²}}, {lamps: {stop: failed, rear_fog: on}}],"

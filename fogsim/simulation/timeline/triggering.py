@@ -81,8 +81,10 @@ class Timeline:
             for action in actions
             if action in refused
         }
+        tried = {begun.name for begun, _ in due.parts}
         for entry in self._entries:
-            entry.refusal = failed.get(entry.name, entry.refusal)
+            if entry.name in tried:
+                entry.refusal = failed.get(entry.name)
         self._ends = [end for end in self._ends if end.name not in failed]
         return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
 

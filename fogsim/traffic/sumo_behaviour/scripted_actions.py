@@ -295,10 +295,10 @@ class ScriptedActions:
             self._api.vehicle.changeLaneRelative(vehicle, change.lanes, change.stay)
 
     def _end_changes(self, time: float, present: Collection[str]) -> None:
-        for vehicle in [one for one, end in self._changing.items() if time >= end]:
+        # Who is teleported meanwhile may come back.
+        for vehicle in [one for one, end in self._changing.items() if time >= end and one in present]:
             del self._changing[vehicle]
-            if vehicle in present:
-                self._modes.withdraw(vehicle)
+            self._modes.withdraw(vehicle)
 
     def release(self, present: Collection[str]) -> None:
         """Give traffic lights and lane changing back; speeds are `SpeedControl`'s."""

@@ -184,6 +184,7 @@ class _RequestedChanges:
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session} changes")
         self._duration = _SUBLANE_CHANGE if float(api.simulation.getOption("lateral-resolution")) > 0.0 else 0.0
         self._asked: dict[str, float] = {}
+        self._left: set[str] = set()
 
     def ask(self, driver: str, lanes: int, time: float) -> bool:
         """Let a driver change lane from the next step on, whoever is there, but not into an overlap.
@@ -205,6 +206,14 @@ class _RequestedChanges:
             del self._asked[driver]
             if driver in present:
                 self._modes.withdraw(driver)
+            else:
+                self._left.add(driver)
+
+    def restart(self, drivers: Sequence[str], present: set[str]) -> None:
+        """Give back the modes of those who come back from a teleport."""
+        for driver in self._left.intersection(drivers).intersection(present) if self._left else ():
+            self._left.discard(driver)
+            self._modes.withdraw(driver)
 
 
 class LaneChanging:
@@ -250,6 +259,7 @@ class LaneChanging:
             for driver in drivers:
                 self._certain_until.pop(driver, None)
             self._standing.restart(drivers, self._roster.present)
+            self._requests.restart(drivers, self._roster.present)
             for switch in (self._overtake_right, *self._unhelpful):
                 switch.restart(drivers, self._roster.present)
 

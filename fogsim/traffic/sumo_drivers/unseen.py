@@ -46,16 +46,14 @@ class LaneChangeSwitch:
             self.turn_on(vehicle)
 
     def restart(self, vehicles: Iterable[str], present: Collection[str]) -> None:
-        """Turn it off for vehicles that have entered or left."""
-        for vehicle in self._turned.intersection(vehicles) if self._turned else ():
-            if vehicle in present:
-                self.turn_off(vehicle)
-            else:
-                self._turned.remove(vehicle)
+        """Turn it off for vehicles that have entered: who comes back from a teleport has it on still."""
+        for vehicle in self._turned.intersection(vehicles).intersection(present) if self._turned else ():
+            self.turn_off(vehicle)
 
     def release(self, present: Collection[str]) -> None:
         """Turn it off for everyone."""
         self.restart(tuple(self._turned), present)
+        self._turned.clear()
 
 
 _NOT_SEEN = math.inf

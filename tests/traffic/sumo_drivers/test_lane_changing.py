@@ -10,13 +10,15 @@ import pytest
 
 from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.playing import Lamps
+from fogsim.traffic.sumo.claims import STRATEGIC
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
-from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
+from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging, _RequestedChanges
 from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.unseen import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
 from fogsim.values import Lamp
 from tests.traffic.common import CROWD, NET, QUIET
@@ -291,3 +293,26 @@ def test_a_hidden_leader_may_have_left_since_the_last_look_ahead(road: Road) -> 
     assert isinstance(leaders, Perception)
     assert leaders.hidden == {"ego": "wreck"}
     assert road.until(lambda: leaders.hidden == {}, 8)
+
+
+def test_who_comes_back_from_a_teleport_changes_lanes_as_before(link: LibsumoLink) -> None:
+    """After a collision, as SUMO has it by default: of drivers who have not seen the other one."""
+    api = link.begin(CROWD)
+    while len(api.vehicle.getIDList()) < 3:
+        link.step()
+    driver = min(api.vehicle.getIDList())
+
+    def changing() -> tuple[float, int]:
+        return STRATEGIC.read(api.vehicle, driver), api.vehicle.getLaneChangeMode(driver)
+
+    usual, lanes = changing(), 1 if api.vehicle.getLaneIndex(driver) == 0 else -1
+    switch, requests = LaneChangeSwitch(api, STRATEGIC, -1.0, "1"), _RequestedChanges(api, "1")
+    switch.turn_on(driver)
+    assert requests.ask(driver, lanes, 1.0)
+    requests.end(set(), 2.0)
+    for part in (switch, requests):
+        part.restart([driver], set())
+    assert changing() == (-1.0, usual[1] & ~0x300 | 0x100)
+    for part in (switch, requests):
+        part.restart([driver], {driver})
+    assert changing() == usual

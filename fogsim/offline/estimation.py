@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fogsim.core.parameters import accepted_parameters
-from fogsim.errors import InputError, UnknownNameError
+from fogsim.errors import InputError, UnknownNameError, shown
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale, scale_left
 from fogsim.offline.camera_file import Calibration
@@ -73,8 +73,8 @@ def estimate_images(
     *,
     sequence: bool | None = None,
     rate: float | None = None,
-    signs: Path | None = None,
-    track: Path | None = None,
+    signs: str | Path | None = None,
+    track: str | Path | None = None,
     night: NightDrive | None = None,
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in your own images or video.
@@ -93,7 +93,7 @@ def estimate_images(
         Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
     rate : float or None
         Images of a sequence in a second [1/s]; None for 10.
-    signs, track : Path or None
+    signs, track : path or None
         A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
         see `fogsim.offline.watch_signs`.
     night : NightDrive or None
@@ -112,6 +112,8 @@ def estimate_images(
     """
     if (signs is None) != (track is None):
         raise InputError("signs and track go together: a map says nothing without places, nor places without a map")
+    if not isinstance(camera, Camera | Calibration):
+        raise InputError(f"expected a Camera, or a Calibration from `load_calibration`, got {shown(camera)}")
     names = [methods] if isinstance(methods, str) else methods
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)

@@ -340,7 +340,9 @@ def _scaled(
             break
     scale = motion.scale()
     if scale is None:
-        return focal, height
+        why = "the road's texture does not show it" if motion.pairs else "no two images are 1.5 to 5 m apart on it"
+        unused = f"the track does not give the scale: {why} (--track-offset is its time at the first image)"
+        return focal, replace(height, warnings=(*height.warnings, unused))
     reason = f"the road moves {1.0 / scale.factor:.2f} times as far as the track does with an assumed {{}}"
     if focal.deviation >= height.deviation:
         focal = _Guessed(focal.value * scale.factor, scale.deviation, reason.format("focal length"))

@@ -13,7 +13,10 @@ from fogsim.offline.image_files import IMAGE_ENDINGS
 from fogsim.offline.source import Animation, ImageFiles, Source
 from fogsim.offline.video_source import VideoFile
 
-_VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
+_VIDEO_ENDINGS = (
+    *(".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts"),
+    *(".wmv", ".flv", ".3gp"),
+)
 """Suffixes of videos."""
 
 _SEQUENCE_RATE = 10.0
@@ -44,8 +47,8 @@ def find_source(
     Raises
     ------
     InputError
-        If a file does not exist, a folder or pattern has no images, the rate is not positive, or there is a video among
-        others.
+        If a file does not exist, a folder or pattern has no images, the rate is not positive, there is a video among
+        others, or files of a sequence are in the order of their names as text instead of their numbers.
     """
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     if rate is not None and not (rate > 0 and math.isfinite(rate)):
@@ -56,6 +59,11 @@ def find_source(
     animation = Animation.open(paths[0], sequence is not False) if len(paths) == 1 else None
     if animation is None and not any(is_video(path) for path in paths):
         temporal = is_sequence(paths) if sequence is None else sequence
+        if temporal and paths == sorted(paths, key=str) != _ordered(paths):
+            raise InputError(
+                f"--sequence: {paths[0]}, {paths[1]}, … are in the order of their names as text, as a shell puts them, "
+                "not of their numbers: give the folder, or the pattern in quotes"
+            )
         return ImageFiles(tuple(paths), temporal, 1.0 / (rate or _SEQUENCE_RATE))
     if len(paths) > 1:
         raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
@@ -73,7 +81,9 @@ def is_video(path: Path) -> bool:
 def _paths(given: str) -> list[Path]:
     path = Path(given)
     if path.is_dir():
-        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
+        # Hidden ones, as "._1.png" of macOS, are no images; patterns leave them out, too.
+        seen = (one for one in path.iterdir() if not one.name.startswith("."))
+        found = _ordered(one for one in seen if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
         if not found:
             raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
         return found

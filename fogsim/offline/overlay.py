@@ -151,7 +151,7 @@ class OverlayFile:
 
     Parameters
     ----------
-    path : Path
+    path : path
         The file: ``.mp4``, or for a single image also ``.png`` or ``.jpg``.
     source : Source
         What is estimated.
@@ -169,10 +169,10 @@ class OverlayFile:
     """
 
     def __init__(
-        self, path: Path, source: Source, camera: Camera, methods: Sequence[str], *, overwrite: bool = False
+        self, path: str | Path, source: Source, camera: Camera, methods: Sequence[str], *, overwrite: bool = False
     ) -> None:
+        self._path = path = Path(path)
         _check(path, source, overwrite)
-        self._path = path
         self._overlay = Overlay(camera, methods)
         self._video = VideoWriter(path, _LOOKED_AT)
         self._format = _PICTURE_FORMATS.get(path.suffix.lower())

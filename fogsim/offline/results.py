@@ -35,6 +35,9 @@ def span_text(low: float, high: float) -> str:
 _DIGITS = 6
 """Significant digits; no method has more than three."""
 
+_LONG = 1000.0
+"""Time from which on it has milliseconds instead, since six digits do not distinguish a long drive's frames [s]."""
+
 
 def record_lines(result: FrameEstimates) -> Iterator[str]:
     """JSON objects of an image: one for each method and one with its ``signs``, if any; or one with an ``error``.
@@ -77,12 +80,13 @@ def csv_lines(result: FrameEstimates) -> Iterator[str]:
     str
         A line without its end for each method; one with the reason alone for an image that could not be used.
     """
-    time, name = _number(result.picture.time), result.picture.name
+    time, name = result.picture.time, result.picture.name
+    seconds = round(time, 3) if time >= _LONG else _number(time)
     if result.picture.error:
-        yield csv_line({"frame": name, "time_s": time, "valid": False, "reason": result.picture.error})
+        yield csv_line({"frame": name, "time_s": seconds, "valid": False, "reason": result.picture.error})
     for estimate in result.estimates:
         reason = "" if estimate.valid else estimate.diagnostics.get("reason", "")
-        yield csv_line({**_record(name, estimate), "time_s": time, "reason": reason})
+        yield csv_line({**_record(name, estimate), "time_s": seconds, "reason": reason})
 
 
 def csv_line(values: Mapping[str, object] = dict(zip(CSV_KEYS, CSV_KEYS, strict=True))) -> str:

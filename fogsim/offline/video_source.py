@@ -121,6 +121,7 @@ _STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.
 
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _SOUND = re.compile(r"Stream #.*: Audio:")
+_HIGH_RANGE = re.compile(r"Video:.*\b(arib-std-b67|smpte2084)\b")  # ITU-R BT.2100: HLG and PQ
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
@@ -136,12 +137,15 @@ _CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
 _MOST_PIXELS = 16_384**2 // 2
 """Most pixels of a frame [px]."""
 
+_SQUARE = "scale=w='if(gt(abs(sar-1),0.01),2*round(iw*sar/2),iw)':h=ih"
+"""ffmpeg's filter that makes pixels square as players do, but for what rounding of a size makes of an aspect ratio."""
+
 _HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
 
 
 @dataclass(frozen=True, slots=True)
 class VideoFile:
-    """A video; its frames have 8 bits a channel and are turned upright.
+    """A video; its frames have 8 bits a channel and square pixels, and are turned upright.
 
     Attributes
     ----------
@@ -180,7 +184,7 @@ class VideoFile:
         Raises
         ------
         InputError
-            If it cannot be read as one, or has no frames.
+            If it cannot be read as one, has no frames, or is HDR.
         """
         # ffmpeg would wait for a writer of a pipe.
         if not path.is_file():
@@ -192,6 +196,11 @@ class VideoFile:
         rate = _RATE.search(header_text)
         if rate is None:
             raise InputError(f"{path}: this is no video that can be read")
+        if curve := _HIGH_RANGE.search(header_text):
+            raise InputError(
+                f"{path}: an HDR video ({curve[1]}), whose pixel values follow no `response` of a camera; record or "
+                "convert it without HDR"
+            )
         header = done.stdout.split(b"\n", _HEADER_LINES)
         if len(header) <= _HEADER_LINES:
             raise InputError(f"{path}: this video has no frames that can be read")
@@ -316,7 +325,7 @@ def _number(text: str) -> float:
 def _command(path: Path, *limits: str) -> list[str]:
     """Command line of a decoder that writes each frame as a PPM image, and its time among its messages."""
     allowed = ["-protocol_whitelist", "file", "-format_whitelist", _CONTAINERS, "-max_pixels", str(_MOST_PIXELS)]
-    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", "showinfo=checksum=0", *limits]
+    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", f"{_SQUARE},showinfo=checksum=0", *limits]
     # Neither repeated nor dropped for a constant rate; numbered, since ffmpeg complains of times that do not increase.
     timing = ["-fps_mode", "passthrough", "-bsf:v", "setts=ts=N"]
     sink = [*timing, "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]

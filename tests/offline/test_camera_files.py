@@ -73,6 +73,28 @@ def test_frames_of_a_video_keep_their_times(tmp_path: Path) -> None:
     ]
 
 
+def made(path: Path, *options: str) -> Path:
+    source = ["-f", "lavfi", "-i", "testsrc=size=64x48:rate=10:duration=0.3"]
+    subprocess.run([ffmpeg_program(), "-loglevel", "error", *source, *options, str(path)], check=True)
+    return path
+
+
+def test_pixels_of_a_video_are_square(tmp_path: Path) -> None:
+    for ratio, size in [("4/3", (86, 48)), ("10/11", (58, 48)), ("1919/1920", (64, 48)), ("0/1", (64, 48))]:
+        source = find_source(made(tmp_path / f"{size[0]}_{ratio[:2]}.avi".replace("/", ""), "-vf", f"setsar={ratio}"))
+        pictures = list(source.pictures())
+        assert source.size == size
+        assert [one.image.shape for one in pictures] == [(*size[::-1], 3)] * 3
+
+
+@pytest.mark.parametrize("curve", ["arib-std-b67", "smpte2084"])
+def test_a_video_of_high_dynamic_range_is_refused(tmp_path: Path, curve: str) -> None:
+    tags = f"log-level=none:colorprim=bt2020:transfer={curve}:colormatrix=bt2020nc"
+    path = made(tmp_path / "hdr.mov", "-c:v", "libx265", "-pix_fmt", "yuv420p10le", "-x265-params", tags)
+    with pytest.raises(InputError, match=rf"an HDR video \({curve}\)"):
+        find_source(path)
+
+
 def test_frames_that_follow_one_another_closely_are_no_damage(tmp_path: Path) -> None:
     path, times = tmp_path / "close.mp4", (0.0, 0.1, 0.2, 0.201, 0.202, 0.3, 0.4)
     with VideoWriter(path) as writer:

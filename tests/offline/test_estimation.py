@@ -106,6 +106,11 @@ def test_images_of_8_bits_are_not_those_of_a_camera_of_12(drive) -> None:
         list(estimate_images(drive.folder / "images", replace(drive.camera, bits=12), "negru2013"))
 
 
+def test_a_camera_is_no_path() -> None:
+    with pytest.raises(InputError, match="expected a Camera, or a Calibration from"):
+        next(estimate_images("drive", "c.yaml"))
+
+
 def test_no_readable_image_is_an_error(drive, tmp_path: Path) -> None:
     for name in ("a.png", "b.png"):
         (tmp_path / name).write_bytes(b"no image")

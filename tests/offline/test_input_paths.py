@@ -29,6 +29,19 @@ def test_files_stay_in_the_order_in_which_they_are_given(folder: Path) -> None:
     assert names(find_source([folder / "f10.png", folder / "f9.png"])) == ["f10.png", "f9.png"]
 
 
+def test_hidden_files_of_a_folder_are_left_out(folder: Path) -> None:
+    (folder / "._f9.png").write_bytes(b"Mac OS X")
+    assert names(find_source(folder)) == ["f9.png", "f10.png", "f11.JPG"]
+
+
+def test_a_sequence_in_the_order_of_a_shell_is_refused(folder: Path) -> None:
+    paths = [folder / "f10.png", folder / "f9.png"]
+    with pytest.raises(InputError, match=r"--sequence: .*f10.png, .*f9.png, … are in the order of their names as text"):
+        find_source(paths, sequence=True)
+    assert not find_source(paths).temporal
+    assert find_source(paths[::-1], sequence=True).temporal
+
+
 def test_a_file_with_the_signs_of_a_pattern_in_its_name_is_that_file(folder: Path) -> None:
     (folder / "a[1].png").write_bytes(b"")
     assert names(find_source(str(folder / "a[1].png"))) == ["a[1].png"]

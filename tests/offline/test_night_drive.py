@@ -7,6 +7,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from fogsim.cli.app import app
+from fogsim.cli.images.estimate import _night_drive
 from fogsim.errors import InputError
 from fogsim.offline import NightDrive, estimate_images
 from fogsim.values import Lamp
@@ -33,6 +34,11 @@ def test_a_drive_by_night_is_read_by_the_own_lamps_that_are_told(drive: Path) ->
     assert "no head lamp" in str(next(dark).estimates[0].diagnostics["reason"])
     with pytest.raises(InputError, match="fogsim calibrate halos"):
         list(estimate_images(drive / "0.png", CAMERA, "gallen2014", night=NightDrive(halos=Path("none.json"))))
+
+
+def test_a_lens_at_the_bumper_is_no_unknown_one() -> None:
+    assert 0.0 < _night_drive(True, None, 0.0, None, None).setback < 0.01
+    assert _night_drive(True, None, None, None, None).setback == 0.0
 
 
 @pytest.mark.usefixtures("drive")

@@ -65,7 +65,7 @@ def test_every_camera_gets_a_size_that_a_video_can_have(drive, width: int, heigh
         assert overlay.draw(result).size == overlay.size
 
 
-def written(path: Path, source, drive, **options) -> None:
+def written(path: str | Path, source, drive, **options) -> None:
     with OverlayFile(path, source, drive.camera, ["negru2013"], **options) as overlay:
         for result in estimates_of(source, drive.camera, ["negru2013"]):
             overlay.add(result)
@@ -91,7 +91,7 @@ def test_stills_are_shown_one_after_another(drive, tmp_path: Path) -> None:
 
 
 def test_a_still_is_a_picture(drive, tmp_path: Path) -> None:
-    written(tmp_path / "a.png", find_source(drive.folder / "images" / "003.png"), drive)
+    written(str(tmp_path / "a.png"), find_source(drive.folder / "images" / "003.png"), drive)
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.size == (640, 540)
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from fogsim.offline import FrameEstimates, ImageFiles, Picture, record_lines, table_heading, table_rows
+from fogsim.offline import FrameEstimates, ImageFiles, Picture, csv_lines, record_lines, table_heading, table_rows
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
 
@@ -63,6 +63,12 @@ def test_no_fog_has_no_largest_visibility() -> None:
 
 def test_an_image_that_cannot_be_used_has_an_error_alone() -> None:
     assert records(name="b.png", error="b.png: broken") == [{"frame": "b.png", "error": "b.png: broken"}]
+
+
+def test_frames_of_a_long_drive_have_times_of_their_own() -> None:
+    for time, written in [(33.366666, "33.3667"), (999.9996, "1000.0"), (12345.6667, "12345.667")]:
+        (line,) = csv_lines(FrameEstimates(Picture(7, time, None, "broken"), ()))
+        assert line.split(",")[1] == written
 
 
 def test_odd_diagnostics_leave_the_line_strict_json() -> None:

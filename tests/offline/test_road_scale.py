@@ -47,3 +47,5 @@ def test_a_guess_takes_the_scale_from_the_way(drive) -> None:
     assert guess.camera.focal_length * guess.camera.mount_height == pytest.approx(true, rel=0.06)
     assert guess.deviations.scale < 0.06
     assert "the road moves" in guess.reasons["focal_length_px"]
+    standing = guess_camera(source, way=lambda _: 0.0)
+    assert any("the track does not give the scale: no two images are" in warning for warning in standing.warnings)

@@ -91,7 +91,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def watch(signs: str = "map.geojson", track: str = "track.csv", offset: float = 0.0) -> SignWatch:
     source = ImageFiles(tuple(Path(f"{index}.png") for index in range(IMAGES)), True, 1.0)
-    return watch_signs(Path(signs), Path(track), source, CAMERA, offset)[0]
+    return watch_signs(signs, track, source, CAMERA, offset)[0]
 
 
 def test_metres_of_a_degree() -> None:
@@ -144,6 +144,14 @@ def test_gpx_and_csv_with_headings_tell_the_same(folder: Path) -> None:
         assert track.pose_at(-0.1) is None
         assert track.pose_at(6.1) is None
     assert load_track(csv_track(folder / "gap.csv", range(0, 20, 10))).pose_at(3.0) is None
+
+
+def test_a_missing_heading_leaves_the_others(folder: Path) -> None:
+    rows = csv_track(folder / "turned.csv", heading="40").read_text("utf-8").splitlines()
+    rows[1] = rows[1].removesuffix("40")
+    (folder / "turned.csv").write_text("\n".join(rows), "utf-8")
+    heading = load_track(folder / "turned.csv").heading
+    assert np.degrees(heading) == pytest.approx([60.0] + [50.0] * IMAGES, abs=1e-3)
 
 
 def test_summary_and_remarks_of_what_came_of_it(folder: Path) -> None:

@@ -218,7 +218,8 @@ def _night_drive(
             raise InputError(f"{option} {file}: there is no such file")
     usual = NightDrive()
     lit = usual.lamps if lamps is None else lamps_named(lamps)
-    return NightDrive(lit, usual.setback if setback is None else setback, head_lamps, halos)
+    # 0 would be unknown.
+    return NightDrive(lit, usual.setback if setback is None else max(setback, 0.001), head_lamps, halos)
 
 
 def _estimate(

@@ -204,15 +204,15 @@ def _far(distance: float) -> str:
 
 
 def watch_signs(
-    signs: Path, track: Path, source: Source, camera: Camera, offset: float = 0.0
+    signs: str | Path, track: str | Path, source: Source, camera: Camera, offset: float = 0.0
 ) -> tuple[SignWatch, tuple[str, ...]]:
     """Read a map of signs and a track for the images of a source.
 
     Parameters
     ----------
-    signs : Path
+    signs : path
         GeoJSON; see `fogsim.offline.drive.sign_file.load_sign_file`.
-    track : Path
+    track : path
         GPX or CSV; see `fogsim.offline.drive.track_file.load_track`.
     source : Source
         The images; a sequence, a video or one image.
@@ -235,7 +235,7 @@ def watch_signs(
         raise InputError("--track has positions by time, but these images are stills without times: add --sequence")
     if not math.isfinite(offset):
         raise InputError(f"--track-offset must be a number of seconds, got {offset!r}")
-    mapped, driven = load_sign_file(signs), load_track(track)
+    mapped, driven = load_sign_file(Path(signs)), load_track(Path(track))
     first, last = driven.time[[0, -1]] - offset
     if first > source.period * max(source.count - 1, 0) or last < 0.0:
         raise InputError(

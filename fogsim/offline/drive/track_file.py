@@ -173,8 +173,9 @@ def _headings(
     path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], headings: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Directions of travel: as given, otherwise from the position before to the one after."""
-    if not np.isnan(headings).any():
-        return np.unwrap(np.radians(90.0 - headings))
+    given = np.radians(90.0 - headings)
+    if not np.isnan(given).any():
+        return np.unwrap(given)
     east, north = metres_per_radian(float(latitude.mean()))
     place = np.stack((east * longitude, north * latitude), axis=1)
     found = np.full(len(place), math.nan)
@@ -187,6 +188,7 @@ def _headings(
         last = near[number - start + after[0]] if after.size else place[number]
         if np.hypot(*(last - first)) >= 0.5 * MOVING:
             found[number] = math.atan2(*(last - first)[::-1])
+    found = np.where(np.isnan(given), found, given)
     known = np.flatnonzero(~np.isnan(found))
     if not known.size:
         raise InputError(f"--track {path}: the track never moves by {MOVING:g} m; give heading_deg in a CSV file")

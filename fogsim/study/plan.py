@@ -25,7 +25,7 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
-from fogsim.scenario.variation import grid_mistake, read_variation
+from fogsim.scenario.variation import grid_mistake, read_variation, with_case
 from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
@@ -302,10 +302,12 @@ def _loader(document: Document, written: StudyFile, may_import: MayImport) -> Ca
 
 
 def _refuse_cases(document: Document, settings: Iterable[str]) -> None:
-    """Raise InputError for a scenario with several cases, since a study would run only the first."""
+    """Raise InputError for a scenario whose cases differ in more than their seeds: a study would run only the first."""
     varied = [setting for setting in settings if setting.lstrip().startswith("vary")]
-    cases = read_variation(replace(document, data=apply_overrides(document.data, varied))).cases
-    if len(cases) > 1:
+    document = replace(document, data=apply_overrides(document.data, varied))
+    cases = read_variation(document).cases
+    first = with_case(document, cases[0]).data
+    if any(with_case(document, one).data != first for one in cases[1:]):
         names = ", ".join(cases[0].values)
         raise InputError(
             f"{document.where(('vary',))}: vary: a study runs a single case, and {names} make {len(cases)}; write "

@@ -230,6 +230,7 @@ def test_a_scenario_of_several_cases_is_refused_unless_one_is_chosen(tmp_path: P
     )
     with pytest.raises(InputError, match=r"mine\.yaml:2: scenario: .*a single case, and strength, run make 4; write"):
         load_study(written(tmp_path, varied))
+    assert load_study(written(tmp_path, STUDY.replace("motorway_fog_bank", "clear_day"))).runs  # where seeds alone vary
     chosen = varied.replace("duration_s=2]", "duration_s=2, 'vary={strength: [0.4], run: 1 seed}']")
     assert {run.scenario.fog.patches.strength for run in load_study(written(tmp_path, chosen)).runs} == {0.4}
 

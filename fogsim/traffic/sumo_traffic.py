@@ -106,10 +106,8 @@ class SumoTraffic:
     """A SUMO simulation with one ego vehicle, or without: see `Traffic` and `NetworkTraffic`."""
 
     def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
-        self._setup = setup
-        self._any_ego = setup.ego == ANY_EGO
+        self._setup, self._link, self._any_ego = setup, link, setup.ego == ANY_EGO
         self._ego_of_seed: int | None = None
-        self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
         self._seed, self._command = 0, _NO_ADVICE
@@ -167,8 +165,7 @@ class SumoTraffic:
             bodies=LongBodies(api, self._link.remote),
             directions=LaneDirections(api),
         )
-        self._signals = None
-        self._seed = seed
+        self._signals, self._seed = None, seed
         if self._fog is not None:
             self.enter_fog(self._fog)
         elif self._obstructions(api):

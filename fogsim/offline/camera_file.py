@@ -94,7 +94,7 @@ class CameraFile(Section):
     mount_height_sd_m: Annotated[Number, Field(ge=0)] | None = None
     """Standard deviation of the height; left out, 5 %."""
 
-    pitch_sd_deg: Annotated[Number, Field(ge=0.001, le=5)] | None = None
+    pitch_sd_deg: Annotated[Number, Field(ge=0.001, le=11)] | None = None
     """Standard deviation of the pitch of single images; left out, 0.15."""
 
     response: Response | None = None

@@ -177,7 +177,7 @@ class OverlayFile:
         self._video = VideoWriter(path, _LOOKED_AT)
         self._format = _PICTURE_FORMATS.get(path.suffix.lower())
         self._picture = b""
-        # Stills all have the time 0.
+        # Stills all have the time 0, but for frames of a video.
         self._spacing, self._drawn = 0.0 if source.temporal else source.period, 0
 
     def add(self, result: FrameEstimates) -> None:
@@ -192,7 +192,7 @@ class OverlayFile:
             return
         drawn = self._overlay.draw(result)
         if self._format is None:
-            self._video.write(np.asarray(drawn), result.picture.time + self._drawn * self._spacing)
+            self._video.write(np.asarray(drawn), result.picture.time or self._drawn * self._spacing)
             self._drawn += 1
             return
         content = io.BytesIO()

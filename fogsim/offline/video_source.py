@@ -127,7 +127,7 @@ _FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
 _PACKET_SIZES = (188, 192, 204)  # of MPEG transport streams: ISO/IEC 13818-1, with a time code, with error correction
 _MOST_MISSING = 0.5
-"""Time by which a complete video's frames may end before its header's duration, as with longer sound [s]."""
+"""Time by which a complete video's frames or sound may end before its header's duration [s]."""
 
 _BLOCK, _MOST_ERRORS = 100_000, 100
 
@@ -262,7 +262,7 @@ class VideoFile:
             *log.errors,
             *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else []),
         ]
-        is_short = self.duration - end > max(_MOST_MISSING, 2.0 * self.period)
+        is_short = self.duration - end > max(_MOST_MISSING, 2.0 * self.period) and not self._has_whole_sound()
         if failed or errors or is_short:
             frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
             reason = f" ({errors[0]})" if errors else ""
@@ -275,6 +275,15 @@ class VideoFile:
             return Picture(index, time, image)
         found, first = (f"{cols} × {rows}" for cols, rows in (size, self.size))
         return Picture(index, time, None, f"{self.path}, frame {index}: it has {found} pixels, the first frame {first}")
+
+    def _has_whole_sound(self) -> bool:
+        """Whether sound lasts as long as the header says: then it is longer than the frames, and nothing is cut off."""
+        if not self.has_sound:
+            return False
+        copy = [*_reading(self.path), "-map", "0:a", "-c", "copy", "-progress", "-", "-f", "null", "-"]
+        done = subprocess.run(copy, stdin=subprocess.DEVNULL, capture_output=True, check=False)  # noqa: S603 - as above
+        ends = re.findall(rb"out_time_us=(\d+)", done.stdout)
+        return bool(ends) and self.duration - 1e-6 * int(ends[-1]) <= _MOST_MISSING
 
     def _ends_in_a_packet(self) -> bool:
         size = self.path.stat().st_size
@@ -324,12 +333,18 @@ def _number(text: str) -> float:
 
 def _command(path: Path, *limits: str) -> list[str]:
     """Command line of a decoder that writes each frame as a PPM image, and its time among its messages."""
-    allowed = ["-protocol_whitelist", "file", "-format_whitelist", _CONTAINERS, "-max_pixels", str(_MOST_PIXELS)]
-    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", f"{_SQUARE},showinfo=checksum=0", *limits]
+    source = ["-map", "0:v:0", "-vf", f"{_SQUARE},showinfo=checksum=0", *limits]
     # Neither repeated nor dropped for a constant rate; numbered, since ffmpeg complains of times that do not increase.
     timing = ["-fps_mode", "passthrough", "-bsf:v", "setts=ts=N"]
     sink = [*timing, "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
-    return [ffmpeg_program(), "-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info", *source, *sink]
+    return [*_reading(path), *source, *sink]
+
+
+def _reading(path: Path) -> list[str]:
+    """The beginning of command lines that read a video."""
+    allowed = ["-protocol_whitelist", "file", "-format_whitelist", _CONTAINERS, "-max_pixels", str(_MOST_PIXELS)]
+    options = ["-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info", *allowed]
+    return [ffmpeg_program(), *options, "-i", f"file:{path}"]
 
 
 def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:

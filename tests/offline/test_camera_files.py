@@ -160,6 +160,16 @@ def test_sound_before_the_first_frame_is_no_damage(tmp_path: Path, ending: str) 
     assert len(pictures) == find_source(trimmed).count == 20
 
 
+@pytest.mark.parametrize("ending", [".mkv", ".mp4"])
+def test_sound_after_the_last_frame_is_no_damage(tmp_path: Path, ending: str) -> None:
+    whole, cut = (tmp_path / f"{name}{ending}" for name in ("whole", "cut"))
+    sound = ["-f", "lavfi", "-i", "sine=duration=3", "-movflags", "+faststart"]
+    pictures = list(find_source(made(whole, *sound)).pictures())
+    assert [one.error for one in pictures] == [""] * 3
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    assert "cut off or damaged" in list(find_source(cut).pictures())[-1].error
+
+
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
 def test_a_stream_that_was_cut_off_says_so(tmp_path: Path, codec: str) -> None:
     whole, stream, cut = (tmp_path / name for name in ("whole.mp4", "stream.ts", "cut.ts"))

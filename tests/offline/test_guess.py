@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from fogsim.errors import InputError
-from fogsim.offline import camera_text, find_source, guess_camera, write_camera
+from fogsim.offline import camera_text, find_source, guess_camera, load_calibration, write_camera
 from fogsim.offline.camera_file import load_camera
 from fogsim.offline.guess import _mount_height
 from fogsim.offline.source import ImageFiles
@@ -100,7 +100,9 @@ def test_a_camera_file_says_what_it_was_guessed_from_and_reads_back(drive, tmp_p
     assert read.pitch == pytest.approx(guess.camera.pitch, abs=math.radians(0.001))
     with pytest.raises(InputError, match="--overwrite"):
         write_camera(path, guess)
-    write_camera(path, guess, overwrite=True)
+    uncertain = replace(guess, deviations=replace(guess.deviations, pitch=math.radians(9.0)))
+    write_camera(path, uncertain, overwrite=True)
+    assert load_calibration(path).deviations.pitch == pytest.approx(math.radians(9.0))
     assert [one.name for one in tmp_path.iterdir()] == ["camera.yaml"]
 
 

@@ -90,9 +90,10 @@ def test_mistakes_are_told(folder: Path, given: str, options: dict, told: str) -
 
 
 def test_a_video_is_alone(folder: Path) -> None:
-    (folder / "a.mp4").write_bytes(b"")
-    with pytest.raises(InputError, match="one video alone, got 2 files"):
-        find_source([folder / "a.mp4", folder / "f9.png"])
+    for name in ("a.mp4", "00001.MTS"):
+        (folder / name).write_bytes(b"")
+        with pytest.raises(InputError, match="one video alone, got 2 files"):
+            find_source([folder / name, folder / "f9.png"])
 
 
 def test_nothing_is_refused() -> None:

@@ -88,6 +88,9 @@ def test_stills_are_shown_one_after_another(drive, tmp_path: Path) -> None:
         Image.fromarray(drive.frames[index]).save(tmp_path / f"{name}.png")
     written(tmp_path / "out.mp4", find_source(tmp_path, rate=2.0), drive)
     assert [one.time for one in find_source(tmp_path / "out.mp4").pictures()] == pytest.approx([0.0, 0.5, 1.0])
+    written(tmp_path / "video.mp4", find_source(drive.folder / "drive.mp4", sequence=False), drive)
+    times = [one.time for one in find_source(tmp_path / "video.mp4").pictures()]
+    assert times == pytest.approx([0.1 * index for index in range(len(drive.frames))])
 
 
 def test_a_still_is_a_picture(drive, tmp_path: Path) -> None:

@@ -153,12 +153,14 @@ RoadEnd = Annotated[float, _endless(0.0), BeforeValidator(_infinity), AfterValid
 """A place along a road [m]; inf is where it ends."""
 
 
-class _Block(type(BaseModel)):  # type: ignore[misc] - pydantic has no public name for it
-    """Reports mistakes of blocks that are made in Python, as the files' are."""
+if TYPE_CHECKING:  # Type checkers take arguments from the fields.
+    from pydantic._internal._model_construction import ModelMetaclass as _Block
+else:
 
-    if not TYPE_CHECKING:  # Type checkers take arguments from the fields.
+    class _Block(type(BaseModel)):
+        """Reports mistakes of blocks that are made in Python, as the files' are."""
 
-        def __call__(cls, *arguments: Any, **values: Any) -> Any:
+        def __call__(cls, *arguments: Any, **values: Any) -> Any:  # noqa: N805 - a metaclass
             try:
                 return super().__call__(*arguments, **values)
             except ValidationError as error:

@@ -160,7 +160,7 @@ else:
     class _Block(type(BaseModel)):
         """Reports mistakes of blocks that are made in Python, as the files' are."""
 
-        def __call__(cls, *arguments: Any, **values: Any) -> Any:  # noqa: N805 - a metaclass
+        def __call__(cls, *arguments: Any, **values: Any) -> Any:
             try:
                 return super().__call__(*arguments, **values)
             except ValidationError as error:

@@ -57,6 +57,14 @@ def _shapes_made_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True)
+def _no_simulation_left() -> Iterator[None]:
+    """Find tests that leave SUMO running: a process has only one, so that whatever test comes next would fail."""
+    yield
+    library = sys.modules.get("libsumo")
+    assert library is None or not library.isLoaded(), "this test has left a SUMO simulation running"
+
+
 @pytest.fixture(scope="session")
 def free_port() -> Callable[[], int]:
     """Ports that the operating system chooses."""

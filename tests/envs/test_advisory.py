@@ -156,10 +156,7 @@ def test_vector_environments_run_in_processes_of_their_own() -> None:
         assert rewards.shape == (2,)
 
 
-# What has an environment of its own comes before those that share one: next to it, it would run in another process.
-
-
-@pytest.fixture(scope="module")
+@pytest.fixture
 def env() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(ID, image_size=(64, 48), overrides=("clocks.camera_period_s=0.5", EARLY))
     yield made

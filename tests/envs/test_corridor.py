@@ -30,7 +30,7 @@ FOG = FogDistribution(ahead=(100.0, 400.0), reach=600.0)
 ROUTE = np.array([[0.0, 0.0, 0.0], [1000.0, 0.0, 0.0]])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def signs() -> Iterator[FogCorridorEnv]:
     made = parallel_env(overrides=SHORT, fog_distribution=FOG)
     yield made
@@ -59,8 +59,7 @@ def test_pettingzoos_checks_find_nothing(signs: FogCorridorEnv) -> None:
     parallel_api_test(signs, num_cycles=5)
 
 
-def test_a_seed_gives_the_same_here_and_in_a_child_process(signs: FogCorridorEnv) -> None:
-    signs.close()  # so that the first of the two runs in this process
+def test_a_seed_gives_the_same_here_and_in_a_child_process() -> None:
     parallel_seed_test(lambda: parallel_env(overrides=SHORT, fog_distribution=FOG), num_cycles=2)
 
 
@@ -73,8 +72,7 @@ def test_an_episode_comes_again_with_its_traffic(signs: FogCorridorEnv) -> None:
         assert again == infos
 
 
-def test_copies_draw_different_episodes(signs: FogCorridorEnv) -> None:
-    signs.close()
+def test_copies_draw_different_episodes() -> None:
     fresh = parallel_env(overrides=SHORT, fog_distribution=FOG)
     drawn = []
     for copy in (pickle.loads(pickle.dumps(fresh)) for _ in range(2)):  # noqa: S301 - our own

@@ -19,7 +19,7 @@ NO_ADVICE = np.array([12, 0])
 _DRAWN = ("light.", "camera.told.", "traffic.events=", "fog=")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def env() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(ID, way=100.0, **SMALL)
     yield made

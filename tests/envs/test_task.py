@@ -1,5 +1,6 @@
 """The task of versions 1 and 2: episodes that differ, a reward that cannot be farmed, and what stands in for frames."""
 
+import contextlib
 import dataclasses
 import importlib
 import inspect
@@ -127,7 +128,7 @@ def test_baselines_that_advise_are_refused_where_the_agent_drives() -> None:
             fogsim_envs.evaluate(name, "fogsim/FogDrive-v2", [0], image_size=(64, 48), **arguments)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def fast() -> Iterator[gymnasium.Env[Any, Any]]:
     made = gymnasium.make(FAST, render_mode="rgb_array")
     yield made
@@ -135,9 +136,10 @@ def fast() -> Iterator[gymnasium.Env[Any, Any]]:
 
 
 @pytest.fixture(scope="module")
-def step(fast: gymnasium.Env[Any, Any]) -> Step:
-    fast.reset(seed=3, options={"visibility": 60.0})
-    return fast.unwrapped._current
+def step() -> Step:
+    with contextlib.closing(gymnasium.make(FAST)) as made:
+        made.reset(seed=3, options={"visibility": 60.0})
+        return made.unwrapped._current
 
 
 def _moved(step: Step, distance: float, seconds: float, **changes: Any) -> Step:
@@ -437,8 +439,8 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     assert [scaled_visibility(one) for one in (0.0, 10.0, 100.0, 1000.0, math.inf)] == [-1.0, -1.0, 0.0, 1.0, 1.0]
 
 
-def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, Any], step: Step) -> None:
-    del step  # which the environment shows
+def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, Any]) -> None:
+    fast.reset(seed=3)
     picture = fast.render()
     assert picture.shape == (480, 1024, 3)
     assert picture.std() > 5.0

@@ -119,7 +119,7 @@ def test_arguments_of_vector_environments_and_demonstrations() -> None:
     assert "seeds" in refusal(fogsim_envs.evaluate, "rule", seeds=[-1])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def fast() -> Iterator[gymnasium.Env[Any, Any]]:
     made = FAST()
     yield made

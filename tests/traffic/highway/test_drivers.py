@@ -8,6 +8,7 @@ import gymnasium
 import highway_env  # noqa: F401 - registers its environments
 import numpy as np
 import pytest
+from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.core.kinematics import safe_speed
 from fogsim.errors import InputError
@@ -167,7 +168,8 @@ def test_a_stretch_that_the_road_does_not_have_is_refused(stretch: Stretch, mess
         Road(exact()).drive(0.1, Command(stretches=(StretchAdvice(15.0, stretch),)))
 
 
-def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
+def test_who_misjudges_distances_keeps_a_shorter_headway(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(IDMVehicle, "DISTANCE_WANTED", 10.0)  # which intersections change for all
     setup = DriverSetup(unaffected, spread=0.0, misjudgement=0.6)
     sight = DriverSight(0.1)
     road = Road(setup, 30.0, sight=sight)

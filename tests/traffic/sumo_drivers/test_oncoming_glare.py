@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,9 @@ ALL_DARK = sum(dark_on(int(ALL_LAMPS), side) for side in Side)
 HIGH_BEAM: OwnLamps = {"coming": int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)}
 
 
-@pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    routes = tmp_path_factory.mktemp("two_way") / "two_way.rou.xml"
+@pytest.fixture
+def api(tmp_path: Path) -> Iterator[Any]:
+    routes = tmp_path / "two_way.rou.xml"
     routes.write_text(ROUTES, encoding="utf-8")
     link = LibsumoLink()
     begun = link.begin(["--net-file", str(NET), "--route-files", str(routes), "--no-step-log", "true"])

@@ -53,6 +53,18 @@ def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Pa
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Village")))
 
 
+def test_of_roads_on_top_of_one_another_z_decides(tmp_path: Path, maps: Path) -> None:
+    lane = '<lane id="bridge_0" index="0" speed="20" length="200" shape="0,-1.75,6 200,-1.75,6"/>'
+    net = opendrive_net(ROAD).replace("</net>", f'<edge id="bridge">{lane}</edge></net>')
+    (maps / "Levels.net.xml").write_text(net, encoding="utf-8")
+    for z, is_bridge in (("0.2", False), ("5.5", True)):
+        file = write(tmp_path, {"Ego": CAR}, {"Ego": world(30, -1.75, f'z="{z}"')}, road=Path("Levels"))
+        [routes] = read_openscenario(file).data["traffic"]["routes"]
+        assert ('edges="bridge"' in Path(routes).read_text(encoding="utf-8")) is is_bridge
+    with pytest.raises(InputError, match=r"at \(30, -1\.75\) are roads 0\.0 m and 6\.0 m high; give z"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": world(30, -1.75)}, road=Path("Levels")))
+
+
 def test_maps_may_have_coordinates_of_utm(tmp_path: Path) -> None:
     x, y = 677000.0, 5400000.0
     text = ROAD.read_text(encoding="utf-8").replace('x="0" y="0"', f'x="{x}" y="{y}"')

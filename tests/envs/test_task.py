@@ -330,6 +330,7 @@ def test_who_strikes_pays(step: Step) -> None:
 
 
 def test_a_collision_in_any_frame_of_a_decision_period_counts(fast: gymnasium.Env[Any, Any], step: Step) -> None:
+    fast.reset(seed=3)
     hit = Collision(step.time, step.traffic.ids[step.ego], "lead", 5.0)
     frames = [_moved(step, 0.0, 0.1 * n, collisions=(hit,) if n == 2 else ()) for n in (1, 2, 3)]
 

@@ -292,9 +292,9 @@ def _loader(document: Document, written: StudyFile, may_import: MayImport) -> Ca
         config, ego = folder / written.sumocfg, written.ego or NO_EGO
         return lambda settings: scenario_from_config(config, ego, settings, may_import=may_import)
     name = str(written.scenario)
-    beside = folder / name
+    own = folder / name
     try:
-        path = scenario_file(beside if beside.exists() else name)
+        path = scenario_file(own if own.exists() else name)
         _refuse_cases(read_scenario_document(path), written.settings)
         return scenario_reader(path, may_import=may_import)
     except InputError as error:

@@ -34,6 +34,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from fogsim_envs import Evaluation, evaluate
+from fogsim_envs.baselines import baseline
 from fogsim_envs.batch import RuleConstants
 from fogsim_envs.batch.stable_baselines import BatchVecEnv
 from fogsim_envs.task.observation import STATE_FEATURES
@@ -49,8 +50,8 @@ METHODS = {"PPO": PPO, "SAC": SAC, "DQN": DQN}
 CONSTANTS: dict[str, dict[str, Any]] = {
     "PPO": {"n_steps": 32, "batch_size": 2048, "n_epochs": 6, "gae_lambda": 0.9, "ent_coef": 0.002},
     "PPO of few decisions": {
-        "n_steps": 1024, "batch_size": 256, "n_epochs": 20, "gae_lambda": 0.9, "ent_coef": 0.0, "gamma": 0.95,
-        "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.7},
+        "n_steps": 2048, "batch_size": 256, "n_epochs": 10, "gae_lambda": 0.9, "ent_coef": 0.0, "gamma": 0.95,
+        "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.9},
     },
     "SAC": {"learning_starts": 2000, "train_freq": 1, "gradient_steps": 4, "ent_coef": "auto_0.1"},
     "DQN": {
@@ -58,7 +59,8 @@ CONSTANTS: dict[str, dict[str, Any]] = {
         "target_update_interval": 1000, "exploration_fraction": 0.0005, "learning_rate": 3e-4,
     },
 }  # fmt: skip
-"""Where SUMO makes decisions slow, PPO learns from each more often, with less noise, and from nearer rewards."""
+"""Where SUMO makes decisions slow, PPO begins as the rule, with less noise, and learns from nearer rewards."""
+DEMONSTRATED = 20_000  # Steps of the rule that it imitates first
 PARTS = {
     "lead": ("lead_present", "lead_distance", "lead_relative_speed"),
     "estimate": tuple(one for one in STATE_FEATURES if one.startswith("estimate")),
@@ -168,7 +170,8 @@ def trained(asked: argparse.Namespace, seed: int) -> tuple[BaseAlgorithm, list[t
         number = 256 if method == "PPO" else 16
         envs: VecEnv = BatchVecEnv(gym.make_vec(asked.train_on, num_envs=number, **actions).unwrapped, REPEAT)
     else:
-        envs = DummyVecEnv([lambda: Repeated(gym.make(asked.train_on, observation="state", **actions))])
+        task = gym.make(asked.train_on, observation="state", **actions)
+        envs = DummyVecEnv([lambda: Repeated(task)])
     workers = VecMonitor(Hidden(envs, asked.hide), info_keywords=("earned", "cost"))
     workers.seed(seed)
     clock = Training(envs, asked.minutes, asked.cost_limit)
@@ -179,11 +182,34 @@ def trained(asked: argparse.Namespace, seed: int) -> tuple[BaseAlgorithm, list[t
     scaled = VecNormalize(workers, norm_obs=False, gamma=constants["gamma"])
     window = 500 if is_batch else 50
     agent = METHODS[method]("MlpPolicy", scaled, stats_window_size=window, seed=seed, device="cpu", **constants)
+    if is_few:
+        imitate_rule(agent, task, shown(asked.hide), seed)
     agent.learn(MOST, callback=clock)
     agent.learning_rate = LAST_RATE  # The file need not hold the clock, and with it all episodes.
     agent._setup_lr_schedule()
     scaled.close()  # A process runs one task on SUMO; a second one would be in another, whose time is not counted.
     return agent, clock.curve
+
+
+def imitate_rule(agent: BaseAlgorithm, env: gym.Env[Any, Any], seen: NDArray[np.float32], seed: int) -> None:
+    """Give an agent the rule's actions as its mean actions."""
+    rule, states, actions, over = baseline("rule", env.action_space), [], [], True
+    for step in range(DEMONSTRATED):
+        if over:
+            state, info = env.reset(seed=seed if step == 0 else None)
+        states.append(state * seen)
+        actions.append(rule(state, info))
+        state, _, terminated, truncated, info = env.step(actions[-1])
+        over = terminated or truncated
+    wanted = torch.as_tensor(np.array(actions, np.float32))
+    given = torch.as_tensor(np.array(states))
+    optimizer = torch.optim.Adam(agent.policy.parameters(), FIRST_RATE)
+    for _ in range(10):
+        for some in torch.randperm(len(given)).split(256):
+            mean = agent.policy.get_distribution(given[some]).distribution.mean
+            optimizer.zero_grad()
+            (mean - wanted[some]).square().mean().backward()
+            optimizer.step()
 
 
 def tuned_rule(minutes: float, path: Path) -> RuleConstants:

@@ -25,7 +25,7 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
-from fogsim.scenario.variation import grid_mistake, read_variation, with_case
+from fogsim.scenario.variation import differing_cases, grid_mistake
 from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
@@ -305,9 +305,8 @@ def _refuse_cases(document: Document, settings: Iterable[str]) -> None:
     """Raise InputError for a scenario whose cases differ in more than their seeds: a study would run only the first."""
     varied = [setting for setting in settings if setting.lstrip().startswith("vary")]
     document = replace(document, data=apply_overrides(document.data, varied))
-    cases = read_variation(document).cases
-    first = with_case(document, cases[0]).data
-    if any(with_case(document, one).data != first for one in cases[1:]):
+    cases = differing_cases(document)
+    if len(cases) > 1:
         names = ", ".join(cases[0].values)
         raise InputError(
             f"{document.where(('vary',))}: vary: a study runs a single case, and {names} make {len(cases)}; write "

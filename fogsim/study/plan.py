@@ -341,6 +341,14 @@ def needs_camera(scenario: Scenario, metrics: Iterable[str] = ()) -> bool:
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))
 
 
+def goes_by_reports(scenario: Scenario, metrics: Iterable[str]) -> bool:
+    """Whether a belief without estimators is informed by the reports of others, and is what the study asks about."""
+    senders = scenario.sensors.reports
+    is_deaf = scenario.fusion.method in ("grid_filter", "mixture_filter", "none")
+    has_senders = senders.roadside is not None or senders.vehicles is not None
+    return has_senders and not is_deaf and needs_camera(scenario, metrics)
+
+
 def _is_of_camera(metric: str) -> bool:
     return metric in OF_THE_BELIEF | OF_WARNINGS or metric.startswith(f"{METHODS_KEY}.")
 

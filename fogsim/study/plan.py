@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from fogsim.core.files.readers import open_regular
 from fogsim.core.parameters import checked_parameters
@@ -33,6 +33,14 @@ from fogsim.study.table import column_mistake
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
+
+
+def _as_key(value: object) -> object:
+    """A number as it is as a key, which is text."""
+    return json.dumps(value) if isinstance(value, int | float) else value
+
+
+_Level = Annotated[Name, BeforeValidator(_as_key, json_schema_input_type=str | float)]
 
 _MOST_EQUAL = 5
 
@@ -58,7 +66,7 @@ class StudyFile(Section):
     seeds: Annotated[int, Field(strict=True, ge=1, le=100_000)] | Annotated[tuple[Seed, ...], Field(min_length=1)] = 10
     """How many seeds, from 0 on, or a list of them; every cell of the grid has the same ones."""
 
-    baseline: dict[Name, Name] = Field(default_factory=dict)
+    baseline: dict[Name, _Level] = Field(default_factory=dict)
     """Level of one factor or several to which the others are compared; by default the first factor's first level."""
 
     confidence: Annotated[Share, Field(ge=0.5, le=0.999)] = 0.95

@@ -95,6 +95,15 @@ def test_a_process_has_one_simulation_until_it_is_closed(traffic: Traffic) -> No
         traffic.observe()
 
 
+def test_a_simulation_that_was_dropped_without_closing_makes_room_for_another() -> None:
+    traffic = libsumo_traffic(SETUP)
+    traffic.start(1)
+    del traffic
+    other = libsumo_traffic(SETUP)
+    other.start(1)
+    other.close()
+
+
 def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[object] = []
 
@@ -105,7 +114,8 @@ def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pyte
     sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, TraCIException=RuntimeError)
     monkeypatch.setattr(libsumo_link, "load_libsumo", lambda: sumo)
     with ThreadPoolExecutor(3) as threads:
-        asked = [threads.submit(libsumo_link.LibsumoLink().begin, ()) for _ in range(3)]
+        links = [libsumo_link.LibsumoLink() for _ in range(3)]
+        asked = [threads.submit(link.begin, ()) for link in links]
     assert [type(one.exception()) for one in asked].count(SimulationRunningError) == 2
     assert len(begun) == 1
 

@@ -1,13 +1,16 @@
 """SUMO inside this process: the libsumo library, imported on first use."""
 
 import contextlib
+import gc
 import io
 import os
 import sys
 import tempfile
 import threading
+import weakref
 from collections.abc import Iterator, Sequence
 from types import ModuleType
+from typing import ClassVar
 
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
@@ -38,6 +41,8 @@ class LibsumoLink:
 
     remote = False
     shared = False
+    _owner: "ClassVar[weakref.ref[LibsumoLink] | None]" = None
+    """The link whose simulation libsumo holds; None if it is none of ours."""
 
     def __init__(self, outputs: OutputFolder | None = None) -> None:
         self._outputs = outputs
@@ -52,6 +57,8 @@ class LibsumoLink:
 
     def _begin(self, arguments: Sequence[str]) -> Api:
         sumo = load_libsumo()
+        if sumo.isLoaded() and self._sumo is None and self._is_left_behind():
+            sumo.close()
         if sumo.isLoaded() and self._sumo is None:
             raise SimulationRunningError(
                 "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
@@ -71,7 +78,7 @@ class LibsumoLink:
                 failure = error
             else:
                 failure = None
-        self._sumo = sumo
+        self._sumo, LibsumoLink._owner = sumo, weakref.ref(self)
         if failure is None:
             self._check_outputs()
             return sumo
@@ -84,6 +91,13 @@ class LibsumoLink:
         if self._outputs is not None:
             message = self._outputs.shorten(message)
         raise SimulationError(message)
+
+    @classmethod
+    def _is_left_behind(cls) -> bool:
+        """Whether the running simulation is of a link that was dropped without `end`, as by a notebook's cell."""
+        if cls._owner is not None and cls._owner() is not None:
+            gc.collect()
+        return cls._owner is not None and cls._owner() is None
 
     def _check_outputs(self) -> None:
         if self._outputs is None:
@@ -113,7 +127,8 @@ class LibsumoLink:
         """End the simulation; see `SumoLink.end`."""
         if self._sumo is not None and self._sumo.isLoaded():
             self._sumo.close()
-        self._sumo = None
+        if self._sumo is not None:
+            self._sumo = LibsumoLink._owner = None
         if self._outputs is not None:
             self._outputs.close()
 

@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 import threading
+import warnings
 import weakref
 from collections.abc import Iterator, Sequence
 from types import ModuleType
@@ -57,14 +58,8 @@ class LibsumoLink:
 
     def _begin(self, arguments: Sequence[str]) -> Api:
         sumo = load_libsumo()
-        if sumo.isLoaded() and self._sumo is None and self._is_left_behind():
-            sumo.close()
         if sumo.isLoaded() and self._sumo is None:
-            raise SimulationRunningError(
-                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
-                "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
-                "environments)"
-            )
+            self._make_room(sumo)
         if self._outputs is not None:
             arguments = [*arguments, *self._outputs.open()]
         self._arguments = arguments
@@ -79,11 +74,14 @@ class LibsumoLink:
             else:
                 failure = None
         self._sumo, LibsumoLink._owner = sumo, weakref.ref(self)
+        lines = [line.strip() for line in words if line.strip()]
         if failure is None:
             self._check_outputs()
+            errors = [line for line in lines if line.startswith("Error")]
+            if errors:
+                warnings.warn(located("SUMO goes on after an error", " ".join(errors), arguments), stacklevel=2)
             return sumo
         self.end()
-        lines = [line.strip() for line in words if line.strip()]
         # What ends SUMO is either there, or in libsumo's error alone.
         if all(line.startswith("Warning") for line in lines):
             lines.insert(0, str(failure))
@@ -92,12 +90,18 @@ class LibsumoLink:
             message = self._outputs.shorten(message)
         raise SimulationError(message)
 
-    @classmethod
-    def _is_left_behind(cls) -> bool:
-        """Whether the running simulation is of a link that was dropped without `end`, as by a notebook's cell."""
-        if cls._owner is not None and cls._owner() is not None:
+    def _make_room(self, sumo: ModuleType) -> None:
+        """Close the simulation of a link that was dropped without `end`, as by a notebook's cell; refuse others."""
+        owner = LibsumoLink._owner
+        if owner is not None and owner() is not None:
             gc.collect()
-        return cls._owner is not None and cls._owner() is None
+        if owner is None or owner() is not None:
+            raise SimulationRunningError(
+                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
+                "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
+                "environments)"
+            )
+        sumo.close()
 
     def _check_outputs(self) -> None:
         if self._outputs is None:

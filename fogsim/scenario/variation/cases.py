@@ -278,9 +278,9 @@ def differing_cases(document: Document) -> tuple[Case, ...]:
 
 def first_of_several(document: Document) -> str:
     """Which case of several the first one is; empty if there is no other."""
-    cases = differing_cases(document)
-    chosen = "vary.NAME=[VALUE] chooses another"
-    return f"{document.path}: {cases[0].label} is the first of {len(cases)} cases; {chosen}" if cases[1:] else ""
+    first, *others = differing_cases(document)
+    chosen = "" if document.cases else "; vary.NAME=[VALUE] chooses another"
+    return f"{document.path}: {first.label} is the first of {len(others) + 1} cases{chosen}" if others else ""
 
 
 def _put(value: Any, values: Mapping[str, Value]) -> Any:

@@ -1,5 +1,6 @@
 """SUMO in process: reading, obeying, scripting, refusing."""
 
+import contextlib
 import math
 import time
 from collections.abc import Iterator
@@ -101,7 +102,12 @@ def test_a_simulation_that_was_dropped_without_closing_makes_room_for_another() 
     del traffic
     other = libsumo_traffic(SETUP)
     other.start(1)
-    other.close()
+    del other
+    # One that the user has started since is not closed.
+    sumo = libsumo_link.load_libsumo()
+    sumo.start(["sumo", "-n", str(SETUP.net)])
+    with contextlib.closing(sumo), pytest.raises(SimulationRunningError):
+        libsumo_traffic(SETUP).start(1)
 
 
 def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +117,8 @@ def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pyte
         time.sleep(0.05)
         begun.append(arguments)
 
-    sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, TraCIException=RuntimeError)
+    marks = SimpleNamespace(getParameter=lambda *_: "", setParameter=lambda *_: None)
+    sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, simulation=marks, TraCIException=RuntimeError)
     monkeypatch.setattr(libsumo_link, "load_libsumo", lambda: sumo)
     with ThreadPoolExecutor(3) as threads:
         links = [libsumo_link.LibsumoLink() for _ in range(3)]

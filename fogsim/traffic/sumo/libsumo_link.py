@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
+from fogsim.traffic.sumo.claims import LoadMark
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.load_errors import located
 from fogsim.traffic.sumo.output_folder import OutputFolder
@@ -42,8 +43,8 @@ class LibsumoLink:
 
     remote = False
     shared = False
-    _owner: "ClassVar[weakref.ref[LibsumoLink] | None]" = None
-    """The link whose simulation libsumo holds; None if it is none of ours."""
+    _begun: "ClassVar[tuple[weakref.ref[LibsumoLink], LoadMark] | None]" = None
+    """The link that began a simulation last, and a mark in that simulation; None after its end."""
 
     def __init__(self, outputs: OutputFolder | None = None) -> None:
         self._outputs = outputs
@@ -73,9 +74,10 @@ class LibsumoLink:
                 failure = error
             else:
                 failure = None
-        self._sumo, LibsumoLink._owner = sumo, weakref.ref(self)
+        self._sumo = sumo
         lines = [line.strip() for line in words if line.strip()]
         if failure is None:
+            LibsumoLink._begun = weakref.ref(self), LoadMark(sumo, "link")
             self._check_outputs()
             errors = [line for line in lines if line.startswith("Error")]
             if errors:
@@ -92,10 +94,10 @@ class LibsumoLink:
 
     def _make_room(self, sumo: ModuleType) -> None:
         """Close the simulation of a link that was dropped without `end`, as by a notebook's cell; refuse others."""
-        owner = LibsumoLink._owner
-        if owner is not None and owner() is not None:
+        link, mark = LibsumoLink._begun or (None, None)
+        if link is not None and link() is not None:
             gc.collect()
-        if owner is None or owner() is not None:
+        if link is None or link() is not None or mark is None or not mark.is_there():
             raise SimulationRunningError(
                 "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
                 "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
@@ -132,7 +134,7 @@ class LibsumoLink:
         if self._sumo is not None and self._sumo.isLoaded():
             self._sumo.close()
         if self._sumo is not None:
-            self._sumo = LibsumoLink._owner = None
+            self._sumo = LibsumoLink._begun = None
         if self._outputs is not None:
             self._outputs.close()
 

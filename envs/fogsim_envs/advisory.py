@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fogsim.core.parameters import checked_parameters
-from fogsim.scenario import Scenario, load_scenario, override
+from fogsim.scenario import Scenario, override
 from fogsim_envs.advising import AdvisingEnv
-from fogsim_envs.hosting import TIMEOUT, Timeout, begin, checked_timeout
+from fogsim_envs.hosting import TIMEOUT, Timeout, begin, checked_timeout, load_first
 from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.spaces import ImageSize
 
@@ -87,4 +87,4 @@ class FogAdvisoryEnv(AdvisingEnv):
 
 
 def _loaded(scenario: str | Path | Scenario, settings: Sequence[str]) -> Scenario:
-    return override(scenario, settings) if isinstance(scenario, Scenario) else load_scenario(scenario, settings)
+    return override(scenario, settings) if isinstance(scenario, Scenario) else load_first(scenario, settings)

@@ -9,14 +9,19 @@ import math
 import os
 import subprocess
 import sys
+import warnings
+from collections.abc import Iterable
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Annotated, Any, Protocol, cast
 
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.parameters import Range
-from fogsim.errors import InputError, SimulationError, SimulationRunningError
+from fogsim.errors import InputError, LeftOutWarning, SimulationError, SimulationRunningError
 from fogsim.scenario import Scenario
+from fogsim.scenario.loading import load_cases
+from fogsim.scenario.variation import first_of_several
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.simulation.traffic_run import TrafficRun
 from fogsim.values import Command, Step, TrafficStep
@@ -45,6 +50,14 @@ class Simulation(Protocol):
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
+
+
+def load_first(scenario: str | Path, settings: Iterable[str]) -> Scenario:
+    """Load a scenario, the first case of a file that varies, and warn if other cases are left out."""
+    loaded = load_cases(scenario, settings)
+    if note := first_of_several(loaded.document):
+        warnings.warn(note, LeftOutWarning, stacklevel=2)
+    return loaded.cases[0][1]
 
 
 def refuse_controller(scenario: Scenario) -> None:

@@ -107,7 +107,7 @@ def chosen_case(
     """Scenario as in `chosen_scenario`, and its case ``name=value`` ("" for the first), which `seed` must fit."""
     from fogsim.scenario import scenario_from_config
     from fogsim.scenario.loading import check_configuration, load_cases
-    from fogsim.scenario.variation import Case
+    from fogsim.scenario.variation import Case, first_of_several
 
     settings, may_import = settings or (), CodeNotice()
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
@@ -126,7 +126,10 @@ def chosen_case(
         if name.endswith(".sumocfg"):
             raise InputError(f"{name} is a SUMO configuration, not a scenario: run it with --sumocfg {name} --ego ID")
         changed = [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings]
-        chosen, scenario = load_cases(name, changed, case, seed, may_import=may_import).cases[0]
+        loaded = load_cases(name, changed, case, seed, may_import=may_import)
+        if not case and (note := first_of_several(loaded.document)):
+            print_remarks("case", (note,))
+        chosen, scenario = loaded.cases[0]
         return scenario, chosen
     given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
     raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")

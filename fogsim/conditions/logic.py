@@ -58,7 +58,8 @@ def passed(before: tuple[Value, Value], now: tuple[Value, Value], how: str) -> b
     Takes the signal and its operand, which may be another signal, at either step.
     """
     if how == "changes":
-        return _without_count(before[0]) != _without_count(now[0])
+        earlier, later = _without_count(before[0]), _without_count(now[0])
+        return None if earlier is None or later is None else earlier != later
     relation = {"falls below": "<", "rises above": ">", "becomes": "=="}[how]
     earlier, later = compared(before[0], relation, before[1]), compared(now[0], relation, now[1])
     return None if earlier is None or later is None else later and not earlier

@@ -107,6 +107,11 @@ def _has_collided(moment: Moment, vehicle: str) -> bool:
     return any(name in pair for pair in moment.collisions)
 
 
+def _have_collided(moment: Moment, one: str, other: str) -> bool:
+    names = moment.vehicle_id(one), moment.vehicle_id(other)
+    return names in moment.collisions or names[::-1] in moment.collisions
+
+
 def _body(moment: Moment, vehicle: str) -> Body | None:
     row = moment.row(vehicle)
     return None if row is None else body_of(moment.traffic, row)
@@ -190,6 +195,7 @@ OF_VEHICLES = {
     ),
     "X.visibility": length_signal("true visibility at the driver's eyes", _of_vehicle(_seen), places=_VEHICLE),
     "X.collision": Signal("whether it has collided so far", _has_collided, Kind.FLAG, places=_VEHICLE),
+    "collision(X, Y)": Signal("whether they have collided so far", _have_collided, Kind.FLAG, places=_PAIR),
     "gap(X, Y)": length_signal(
         "gap from X to Y along the route, bumper to bumper, whatever the lane: positive if Y is ahead, negative if it "
         "is behind, 0 if they overlap",

@@ -95,11 +95,8 @@ class Watch:
 
     def _passed(self, edge: Edge) -> bool | None:
         now = self.values[edge.left], None if edge.right is None else self._operand(edge.right)
-        if now[0] is None or (now[1] is None and edge.right is not None):
-            return None
-        before = self._before.get(edge)
-        self._before[edge] = now
-        return False if before is None else passed(before, now, edge.how)
+        before, self._before[edge] = self._before.get(edge, now), now
+        return passed(before, now, edge.how)
 
     def _held(self, part: Held, inside: bool | None, time: float, duration: float) -> bool | None:
         if not inside:

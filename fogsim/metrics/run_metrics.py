@@ -21,7 +21,7 @@ from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficCohort, TrafficMetric
 from fogsim.units import clock_time
-from fogsim.values import Step, TrafficStep
+from fogsim.values import Ending, Step, TrafficStep
 from fogsim.values.result_checks import checked_values
 
 MetricFactory = Callable[[SafetyStandard], Metric | TrafficMetric]
@@ -299,10 +299,10 @@ def metric_topics() -> dict[str, tuple[str, ...]]:
 
 
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
-    """Time since the step before [s]; None if it is the same."""
+    """Time since the step before [s]; None if it repeats that one, as after the ego has left the network."""
     if last is None:
         return 0.0
-    if last.index == step.index:
+    if last.index == step.index or step.ending is Ending.LEFT_NETWORK:
         return None
     elapsed = clock_time(step.time - last.time)
     if not elapsed > 0:

@@ -233,5 +233,11 @@ def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:
+        most = int(image.max(initial=0))
+        if 2**8 <= most < 2**_WHOLE_RANGE_BITS:
+            raise InputError(
+                f"the image has 16 bits and no value above {most}: write `bits: {10 if most < 2**10 else 12}` in the "
+                "camera file if it is the camera's, or spread the values over 0 … 65535"
+            )
         return (image >> (16 - _WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=_WHOLE_RANGE_BITS)
     return image, camera

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import math
+import re
 import struct
 import tokenize
 import warnings
@@ -39,6 +40,11 @@ _OPTIONS: dict[str, list[int]] = {".webp": [getattr(cv2, name) for name in _EXAC
 
 _CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
 """Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
+
+_LARGEST_VALUE = re.compile(rb"P[56](?:\s+(?:#[^\n]*\n\s*)*\d+){2}\s+(?:#[^\n]*\n\s*)*(\d+)")
+"""Of the header of a PGM or PPM file; pixels are read as they are, whatever it says."""
+
+_FULL_SCALES = (255, 1023, 4095, 65535)  # of 8, 10, 12 and 16 bits
 
 ANIMATED_FORMATS = ("GIF", "WEBP", "PNG")
 _PARTS = dict.fromkeys(ANIMATED_FORMATS, "frames") | {"TIFF": "pages"}
@@ -116,6 +122,10 @@ def _checked(path: Path, data: bytes) -> int:
         raise InputError(f"{path}: by its header the image is larger than any camera's: {error}") from error
     except (*IMAGE_FAULTS, MemoryError) as error:
         raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
+    header = _LARGEST_VALUE.match(data)
+    if header is not None and int(header[1]) not in _FULL_SCALES:
+        known = ", ".join(map(str, _FULL_SCALES))
+        raise InputError(f"{path}: expected a largest value of {known} in the header, got {int(header[1])}")
     if parts > 1 and image.format in _PARTS:
         raise InputError(f"{path}: expected one image, got {parts} {_PARTS[image.format]}")
     # OpenCV turns TIFF by itself.

@@ -4,6 +4,7 @@ import glob
 import itertools
 import math
 import re
+import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -64,6 +65,12 @@ def find_source(
                 f"--sequence: {paths[0]}, {paths[1]}, … are in the order of their names as text, as a shell puts them, "
                 "not of their numbers: give the folder, or the pattern in quotes"
             )
+        if sequence and (gap := _first_gap(paths)):
+            warnings.warn(
+                f"--sequence: the numbers of {gap[0]} and {gap[1]} are farther apart than others: images may be "
+                f"missing there; each is taken as {1.0 / (rate or _SEQUENCE_RATE):g} s after the one before",
+                stacklevel=2,
+            )
         return ImageFiles(tuple(paths), temporal, 1.0 / (rate or _SEQUENCE_RATE))
     if len(paths) > 1:
         raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
@@ -109,14 +116,24 @@ def _ordered(paths: Iterable[Path]) -> list[Path]:
 
 def is_sequence(paths: Sequence[Path]) -> bool:
     """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps."""
-    if len(paths) < 2:
-        return False
+    steps = set(_steps(paths))
+    return len(steps) == 1 and min(steps) > 0
+
+
+def _first_gap(paths: Sequence[Path]) -> Sequence[Path]:
+    """The two files of a numbered sequence between which numbers are first left out; none without a gap."""
+    steps = _steps(paths)
+    usual = min(steps, default=0)
+    return next((paths[i : i + 2] for i, step in enumerate(steps) if step > 1.5 * usual > 0.0), ())
+
+
+def _steps(paths: Sequence[Path]) -> list[int]:
+    """Differences between the numbers of files whose names differ in one number; none of others."""
     # The last number counts: "drive2_cam1_0007.png".
     parts = [re.fullmatch(r"(.*?)([0-9]+)([^0-9]*)", path.name) for path in paths]
     matches = [part for part in parts if part is not None]
     if len(matches) < len(paths):
-        return False
+        return []
     around = {(path.parent, match[1], match[3]) for path, match in zip(paths, matches, strict=True)}
     numbers = [int(match[2]) for match in matches]
-    steps = {after - before for before, after in itertools.pairwise(numbers)}
-    return len(around) == 1 and len(steps) == 1 and min(steps) > 0
+    return [after - before for before, after in itertools.pairwise(numbers)] if len(around) == 1 else []

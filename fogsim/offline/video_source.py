@@ -295,7 +295,7 @@ class _Log:
 
     def __init__(self, file: int, period: float) -> None:
         self._file, self._period = file, period
-        self._at, self._rest = 0, b""
+        self._at, self._rest, self._shift = 0, b"", 0.0
         self._times: list[float] = []
         self._sizes: list[tuple[int, int]] = []
         self.errors: list[str] = []
@@ -318,7 +318,11 @@ class _Log:
     def _take(self, line: str) -> None:
         if frame := _FRAME.search(line):
             after = self._times[-1] + self._period if self._times else 0.0
-            self._times.append(after if frame[1] == "NOPTS" else float(frame[1]))
+            time = after if frame[1] == "NOPTS" else float(frame[1]) + self._shift
+            if self._times and time < self._times[-1]:
+                # Time has begun again, as where one file was appended to another.
+                self._shift, time = self._shift + after - time, after
+            self._times.append(time)
             self._sizes.append((int(frame[2]), int(frame[3])))
         elif _ERROR in line and len(self.errors) < _MOST_ERRORS:
             self.errors.append(_ADDRESS.sub("", line).replace(_ERROR, "").strip())

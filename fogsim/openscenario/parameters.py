@@ -208,9 +208,11 @@ def to_standard(root: Node) -> None:
     headers = (node.attributes.get("description", "") for node in root.children if node.tag == "FileHeader")
     nodes = list(root.walk()) if any(text.startswith("CARLA:") for text in headers) else []
     for node in (one for one in nodes if one.tag.endswith(("Position", "Orientation"))):
+        # ScenarioRunner counts the offset to the right of the lane, the format to the left of the road.
+        turned = {"offset"} if node.attributes.get("laneId", "").startswith("-") else set()
         # What is no number is found where it is read.
         with contextlib.suppress(ValueError):
-            for key in node.attributes.keys() & _MIRRORED:
+            for key in node.attributes.keys() & (_MIRRORED | turned):
                 node.attributes[key] = repr(-float(node.attributes[key]))
     for node in (one for one in nodes if one.tag == "StopTrigger"):
         for group in node.children:

@@ -250,11 +250,11 @@ class Triggers:
         return self._compared(node, f"{signal}({one.called}, {other.called}, {further:g} m)", "s")
 
     def collision_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`X.collision`, with anybody or a vehicle: `X.collision and Y.collision`."""
+        """`X.collision`, with anybody or a vehicle; `collision(X, Y)`."""
         for kind in node.all("ByType"):
             kind.word("type", ("vehicle",))
-        both = (one, *map(self.positions.vehicles.of, node.all("EntityRef")))
-        return (" and ".join(f"{each.called}.collision" for each in both),)
+        others = [self.positions.vehicles.of(other).called for other in node.all("EntityRef")]
+        return (f"collision({one.called}, {others[0]})" if others else f"{one.called}.collision",)
 
 
 CONDITIONS = handlers(Triggers, "condition")

@@ -14,7 +14,7 @@ from fogsim.errors import InputError, shown
 from fogsim.recorders.manifest import versions
 from fogsim.study.execution import result_file
 from fogsim.study.main_metrics import OF_THE_BELIEF, OF_WARNINGS
-from fogsim.study.plan import Study, StudyRun
+from fogsim.study.plan import Study, StudyRun, goes_by_reports
 from fogsim.study.profiles import Profiles
 from fogsim.study.run_file import STUDY_RUN, CompleteRun, FailedRun, Value, read_run
 from fogsim.study.table import Row
@@ -99,8 +99,8 @@ class StudyDirectory:
     def _row(self, run: StudyRun) -> Row:
         found = self._result(run)
         metrics = found.metrics if isinstance(found, CompleteRun) else {}
-        if not run.scenario.estimators:
-            # Without a camera the belief stays at its prior: there is no error to compare.
+        if not run.scenario.estimators and not goes_by_reports(run.scenario, self._study.metrics):
+            # Without a camera or reports the belief stays at its prior: there is no error to compare.
             unknown = OF_THE_BELIEF if run.scenario.controller else OF_THE_BELIEF | OF_WARNINGS
             metrics = {key: None if key in unknown else value for key, value in metrics.items()}
         about = {

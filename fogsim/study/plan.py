@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from fogsim.core.files.readers import open_regular
 from fogsim.core.parameters import checked_parameters
@@ -25,7 +25,7 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
-from fogsim.scenario.variation import grid_mistake, read_variation, with_case
+from fogsim.scenario.variation import differing_cases, grid_mistake
 from fogsim.scenario.written_form import deciding
 from fogsim.simulation.run_config import NO_RENDERER
 from fogsim.study.main_metrics import METHODS_KEY, OF_THE_BELIEF, OF_WARNINGS, unknown_metrics
@@ -33,6 +33,14 @@ from fogsim.study.table import column_mistake
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
+
+
+def _as_key(value: object) -> object:
+    """A number as it is as a key, which is text."""
+    return json.dumps(value) if isinstance(value, int | float) else value
+
+
+_Level = Annotated[Name, BeforeValidator(_as_key, json_schema_input_type=str | float)]
 
 _MOST_EQUAL = 5
 
@@ -58,7 +66,7 @@ class StudyFile(Section):
     seeds: Annotated[int, Field(strict=True, ge=1, le=100_000)] | Annotated[tuple[Seed, ...], Field(min_length=1)] = 10
     """How many seeds, from 0 on, or a list of them; every cell of the grid has the same ones."""
 
-    baseline: dict[Name, Name] = Field(default_factory=dict)
+    baseline: dict[Name, _Level] = Field(default_factory=dict)
     """Level of one factor or several to which the others are compared; by default the first factor's first level."""
 
     confidence: Annotated[Share, Field(ge=0.5, le=0.999)] = 0.95
@@ -305,9 +313,8 @@ def _refuse_cases(document: Document, settings: Iterable[str]) -> None:
     """Raise InputError for a scenario whose cases differ in more than their seeds: a study would run only the first."""
     varied = [setting for setting in settings if setting.lstrip().startswith("vary")]
     document = replace(document, data=apply_overrides(document.data, varied))
-    cases = read_variation(document).cases
-    first = with_case(document, cases[0]).data
-    if any(with_case(document, one).data != first for one in cases[1:]):
+    cases = differing_cases(document)
+    if len(cases) > 1:
         names = ", ".join(cases[0].values)
         raise InputError(
             f"{document.where(('vary',))}: vary: a study runs a single case, and {names} make {len(cases)}; write "
@@ -340,6 +347,14 @@ def needs_camera(scenario: Scenario, metrics: Iterable[str] = ()) -> bool:
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method in unmoved
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))
+
+
+def goes_by_reports(scenario: Scenario, metrics: Iterable[str]) -> bool:
+    """Whether a belief without estimators is informed by the reports of others, and is what the study asks about."""
+    senders = scenario.sensors.reports
+    is_deaf = scenario.fusion.method in ("grid_filter", "mixture_filter", "none")
+    has_senders = senders.roadside is not None or senders.vehicles is not None
+    return has_senders and not is_deaf and needs_camera(scenario, metrics)
 
 
 def _is_of_camera(metric: str) -> bool:

@@ -17,6 +17,7 @@ from early_motorway import EARLY
 from pyarrow import parquet
 
 from fogsim.cli.app import app
+from fogsim.cli.scenario_options import chosen_scenario
 from fogsim.scenario import catalogue
 from tests.helpers.command import Command, run_command, run_python
 
@@ -32,6 +33,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("run") / "out"
     assert run_command("run", "motorway_fog_bank", "--seed", "3", "--trajectories", "--out", str(out), *SMALL) == 0
     return out
+
+
+def test_the_first_of_several_cases_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    chosen_scenario("patchy_fog", None, None, None, ["vary={strength: [0.7], run: 1 seed}"])
+    assert not capsys.readouterr().err
+    chosen_scenario("patchy_fog", None, None, None, None)
+    assert "strength=0.4,run=0 is the first of 4 cases" in capsys.readouterr().err
 
 
 def test_a_run_writes_everything(finished: Path) -> None:

@@ -69,7 +69,7 @@ def test_who_is_not_on_the_road_has_no_value() -> None:
     for signal, found in SIGNALS.items():
         name = signal.replace("X", "ghost").replace("Y", "ghost").replace("METHOD", "ghost").replace("ID", "ghost")
         name = name.replace("LENGTH", "2 m")
-        if "ghost" in name and name not in {"ghost.present", "ghost.collision"}:
+        if "ghost" in name and name not in {"ghost.present", "ghost.collision", "collision(ghost, ghost)"}:
             assert read(name.replace("N", "0"), step) is None
         elif found.kind is Kind.NUMBER:
             assert isinstance(read(name, step), float | None), signal
@@ -267,6 +267,13 @@ def test_what_has_happened_stays_so() -> None:
     assert [watch.update(step) for step in steps] == [False, False, True, True]
     over = Watch(parse_condition("happened(end)"))
     assert [over.update(step) for step in steps] == [False] * 4
+
+
+def test_two_that_hit_others_have_not_hit_each_other() -> None:
+    pairs = ("ego", "other"), ("third", "fourth"), ("third", "ego")
+    step = make_step(collisions=tuple(Collision(0.0, *pair, 2.0) for pair in pairs))
+    for condition, holds in (("collision(ego, third)", True), ("collision(third, other)", False)):
+        assert Watch(parse_condition(condition)).update(step) is holds
 
 
 def test_the_light_ahead() -> None:

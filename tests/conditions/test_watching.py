@@ -12,6 +12,8 @@ from fogsim.conditions.logic import combined
 from fogsim.conditions.signal import Kind
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Flag, Held, Not, Quantity, Reference, Word
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values import Estimate
 from tests.recorders.synthetic import make_step
 
 
@@ -63,6 +65,16 @@ def test_what_is_not_known() -> None:
         assert over(condition, [1.0]) == [known], condition
     watch = Watch(parse_condition("estimate(m).valid becomes true"))
     assert [watch.update(make_step(i)) for i in range(2)] == [None, None]
+
+
+@pytest.mark.parametrize("how", ["falls below 50 m", "becomes 30 m", "changes"])
+def test_nothing_is_passed_over_a_gap(how: str) -> None:
+    watch = Watch(parse_condition(f"estimate(m).visibility {how}"))
+    k = OPTICAL_DEPTH_AT_VISIBILITY
+    seen = k / 60.0, k / 60.0, None, k / 30.0, k / 30.0, k / 60.0, k / 30.0
+    estimates = [() if one is None else (Estimate("m", one, 0.01, valid=True),) for one in seen]
+    held = [watch.update(make_step(time=0.5 * i, estimates=one)) for i, one in enumerate(estimates)]
+    assert held == [False, False, None, None, False, how == "changes", True]
 
 
 def test_values_are_told_in_the_units_that_were_written() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import fogsim
 from fogsim.camera import USUAL_MOUNTS
+from fogsim.estimators.night.own_light import setback_of
 from fogsim.scenario import build, catalogue
 from fogsim.traffic.appearance import EYE_HEIGHTS
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
@@ -49,6 +50,13 @@ def test_what_the_scenario_says_holds_for_every_body(tmp_path: Path) -> None:
     said = ("camera.mount_height_m=3", "camera.told.mount_height_error_percent=10")
     with fogsim.ClosedLoop(load(tmp_path, 'vClass="coach"', *said)) as loop:
         assert mounted(loop.start(1)) == pytest.approx((3.0, 3.3, USUAL_MOUNTS["bus"].setback))
+
+
+def test_a_camera_at_the_front_bumper_is_known_to_be_there(tmp_path: Path) -> None:
+    with fogsim.ClosedLoop(load(tmp_path, 'vClass="passenger"', "camera.setback_m=0")) as loop:
+        step = loop.start(1)
+    assert mounted(step)[2] == 0.0
+    assert setback_of(step.observation) == 0.001
 
 
 def test_in_a_simulation_of_the_users_own_too(tmp_path: Path) -> None:

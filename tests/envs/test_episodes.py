@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.scenario import Scenario, load_scenario
 from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
@@ -36,6 +36,13 @@ def test_numpys_numbers_draw_the_same_episodes() -> None:
     for scenario in (None, "clear_day"):
         expected = drawn(2.0, scenario)
         assert all(drawn(one(2), scenario) == expected for one in (np.float64, np.float32, np.int64))
+
+
+def test_cases_that_are_left_out_are_named() -> None:
+    source = EpisodeSource("patchy_fog", None, None, (), "train")
+    with pytest.warns(LeftOutWarning, match=r"strength=0.4,run=0 is the first of 4 cases; vary\.NAME=\[VALUE\]"):
+        assert source.first_scenario() == load_scenario("patchy_fog")
+    EpisodeSource("patchy_fog", None, None, ("vary={strength: [0.7], run: 1 seed}",), "train").first_scenario()
 
 
 def test_splits_share_no_seed() -> None:

@@ -58,8 +58,9 @@ def test_the_summary_names_what_sight_was_judged_by() -> None:
 
 def test_a_step_that_comes_once_more_adds_only_its_ending() -> None:
     step = make_step(0, time=1.0, collisions=(Collision(1.0, "a", "b", 3.0),))
-    summary = summarise([step, dataclasses.replace(step, ending=Ending.LEFT_NETWORK)])
-    assert summary["collisions"] == 1
+    # As `ClosedLoop.advance` makes it.
+    summary = summarise([step, dataclasses.replace(step, index=1, time=1.5, ending=Ending.LEFT_NETWORK)])
+    assert (summary["collisions"], summary["duration_s"], summary["traffic_vehicle_time_s"]) == (1, 0.0, 0.0)
     assert summary["steps"] == 1
     assert summary["ending"] == "left the network"
 

@@ -106,6 +106,14 @@ def test_images_of_8_bits_are_not_those_of_a_camera_of_12(drive) -> None:
         list(estimate_images(drive.folder / "images", replace(drive.camera, bits=12), "negru2013"))
 
 
+def test_images_of_12_bits_need_a_camera_of_12(drive, tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "deep.png"), drive.frames[0].astype(np.uint16) * 16)
+    with pytest.raises(InputError, match=r"16 bits and no value above \d+: write `bits: 12` in the camera file"):
+        list(estimate_images(tmp_path / "deep.png", drive.camera, "negru2013"))
+    camera = replace(drive.camera, bits=12)
+    assert visibilities(estimate_images(tmp_path / "deep.png", camera, "negru2013"))
+
+
 def test_a_camera_is_no_path() -> None:
     with pytest.raises(InputError, match="expected a Camera, or a Calibration from"):
         next(estimate_images("drive", "c.yaml"))

@@ -81,6 +81,17 @@ def test_formats_that_change_pixels_are_not_written(tmp_path: Path, ending: str)
         refuse_unwritable_image(tmp_path / f"image{ending}", "--out")
 
 
+@pytest.mark.parametrize(("most", "is_read"), [(100, False), (255, True), (1000, False), (4095, True), (65535, True)])
+def test_the_largest_value_of_a_pgm_is_a_full_scale(tmp_path: Path, most: int, is_read: bool) -> None:
+    path, values = tmp_path / "grey.pgm", np.linspace(0, most, 20).astype(">u2" if most > 255 else np.uint8)
+    path.write_bytes(b"P5 # made by hand\n# 7 8 9\n5 4\n%d\n" % most + values.tobytes())
+    if is_read:
+        assert np.array_equal(read_image(path).ravel(), values)
+        return
+    with pytest.raises(InputError, match=f"expected a largest value of 255, 1023, 4095, 65535 .*, got {most}"):
+        read_image(path)
+
+
 def test_they_are_read(tmp_path: Path) -> None:
     for ending in (".pnm", ".ras", ".sr"):
         cv2.imwrite(str(tmp_path / f"image{ending}"), COLOURED)

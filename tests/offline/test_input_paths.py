@@ -62,6 +62,14 @@ def test_numbers_that_count_on_in_equal_steps_make_a_sequence() -> None:
         assert is_sequence([Path(file) for file in files]) is sequence
 
 
+def test_images_that_are_missing_in_a_sequence_are_named(tmp_path: Path) -> None:
+    for number in (7, 8, 11, 12):
+        (tmp_path / f"f{number}.png").write_bytes(b"")
+    with pytest.warns(UserWarning, match=r"numbers of \S+f8\.png and \S+f11\.png are farther apart .* taken as 0\.1 s"):
+        assert find_source(tmp_path, sequence=True).temporal
+    find_source(tmp_path)  # as stills, of which its description speaks
+
+
 def test_what_was_found_is_told(folder: Path) -> None:
     assert find_source(folder / "f9.png").description == "1 image"
     assert find_source(str(folder / "*.png"), rate=25).description == "2 images, taken as a sequence of 25 a second"

@@ -16,6 +16,7 @@ from fogsim.offline import ImageFiles, SignWatch, estimate_images, record_lines,
 from fogsim.offline.drive.sign_file import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
 from fogsim.offline.drive.track_file import load_track, metres_per_radian
 from fogsim.offline.overlay import Overlay
+from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.sign_marks import NET, write_sign_map
 from fogsim.recorders.style import ADVICE, MUTED
 from fogsim.values import Camera, Sign, SignMap
@@ -180,6 +181,8 @@ def test_images_outside_the_track_and_signs_of_the_other_direction_are_told(fold
     assert "do they face the other way" in next(back.remarks())
     with pytest.raises(InputError, match=r"covers -60\.0 … -54\.0 s from the first image, and the images 0 … 5\.0 s"):
         watch(offset=60.0)
+    # A video that does not state its length may last until the track begins.
+    watch_signs("map.geojson", "track.csv", VideoFile(Path("raw.h264"), True, (320, 240), 0.1, 0.0), CAMERA, -20.0)
 
 
 def test_a_sign_behind_the_camera_is_none_that_is_looked_for(folder: Path) -> None:

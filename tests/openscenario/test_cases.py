@@ -167,6 +167,12 @@ def test_files_of_carla_have_their_own_axes(tmp_path: Path) -> None:
     with pytest.warns(LeftOutWarning, match="read as the share"):
         step = run(file, "duration_s=0.1")[0]
     assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.7, -1.3], abs=0.01)
+    # To the right of the lane.
+    shifted = (place.format(30), '<LanePosition roadId="7" laneId="-1" s="30" offset="0.5"/>')
+    file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), shifted)
+    with pytest.warns(LeftOutWarning, match="read as the share"):
+        moved = run(file, "duration_s=0.1")[0]
+    assert float(moved.traffic.position[0, 1]) == pytest.approx(-1.75 - 0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("begins", [(70.0, 33.7 + 30.0 + 4.6), (10.0, 33.7 - 4.6 - 30.0 + 40.0)])

@@ -72,7 +72,8 @@ def test_conditions(read: Callable[..., dict[str, Any]]) -> None:
             far.format('alongRoute="true" rule="greaterThan"', there),
             "ego.position < 153.671 m or ego.position > 253.671 m",
         ),
-        ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "ego.collision"),
+        ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "collision(ego, Lead)"),
+        ('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>', "ego.collision"),
     ]:
         assert told in read((STAND_STILL, condition))["end_when"]
 

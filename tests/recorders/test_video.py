@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.metrics import step_metrics
+from fogsim.offline.video_source import VideoFile
 from fogsim.recorders import VideoRecorder, encoder_report
 from fogsim.recorders.video import Encoder, encoder_command
 from tests.recorders.synthetic import make_step
@@ -55,6 +56,18 @@ def test_every_step_is_a_frame_at_real_speed(tmp_path: Path) -> None:
 def test_a_run_without_steps_leaves_nothing(tmp_path: Path) -> None:
     VideoRecorder(tmp_path / "video.mp4", frame_period=0.1).close(complete=False)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_time_goes_on_where_one_video_was_appended_to_another(tmp_path: Path) -> None:
+    one, both = tmp_path / "one.mkv", tmp_path / "both.mkv"
+    command = encoder_command(one, 0.1, (64, 48))
+    encoder = Encoder(["matroska" if word == "mp4" else word for word in command])
+    for _ in range(4):
+        encoder.write(bytes(64 * 48 * 3))
+    encoder.finish()
+    both.write_bytes(2 * one.read_bytes())
+    times = [picture.time for picture in VideoFile.open(both).pictures()]
+    assert times == pytest.approx(np.arange(8) / 10.0, abs=0.002)
 
 
 def test_a_frame_that_was_cut_off_does_not_spoil_the_others(tmp_path: Path) -> None:

@@ -88,6 +88,13 @@ def test_mistakes_are_named_with_their_place(tmp_path: Path) -> None:
             load_study(written(tmp_path, STUDY.replace(*change, 1)))
 
 
+def test_a_level_that_is_a_number_can_be_the_baseline(tmp_path: Path) -> None:
+    text = STUDY.replace("v60:", "60:", 1).replace("seeds: 3", "baseline: {visibility: 60}")
+    assert load_study(written(tmp_path, text)).baseline == {"visibility": "60"}
+    with pytest.raises(InputError, match=r"baseline\.visibility: unknown level '60\.0'; did you mean '60'"):
+        load_study(written(tmp_path, text.replace("visibility: 60}", "visibility: 60.0}")))
+
+
 def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path) -> None:
     for name in [
         *sorted(FIXED_COLUMNS),

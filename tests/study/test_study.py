@@ -260,8 +260,23 @@ def test_a_damaged_description_is_one_error(tmp_path: Path, damage: str) -> None
         StudyDirectory(tmp_path / "out", study)
 
 
-def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", "duration_s=1, lighting=low_beam")))
+_REPORTS = "renderer=none, 'estimators=[]', lighting=low_beam, 'sensors.reports.roadside={every_m: 200}'"
+
+
+@pytest.mark.parametrize(
+    ("settings", "chosen", "is_known"),
+    [
+        ("lighting=low_beam", "", False),
+        (f"{_REPORTS}, fusion=grid_filter", "metrics: [belief_median_error_percent]", False),
+        (f"{_REPORTS}, fusion=field_filter", "", False),
+        (f"{_REPORTS}, fusion=field_filter", "metrics: [belief_median_error_percent]", True),
+    ],
+)
+def test_what_is_believed_without_camera_and_reports_is_no_metric(
+    tmp_path: Path, settings: str, chosen: str, is_known: bool
+) -> None:
+    text = STUDY.replace("duration_s=1", f"duration_s=1, {settings}") + chosen
+    study = load_study(study_file(tmp_path, text))
     assert not study.runs[0].scenario.estimators
     directory = StudyDirectory(tmp_path / "out", study)
     believed = {
@@ -273,7 +288,8 @@ def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
     result = complete(metrics)
     (tmp_path / "out" / "runs" / f"{study.runs[0].key}.json").write_text(json.dumps(result), encoding="utf-8")
     row = directory.rows()[0]
-    assert {key: row[key] for key in metrics} == {**dict.fromkeys(believed), "mean_speed_mps": 20.0}
+    kept = believed if is_known else dict.fromkeys(believed)
+    assert {key: row[key] for key in metrics} == {**kept, "mean_speed_mps": 20.0}
 
 
 def test_a_policy_that_returns_no_speed_is_reported_with_its_name(

@@ -1,5 +1,6 @@
 """SUMO in process: reading, obeying, scripting, refusing."""
 
+import contextlib
 import math
 import time
 from collections.abc import Iterator
@@ -95,6 +96,20 @@ def test_a_process_has_one_simulation_until_it_is_closed(traffic: Traffic) -> No
         traffic.observe()
 
 
+def test_a_simulation_that_was_dropped_without_closing_makes_room_for_another() -> None:
+    traffic = libsumo_traffic(SETUP)
+    traffic.start(1)
+    del traffic
+    other = libsumo_traffic(SETUP)
+    other.start(1)
+    del other
+    # One that the user has started since is not closed.
+    sumo = libsumo_link.load_libsumo()
+    sumo.start(["sumo", "-n", str(SETUP.net)])
+    with contextlib.closing(sumo), pytest.raises(SimulationRunningError):
+        libsumo_traffic(SETUP).start(1)
+
+
 def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[object] = []
 
@@ -102,10 +117,12 @@ def test_of_threads_that_begin_together_one_has_the_simulation(monkeypatch: pyte
         time.sleep(0.05)
         begun.append(arguments)
 
-    sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, TraCIException=RuntimeError)
+    marks = SimpleNamespace(getParameter=lambda *_: "", setParameter=lambda *_: None)
+    sumo = SimpleNamespace(isLoaded=lambda: bool(begun), start=start, simulation=marks, TraCIException=RuntimeError)
     monkeypatch.setattr(libsumo_link, "load_libsumo", lambda: sumo)
     with ThreadPoolExecutor(3) as threads:
-        asked = [threads.submit(libsumo_link.LibsumoLink().begin, ()) for _ in range(3)]
+        links = [libsumo_link.LibsumoLink() for _ in range(3)]
+        asked = [threads.submit(link.begin, ()) for link in links]
     assert [type(one.exception()) for one in asked].count(SimulationRunningError) == 2
     assert len(begun) == 1
 

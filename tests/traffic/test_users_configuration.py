@@ -143,6 +143,14 @@ def test_what_sumo_cannot_load_is_named_with_file_and_line(tmp_path: Path) -> No
     for mistake, option, place, cause in (
         ('<poly id="x" shape="a,b 3,4"/>', "", "a.add.xml:2", "Attribute 'shape' in definition of poly 'x'"),
         ('<flow id="f" begin="0" number="5" route="no"/>', "", "a.add.xml:2", "The route 'no' for flow 'f'"),
+        (
+            '<vType accel="2" id="x"/><vType id="y"\n accel="2 m"/>',
+            "",
+            "a.add.xml:2",
+            "Invalid Car-Following",
+        ),
+        ('<vType id="x" minGap="0"/>\n<vType id="y" minGap="-1"/>', "", "a.add.xml:3", "minGap must be equal or"),
+        ('<vType id="x" sigma="1"/>\n<vType id="y" sigma="2"/>', "", "a.add.xml:3", "Invalid .* between \\[0-1\\]"),
         ("", '<foo value="3"/>', "mine.sumocfg:1", "No option with the name 'foo' exists"),
     ):
         additional.write_text(f"<additional>\n{mistake}\n</additional>", encoding="utf-8")
@@ -150,6 +158,15 @@ def test_what_sumo_cannot_load_is_named_with_file_and_line(tmp_path: Path) -> No
         config = configured(tmp_path, DATA / "a.net.xml", rows, option, additional=additional)
         with pytest.raises(SimulationError, match=rf"^{tmp_path}/{place}: SUMO cannot load the scenario: {cause}"):
             next(fogsim.run(loaded(config)))
+
+
+def test_an_error_that_sumo_passes_over_is_a_warning(tmp_path: Path) -> None:
+    rows = f'<routes>{CAR}\n<vType id="x" vClass="lorry"/>{vehicle("ego", 0.0, WAY)}</routes>'
+    scenario = loaded(configured(tmp_path, DATA / "a.net.xml", rows))
+    with pytest.warns(
+        UserWarning, match=r"\.xml:2: SUMO goes on after an error: The vehicle class 'lorry' for vType 'x'"
+    ):
+        next(fogsim.run(scenario))
 
 
 def test_a_missing_file_that_ends_sumo_is_refused_before(tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 
 from fogsim.core.parameters import Range
 from fogsim.errors import InputError, UnknownNameError, shown
-from fogsim.scenario import Scenario, load_scenario, override
+from fogsim.scenario import Scenario, override
 from fogsim.units import DAY_ILLUMINANCE
+from fogsim_envs.hosting import load_first
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting
 
 MOTORWAY, MOTORWAY_2 = (Path(__file__).with_name(name) for name in ("motorway.yaml", "motorway_2.yaml"))
@@ -157,7 +158,7 @@ class EpisodeSource:
         if (scenario, settings) not in self._kept:
             if len(self._kept) == _KEPT_SCENARIOS:
                 self._kept.pop(next(iter(self._kept)))
-            self._kept[scenario, settings] = load_scenario(scenario, settings)
+            self._kept[scenario, settings] = load_first(scenario, settings)
         return self._kept[scenario, settings]
 
 

@@ -237,9 +237,11 @@ def watch_signs(
         raise InputError(f"--track-offset must be a number of seconds, got {offset!r}")
     mapped, driven = load_sign_file(Path(signs)), load_track(Path(track))
     first, last = driven.time[[0, -1]] - offset
-    if first > source.period * max(source.count - 1, 0) or last < 0.0:
+    # A video may not state its length.
+    end = math.inf if source.temporal and source.count == 1 else source.period * max(source.count - 1, 0)
+    if first > end or last < 0.0:
         raise InputError(
             f"--track {track}: covers {first:.1f} … {last:.1f} s from the first image, and the images "
-            f"0 … {source.period * max(source.count - 1, 0):.1f} s: see --track-offset"
+            f"0 … {end:.1f} s: see --track-offset"
         )
     return SignWatch(mapped, driven, camera, offset), mapped.remarks

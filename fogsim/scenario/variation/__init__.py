@@ -9,6 +9,8 @@ from fogsim.scenario.variation.cases import (
     VariationKeys,
     Verdict,
     chosen_cases,
+    differing_cases,
+    first_of_several,
     read_variation,
     with_case,
 )
@@ -28,6 +30,8 @@ __all__ = [
     "VariationKeys",
     "Verdict",
     "chosen_cases",
+    "differing_cases",
+    "first_of_several",
     "grid_mistake",
     "number_with_unit",
     "read_variation",

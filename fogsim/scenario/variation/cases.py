@@ -269,6 +269,20 @@ def with_case(document: Document, case: Case) -> Document:
     return replace(document, data=data if of_file or not case.values else _put(data, case.values))
 
 
+def differing_cases(document: Document) -> tuple[Case, ...]:
+    """All cases of a file; only the first if they differ in nothing but their seeds."""
+    cases = read_variation(document).cases
+    first = with_case(document, cases[0]).data
+    return cases if any(with_case(document, one).data != first for one in cases[1:]) else cases[:1]
+
+
+def first_of_several(document: Document) -> str:
+    """Which case of several the first one is; empty if there is no other."""
+    first, *others = differing_cases(document)
+    chosen = "" if document.cases else "; vary.NAME=[VALUE] chooses another"
+    return f"{document.path}: {first.label} is the first of {len(others) + 1} cases{chosen}" if others else ""
+
+
 def _put(value: Any, values: Mapping[str, Value]) -> Any:
     if isinstance(value, dict):
         return {key: _put(one, values) for key, one in value.items()}

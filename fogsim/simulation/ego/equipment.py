@@ -313,7 +313,8 @@ class EgoEquipment:
             speed=speed,
             lead=self._sensors.lead(snapshot, faults, parts.streams),
             signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
-            camera_setback=self._rig.setback,
+            # 0 would be unknown.
+            camera_setback=max(self._rig.setback, 0.001),
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,

@@ -32,8 +32,8 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
 
     It stands on the side that vehicles keep to: left (1) or right (−1).
     """
-    limit = edge.getSpeed()
-    if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
+    limit = _limit(edge)
+    if any(abs(_limit(incoming) - limit) < 0.1 for incoming in edge.getIncoming()):
         return None
     lane = edge.getLanes()[0]
     points = np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
@@ -53,11 +53,16 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
     return Sign(
         f"limit.{edge.getID()}",
         SPEED_LIMIT,
-        float(limit),
+        limit,
         (x, y, float(z) + _SIGN_HEIGHT),
         heading,
         _SIGN_DIAMETER,
     )
+
+
+def _limit(edge: Any) -> float:
+    """Highest limit of an edge's lanes [m/s]; the first lane may be a sidewalk, or for lorries."""
+    return max(float(lane.getSpeed()) for lane in edge.getLanes())
 
 
 def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:

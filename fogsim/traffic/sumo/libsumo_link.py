@@ -1,16 +1,21 @@
 """SUMO inside this process: the libsumo library, imported on first use."""
 
 import contextlib
+import gc
 import io
 import os
 import sys
 import tempfile
 import threading
+import warnings
+import weakref
 from collections.abc import Iterator, Sequence
 from types import ModuleType
+from typing import ClassVar
 
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
+from fogsim.traffic.sumo.claims import LoadMark
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.load_errors import located
 from fogsim.traffic.sumo.output_folder import OutputFolder
@@ -38,6 +43,8 @@ class LibsumoLink:
 
     remote = False
     shared = False
+    _begun: "ClassVar[tuple[weakref.ref[LibsumoLink], LoadMark] | None]" = None
+    """The link that began a simulation last, and a mark in that simulation; None after its end."""
 
     def __init__(self, outputs: OutputFolder | None = None) -> None:
         self._outputs = outputs
@@ -53,11 +60,7 @@ class LibsumoLink:
     def _begin(self, arguments: Sequence[str]) -> Api:
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
-            raise SimulationRunningError(
-                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
-                "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
-                "environments)"
-            )
+            self._make_room(sumo)
         if self._outputs is not None:
             arguments = [*arguments, *self._outputs.open()]
         self._arguments = arguments
@@ -72,11 +75,15 @@ class LibsumoLink:
             else:
                 failure = None
         self._sumo = sumo
+        lines = [line.strip() for line in words if line.strip()]
         if failure is None:
+            LibsumoLink._begun = weakref.ref(self), LoadMark(sumo, "link")
             self._check_outputs()
+            errors = [line for line in lines if line.startswith("Error")]
+            if errors:
+                warnings.warn(located("SUMO goes on after an error", " ".join(errors), arguments), stacklevel=2)
             return sumo
         self.end()
-        lines = [line.strip() for line in words if line.strip()]
         # What ends SUMO is either there, or in libsumo's error alone.
         if all(line.startswith("Warning") for line in lines):
             lines.insert(0, str(failure))
@@ -84,6 +91,19 @@ class LibsumoLink:
         if self._outputs is not None:
             message = self._outputs.shorten(message)
         raise SimulationError(message)
+
+    def _make_room(self, sumo: ModuleType) -> None:
+        """Close the simulation of a link that was dropped without `end`, as by a notebook's cell; refuse others."""
+        link, mark = LibsumoLink._begun or (None, None)
+        if link is not None and link() is not None:
+            gc.collect()
+        if link is None or link() is not None or mark is None or not mark.is_there():
+            raise SimulationRunningError(
+                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
+                "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
+                "environments)"
+            )
+        sumo.close()
 
     def _check_outputs(self) -> None:
         if self._outputs is None:
@@ -113,7 +133,8 @@ class LibsumoLink:
         """End the simulation; see `SumoLink.end`."""
         if self._sumo is not None and self._sumo.isLoaded():
             self._sumo.close()
-        self._sumo = None
+        if self._sumo is not None:
+            self._sumo = LibsumoLink._begun = None
         if self._outputs is not None:
             self._outputs.close()
 

@@ -104,6 +104,13 @@ def test_only_roads_for_vehicles_have_speed_limit_signs(tmp_path: Path) -> None:
         assert bool(read_net(file).limit_signs) is has_signs, users
 
 
+def test_the_limit_on_a_sign_is_that_of_the_fastest_lane(tmp_path: Path) -> None:
+    file, text = tmp_path / "lorries.net.xml", NET.read_text(encoding="utf-8")
+    file.write_text(re.sub(r'(<lane id="[^"]*_0"[^>]* speed=")[^"]*', r"\g<1>5.00", text), encoding="utf-8")
+    usual, here = (read_net(path).limit_signs for path in (NET, file))
+    assert [sign.value for sign in here] == [sign.value for sign in usual] != []
+
+
 def test_a_lane_of_no_length_has_no_sign(tmp_path: Path) -> None:
     lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="9" shape="{4}"/></edge>'
     edges = lane.format("a", "n", "m", 10, "0,0 0,0 9,0"), lane.format("b", "m", "n", 20, "9,0 9,0")

@@ -89,5 +89,5 @@ def run_program(
 OTHERS_PACKAGES = "PYTHONPATH", "VIRTUAL_ENV"
 """Variables that show an environment of its own the packages of this one."""
 
-run_python = functools.partial(run_program, sys.executable, timeout=240.0)
+run_python = functools.partial(run_program, sys.executable, timeout=250.0)
 """Run Python in a process of its own."""

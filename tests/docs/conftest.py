@@ -1,12 +1,11 @@
 """What a reader of the pages has at hand: a SUMO simulation, photographs, a video, a scenario and a camera file."""
 
+import functools
 import json
-import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from fogsim.offline.camera_file import load_calibration
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.scenario import catalogue
 from tests.helpers.camera_files import camera_yaml
+from tests.helpers.command import run_python
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((CHECKOUT / "docs" / "tutorial").glob("*.md"))
@@ -52,14 +52,7 @@ def folder(tmp_path: Path) -> Path:
 def python(folder: Path) -> Run:
     """Run Python code as a script of the user's, in that folder."""
 
-    def run(code: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-c", code, *arguments]
-        environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
-        return subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=250, env=environment, check=False
-        )
-
-    return run
+    return functools.partial(run_python, "-c", cwd=folder, environment={"COLUMNS": "200", "NO_COLOR": "1"}, check=False)
 
 
 @pytest.fixture

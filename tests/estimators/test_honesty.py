@@ -4,8 +4,6 @@ import ast
 import dataclasses
 import enum
 import pickle
-import subprocess
-import sys
 import zlib
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -36,6 +34,7 @@ from fogsim.values import (
     TrafficState,
     Truth,
 )
+from tests.helpers.command import run_python
 from tests.helpers.osi_peer import framed, osi_peer
 
 TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "simulation")
@@ -241,13 +240,7 @@ def test_observations_alone_give_the_same_where_no_truth_can_be_imported(
         blocked_libraries=("libsumo", "traci", "sumolib", "OpenGL", "highway_env"),
         methods=methods,
     )
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", program, tmp_path / "seen", tmp_path / "found"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    run_python("-W", "error", "-c", program, tmp_path / "seen", tmp_path / "found")
     found = pickle.loads((tmp_path / "found").read_bytes())  # noqa: S301 - what this test has just written
     assert found == [[essence(one)[:4] for one in step.estimates] for step in as_it_is]
 

@@ -13,9 +13,9 @@ import pytest
 
 from fogsim.core.files.generated_files import kept_text, write_generated
 from fogsim.core.files.user_cache import keep_newest, read_entry, replace_file, write_entry
-from fogsim.traffic.road import map_cache, network
-from fogsim.traffic.road.map_cache import RoadMap
+from fogsim.traffic.road import map_cache
 from fogsim.traffic.road.network import read_net
+from tests.traffic.common import networks_parsed
 
 GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.net.xml"
 TEXTS = {"road.net.xml": "<net/>\n" * 40, "road.rou.xml": "<routes/>\n"}
@@ -85,14 +85,8 @@ def _kept(folder: Path, _: pytest.MonkeyPatch) -> Used:
 
 
 def _map(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Used:
-    parsed, parse = list[Path](), network._parsed
-
-    def count(path: Path) -> RoadMap:
-        parsed.append(path)
-        return parse(path)
-
     monkeypatch.setattr(map_cache, "_WORTHWHILE", 0)
-    monkeypatch.setattr(network, "_parsed", count)
+    parsed = networks_parsed(monkeypatch)
 
     def use() -> tuple[object, int]:
         lanes = read_net(GRID).lanes

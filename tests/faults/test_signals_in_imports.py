@@ -1,11 +1,11 @@
 """Signals that come while libraries are imported."""
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.helpers.command import run_python
 
 PROGRAM = """
 import os, runpy, sys
@@ -33,7 +33,6 @@ runpy.run_module("fogsim", run_name="__main__")
     ],
 )
 def test_they_end_in_one_line(tmp_path: Path, module: str, number: int, command: list[str]) -> None:
-    program = [sys.executable, "-c", PROGRAM, module, str(int(number)), "fogsim", *command]
-    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "interrupted\n")
+    done = run_python("-c", PROGRAM, module, str(int(number)), "fogsim", *command, cwd=tmp_path, check=False)
+    assert done == (128 + number, "", "interrupted\n")
     assert not list(tmp_path.iterdir())

@@ -1,13 +1,14 @@
 """Programs in this process, since one of their own would spend its time on imports, and in processes of their own."""
 
 import contextlib
+import functools
 import io
 import os
 import runpy
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,18 +69,25 @@ def run_script(script: Path, *arguments: str | Path) -> Ran:
     return Ran(1 if words else int(code or 0), out.getvalue(), err.getvalue() + words)
 
 
-def run_python(
-    *arguments: str | Path, environment: dict[str, str] | None = None, cwd: Path | None = None, check: bool = True
+def run_program(
+    *command: str | Path,
+    environment: Mapping[str, str] | None = None,
+    without: Collection[str] = (),
+    cwd: Path | None = None,
+    check: bool = True,
+    timeout: float | None = None,
 ) -> Ran:
-    """Run Python in a process of its own, with changes to the environment."""
+    """Run a program in a process of its own, with changes to the environment, and without some of its variables."""
+    kept = {name: value for name, value in os.environ.items() if name not in without} | dict(environment or {})
     done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=cwd,
-        env={**os.environ, **(environment or {})},
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
+        list(command), cwd=cwd, env=kept, capture_output=True, text=True, timeout=timeout, check=False
     )
-    assert not (check and done.returncode), done.stderr
+    assert not (check and done.returncode), f"{command}\n{done.stdout}\n{done.stderr}"
     return Ran(done.returncode, done.stdout, done.stderr)
+
+
+OTHERS_PACKAGES = "PYTHONPATH", "VIRTUAL_ENV"
+"""Variables that show an environment of its own the packages of this one."""
+
+run_python = functools.partial(run_program, sys.executable, timeout=250.0)
+"""Run Python in a process of its own."""

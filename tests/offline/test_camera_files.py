@@ -18,8 +18,6 @@ from fogsim.offline.image_files import read_image
 from fogsim.offline.video_source import VideoWriter
 from fogsim.recorders.video import ffmpeg_program
 
-TIMES = (0.0, 0.05, 0.1, 0.5, 0.9, 2.0)
-
 
 def frame(index: int) -> np.ndarray:
     image = np.full((32, 48, 3), 40 * index, np.uint8)
@@ -61,15 +59,23 @@ def test_pages_are_refused(tmp_path: Path) -> None:
         read_image(path)
 
 
-def test_frames_of_a_video_keep_their_times(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("times", "off"),
+    [((0.0, 0.05, 0.1, 0.5, 0.9, 2.0), 1e-3), ((0.0, 0.1, 0.2, 0.201, 0.202, 0.3), 1e-4)],
+    ids=["uneven", "one closely after another"],
+)
+def test_frames_of_a_video_keep_their_times_and_are_no_damage(
+    tmp_path: Path, times: tuple[float, ...], off: float
+) -> None:
     path = tmp_path / "uneven.mp4"
     with VideoWriter(path) as writer:
-        for index, at in enumerate(TIMES):
+        for index, at in enumerate(times):
             writer.write(frame(index), at)
     pictures = list(find_source(path).pictures())
-    assert [one.time for one in pictures] == pytest.approx(TIMES, abs=1e-3)
+    assert [one.error for one in pictures] == [""] * len(times)
+    assert [one.time for one in pictures] == pytest.approx(times, abs=off)
     assert [round(float(one.image.mean()) / 40) for one in pictures] == [
-        round(float(frame(index).mean()) / 40) for index in range(len(TIMES))
+        round(float(frame(index).mean()) / 40) for index in range(len(times))
     ]
 
 
@@ -93,16 +99,6 @@ def test_a_video_of_high_dynamic_range_is_refused(tmp_path: Path, curve: str) ->
     path = made(tmp_path / "hdr.mov", "-c:v", "libx265", "-pix_fmt", "yuv420p10le", "-x265-params", tags)
     with pytest.raises(InputError, match=rf"an HDR video \({curve}\)"):
         find_source(path)
-
-
-def test_frames_that_follow_one_another_closely_are_no_damage(tmp_path: Path) -> None:
-    path, times = tmp_path / "close.mp4", (0.0, 0.1, 0.2, 0.201, 0.202, 0.3, 0.4)
-    with VideoWriter(path) as writer:
-        for index, at in enumerate(times):
-            writer.write(frame(index), at)
-    pictures = list(find_source(path).pictures())
-    assert [one.error for one in pictures] == [""] * len(times)
-    assert [one.time for one in pictures] == pytest.approx(times, abs=1e-4)
 
 
 def test_frames_at_one_time_are_read_and_written(tmp_path: Path) -> None:

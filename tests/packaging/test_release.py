@@ -1,13 +1,13 @@
 """One version: what is installed, what is cited, and what the changelog tells of."""
 
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
+
+from tests.helpers.command import run_python
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 VERSION = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
@@ -38,7 +38,5 @@ def test_no_text_installs_what_no_index_has() -> None:
 
 @pytest.mark.nightly
 def test_an_extra_is_added_to_the_installation_without_an_index() -> None:
-    command = [sys.executable, "-m", "pip", "install", "--no-index", "--dry-run", "--disable-pip-version-check"]
-    done = subprocess.run([*command, "fogsim[test]"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_python("-m", "pip", "install", "--no-index", "--dry-run", "--disable-pip-version-check", "fogsim[test]")
     assert "Would install" not in done.stdout

@@ -1,9 +1,8 @@
 """A wheel with kernels compiles none; ``make pythons`` builds one with all kernels, in a minute, and runs it."""
 
-import os
+import functools
 import platform
 import shutil
-import subprocess
 import sys
 import sysconfig
 import venv
@@ -12,23 +11,10 @@ from pathlib import Path
 import pytest
 
 from fogsim.core.compiling.shipped_code import usable_kind
+from tests.helpers.command import OTHERS_PACKAGES, run_program
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-
-
-def call(*command: str | Path, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    inherited = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "VIRTUAL_ENV"}}
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=cwd,
-        env=inherited | environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done
+call = functools.partial(run_program, without=OTHERS_PACKAGES, timeout=600.0)
 
 
 CONVOLVES = """
@@ -49,18 +35,8 @@ def compile_kernels() -> Iterator[str]:
 
 
 def built_wheel(project: Path, folder: Path, **environment: str) -> Path:
-    call(
-        sys.executable,
-        "-m",
-        "build",
-        "--no-isolation",
-        "--wheel",
-        "--outdir",
-        folder,
-        project,
-        cwd=folder,
-        **environment,
-    )
+    command = (sys.executable, "-m", "build", "--no-isolation", "--wheel", "--outdir", folder, project)
+    call(*command, cwd=folder, environment=environment)
     (wheel,) = folder.glob("fogsim-*.whl")
     return wheel
 
@@ -96,6 +72,6 @@ def test_a_wheel_with_kernels_needs_not_compile_them(tmp_path: Path) -> None:
     python, packages = installed_wheel(wheel, tmp_path / "venv")
     kernels = [path.name for path in (packages / "fogsim" / "_kernels").rglob("*.nbc")]
     assert [name.split("-")[0] for name in kernels] == ["linear_algebra.convolution"]
-    said = call(python, "-c", CONVOLVES, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout
+    said = call(python, "-c", CONVOLVES, cwd=tmp_path, environment={"NUMBA_CACHE_DIR": str(tmp_path / "cache")}).stdout
     assert said.split() == ["[1.", "2.", "1.]", "1"]
     assert not list((tmp_path / "cache").rglob("*.nbc"))

@@ -6,10 +6,8 @@ processor can run: always three.
 """
 
 import json
-import os
 import platform
 import runpy
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -21,6 +19,7 @@ import pytest
 
 from fogsim.estimators import ESTIMATORS
 from fogsim.offline import NIGHT_METHODS
+from tests.helpers.command import run_program
 
 TOOL = Path(__file__).parents[2] / "tools" / "fingerprint.py"
 CORE_TYPES = {"SkylakeX": "avx512bw", "Haswell": "avx2", "Sandybridge": "avx", "Nehalem": "sse4_2", "Prescott": "sse3"}
@@ -90,12 +89,7 @@ def _fingerprint(setting: Mapping[str, str], parts: Sequence[str] = PARTS) -> An
 
 def _said(setting: Mapping[str, str], *arguments: str | Path) -> str:
     """What Python prints where the environment is changed so."""
-    told = subprocess.run(
-        [sys.executable, *arguments], env={**os.environ, **setting}, capture_output=True, text=True, check=False
-    )
-    if told.returncode:
-        raise AssertionError(f"{setting} ends with {told.returncode}: {told.stderr[-2000:]}")
-    return told.stdout
+    return run_program(sys.executable, *arguments, environment=setting).stdout
 
 
 @pytest.fixture(scope="module")

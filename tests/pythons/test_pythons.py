@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.core.compiling.shipped_code import usable_kind
+from tests.helpers.command import OTHERS_PACKAGES, run_program
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 VERSIONS = ("3.11", "3.12", "3.13")
@@ -34,7 +35,7 @@ for name in catalogue():
 
 pytestmark = pytest.mark.timeout(1800)
 
-Run = Callable[..., str]
+Run = Callable[..., None]
 
 
 @pytest.fixture(scope="module")
@@ -46,19 +47,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(folder: Path) -> Run:
     """Run a command away from the checkout, by a user who has nothing yet."""
     (folder / "home").mkdir()
-    kept = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
 
-    def call(*command: str | Path, **environment: str) -> str:
-        done = subprocess.run(
-            list(map(str, command)),
-            cwd=folder,
-            env={**kept, "HOME": str(folder / "home"), **environment},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-        return done.stdout
+    def call(*command: str | Path, **environment: str) -> None:
+        setting = {"HOME": str(folder / "home"), **environment}
+        run_program(*command, cwd=folder, environment=setting, without=OTHERS_PACKAGES)
 
     return call
 

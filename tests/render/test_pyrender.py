@@ -2,8 +2,6 @@
 
 import dataclasses
 import math
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from fogsim.scenario import load_scenario
 from fogsim.scene import vehicle_batches
 from fogsim.values import Beam, CameraPose, HeadLamp, Lights, LightSources, Scene, StreetLighting, Surface, View
 from fogsim.values.scene import LEVELS_OF_DETAIL
+from tests.helpers.command import run_python
 from tests.render.conftest import Place, camera, walls
 
 ILLUMINANCE = 1e4
@@ -190,7 +189,5 @@ def test_pyrenders_own_renderer_draws_it_in_a_process_of_its_own() -> None:
         "print(round(float(np.median(depth)), 2), int(np.median(colour)))\n"
     )
     root = Path(__file__).parents[2]
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False, cwd=root
-    )
+    done = run_python("-c", code, cwd=root)
     assert done.stdout.split() == ["12.0", "186"], done.stderr  # 255 · 0.5^(1/2.2)

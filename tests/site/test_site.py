@@ -3,9 +3,7 @@
 It is opened from its folder, as by somebody who has nothing else: no server, no network, no checkout.
 """
 
-import os
 import re
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,8 @@ from urllib.parse import unquote, urldefrag, urlparse
 
 import pytest
 from playwright.sync_api import Browser, Error, Page, Request
+
+from tests.helpers.command import run_program
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PHONE = {"width": 390, "height": 844}
@@ -58,16 +58,10 @@ class Visit:
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
-        cwd=CHECKOUT,
-        capture_output=True,
-        text=True,
-        check=False,
-        # Material tells of its own future at each start otherwise.
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS_NOT_RUN": "0[1-7]_*"},
-    )
-    assert done.returncode == 0, done.stderr
+    # Material tells of its own future at each start otherwise.
+    setting = {"NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS_NOT_RUN": "0[1-7]_*"}
+    command = (sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder)
+    done = run_program(*command, cwd=CHECKOUT, environment=setting)
     assert "WARNING" not in done.stderr
     return folder
 

@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
 from early_motorway import ROUTES
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import FogAccess, Traffic, TrafficSetup, libsumo_traffic
+from fogsim.traffic.road import network
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, FogField, TrafficSnapshot, TrafficState
 
@@ -61,6 +63,13 @@ def configured(folder: Path, net: Path, routes: str | Path, *options: str, addit
     config = folder / "mine.sumocfg"
     config.write_text(f"<configuration>{files}{more}{''.join(options)}</configuration>", encoding="utf-8")
     return config
+
+
+def networks_parsed(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Networks that are parsed from now on, to which each is added."""
+    paths, parse = list[Path](), network._parsed
+    monkeypatch.setattr(network, "_parsed", lambda path: paths.append(path) or parse(path))
+    return paths
 
 
 @contextlib.contextmanager

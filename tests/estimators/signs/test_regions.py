@@ -111,30 +111,17 @@ def distance(step: int) -> float:
 
 
 def test_the_first_of_confirmed_detections_counts_and_lies_before_the_last_miss() -> None:
-    (track,) = drive("---++-+").tracks
-    assert track.confirmed
-    assert track.first_seen == pytest.approx(distance(3))
-    assert track.unseen_before == pytest.approx(distance(2))
-    assert (track.detections, track.misses, track.misses_since) == (3, 4, 0)
-
-
-def test_a_false_alarm_is_forgotten() -> None:
-    (track,) = drive("-+----++").tracks
-    assert track.first_seen == pytest.approx(distance(6))
-    assert track.unseen_before == pytest.approx(distance(5))
-
-
-def test_one_seen_at_once_may_have_been_visible_from_afar() -> None:
-    (track,) = drive("+++").tracks
-    assert track.unseen_before is None
-
-
-def test_a_sign_that_should_be_seen_and_is_not_is_missed() -> None:
-    (track,) = drive("-----").tracks
-    assert track.first_seen is None
-    assert not track.confirmed
-    assert track.misses == 5
-    assert track.unseen_before == pytest.approx(distance(4))
+    for seen, first, unseen, counts in [
+        ("---++-+", 3, 2, (3, 4, 0)),
+        ("-+----++", 6, 5, (2, 5, 0)),  # a false alarm is forgotten
+        ("+++", 0, None, (3, 0, 0)),  # it may have been visible from afar
+        ("-----", None, 4, (0, 5, 5)),
+    ]:
+        (track,) = drive(seen).tracks
+        assert track.confirmed == (first is not None)
+        assert track.first_seen == (None if first is None else pytest.approx(distance(first))), seen
+        assert track.unseen_before == (None if unseen is None else pytest.approx(distance(unseen))), seen
+        assert (track.detections, track.misses, track.misses_since) == counts, seen
 
 
 def test_a_sign_that_the_map_no_longer_shows_ahead_has_been_passed() -> None:

@@ -3,8 +3,6 @@
 import csv
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -22,6 +20,7 @@ from fogsim.testing.campaign.drawing_plan import Findings
 from fogsim.testing.campaign.outputs import rate_text, write_campaign_junit, write_cases, write_report
 from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign, smallest_failing
 from fogsim.testing.results import finding_to_json
+from tests.helpers.command import run_python
 
 
 class Closed:
@@ -206,8 +205,7 @@ def test_mistakes(tmp_path: Path) -> None:
 @pytest.mark.nightly
 def test_the_command(tmp_path: Path) -> None:
     (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
-    line = [sys.executable, "-m", "fogsim", "campaign", "drawn.fog.yaml", "--budget", "20", "-j", "2", "--out", "out"]
-    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    line = ("-m", "fogsim", "campaign", "drawn.fog.yaml", "--budget", "20", "-j", "2", "--out", "out")
+    done = run_python(*line, cwd=tmp_path)
     assert "20 cases: 20 passed" in done.stdout
     assert len((tmp_path / "out" / "cases.csv").read_text().splitlines()) == 21

@@ -1,7 +1,6 @@
 """Coverage by measured values: of steps made by hand, and of a campaign, the same however it was run."""
 
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from fogsim.testing.odd.odd_file import read_odd
 from fogsim.testing.results import finding_to_json
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Step
+from tests.helpers.command import run_python
 from tests.recorders.synthetic import make_step
 
 SCENARIO = DRAWN.replace("{lognormal: [100 m, 1], at_least: 20 m, at_most: 1000 m}", "{uniform: [50 m, 1500 m]}")
@@ -164,10 +164,7 @@ def test_the_command_writes_the_same_with_any_number_of_processes(tmp_path: Path
     written = []
     for processes in ("1", "2"):
         line = ["campaign", "drawn.fog.yaml", "--budget", "16", "--odd", "fog", "-j", processes, "--out", processes]
-        done = subprocess.run(
-            [sys.executable, "-m", "fogsim", *line], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
+        done = run_python("-m", "fogsim", *line, cwd=tmp_path)
         assert "hole: environment.illumination" in done.stdout
         out = tmp_path / processes
         files = [out / "coverage.json", out / "coverage.html", *sorted((out / "coverage").iterdir())]

@@ -2,10 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.traffic.road import map_cache, network
+from fogsim.traffic.road import map_cache
 from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net
-from tests.traffic.common import DATA, NET
+from tests.traffic.common import DATA, NET, networks_parsed
 
 GRID = DATA / "grid" / "grid.net.xml"
 
@@ -20,15 +20,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def parsed(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """Networks that have been parsed."""
-    paths, parse = list[Path](), network._parsed
-
-    def count(path: Path) -> RoadMap:
-        paths.append(path)
-        return parse(path)
-
-    monkeypatch.setattr(network, "_parsed", count)
-    return paths
+    return networks_parsed(monkeypatch)
 
 
 def told(roads: RoadMap) -> list[object]:

@@ -43,6 +43,12 @@ _WORTHWHILE = 100_000
 _GAIN = 0.05
 """How far the middle moves towards the slower band, over the picture's rows and the bands' relative difference."""
 
+_UNROLLED = (
+    *("fogsim.atmosphere.", "fogsim.camera.", "fogsim.render.", "fogsim.vision.light.", "fogsim.vision.region."),
+    *("fogsim.vision.restoration.", "fogsim.vision.sources.", "fogsim.vision.symmetry."),
+)
+"""Modules with loops over pixels, faster if unrolled; a fifth of LLVM's time is saved with the others."""
+
 _PATIENCE = 0.5
 """Time that a process compiles before it says so [s]: one kernel more is no news, a first run is."""
 
@@ -106,10 +112,11 @@ class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
 
     def on_start(self, compiling: Any) -> None:
         """Begin at the outermost kernel."""
-        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{_FOGSIM}."):
+        module = compiling.data["dispatcher"].py_func.__module__
+        if self._depth == 0 and module.startswith(f"{_FOGSIM}."):
             self._collects = gc.isenabled()
             gc.disable()
-            self._end = begin_economy()
+            self._end = begin_economy(unrolling=module.startswith(_UNROLLED))
         self._depth += 1
 
     def on_end(self, _: Any) -> None:

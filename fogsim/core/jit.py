@@ -134,16 +134,22 @@ event.register("numba:compile", CompileSpeedup())
 
 
 class CompilerProcess:
-    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it."""
+    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it.
+
+    The first wait begins with work of one's own: what the other process would compile last.
+    """
 
     def __init__(self) -> None:
         self._is_over: Callable[[], bool] | None = None
         self._packages: tuple[str, ...] = ()
+        self._work: Callable[[], object] | None = None
 
     @contextmanager
-    def compiles(self, is_over: Callable[[], bool], packages: Sequence[str]) -> Iterator[None]:
-        """Reckon with another process."""
-        self._is_over, self._packages = is_over, tuple(packages)
+    def compiles(
+        self, is_over: Callable[[], bool], packages: Sequence[str], work: Callable[[], object] | None = None
+    ) -> Iterator[None]:
+        """Wait for another process from now on; `work` is done before the first wait."""
+        self._is_over, self._packages, self._work = is_over, tuple(packages), work
         try:
             yield
         finally:
@@ -153,10 +159,16 @@ class CompilerProcess:
         """Whether a kernel of a module that was not on the disk is worth another look, after a short while."""
         if self._is_over is None or not module.startswith(self._packages):
             return False
-        if self._is_over():
-            self._is_over = None
-        else:
+        is_over, self._is_over = self._is_over, None
+        if is_over():
+            return True
+        if self._work is None:
             time.sleep(_LOOKS_AGAIN)
+        else:
+            work, self._work = self._work, None
+            # Nothing is waited for within.
+            work()
+        self._is_over = is_over
         return True
 
 

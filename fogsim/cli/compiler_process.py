@@ -1,6 +1,7 @@
 """A first run compiles in two processes: its own renders, and a second one runs estimators and fusion.
 
-Estimators and fusion share hardly a kernel with rendering, and take half of the time.
+Estimators and fusion share hardly a kernel with rendering, and take two thirds of the time; so this process runs the
+last of them when it has rendered its first frame.
 """
 
 import gc
@@ -11,8 +12,10 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -46,8 +49,10 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
                 # It has nothing to do in this run, however long the run is.
                 _end(process)
                 return
-            stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, _PACKAGES))
-            _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
+            message = {"size": (scenario.camera.width, scenario.camera.height), **methods}
+            is_over = partial(_has_ended, process)
+            stack.enter_context(COMPILER_PROCESS.compiles(is_over, _PACKAGES, partial(_read_last, message)))
+            _send(process, message)
 
         yield send
 
@@ -65,6 +70,23 @@ def _started() -> "subprocess.Popen[bytes] | None":
     except OSError:
         # Too little memory or too many processes: this one compiles alone, as on a single processor.
         return None
+
+
+def _has_ended(process: "subprocess.Popen[bytes]") -> bool:
+    return process.poll() is not None
+
+
+def _read_last(wanted: Mapping[str, Any]) -> None:
+    """Run all methods but the first, in reverse order, and the fusion: this process's part while it would wait."""
+    from fogsim.cli.compile import fuse_estimates, read_foggy_road
+
+    _, *others = wanted["methods"]
+    # What these images make of a method is no concern of the run.
+    with suppress(Exception), warnings.catch_warnings(action="ignore"):
+        estimates = [read_foggy_road(name, parameters, wanted["size"]) for name, parameters in reversed(others)]
+        if wanted["fusion"] is not None and estimates:
+            fusion, parameters = wanted["fusion"]
+            fuse_estimates(fusion, parameters, estimates)
 
 
 def _send(process: "subprocess.Popen[bytes]", message: Mapping[str, Any]) -> None:

@@ -129,3 +129,10 @@ def test_one_looks_again_while_the_other_process_runs_and_once_when_it_has_ended
     with beside.compiles(lambda: False, ("fogsim.vision.",)):
         assert beside.may_bring("fogsim.vision.light")
     assert not beside.may_bring("fogsim.vision.light")
+
+
+def test_the_first_wait_begins_with_work_within_which_nothing_is_waited_for() -> None:
+    module, waits, other = "fogsim.vision.light", list[bool](), CompilerProcess()
+    with other.compiles(lambda: False, ("fogsim.vision.",), lambda: waits.append(other.may_bring(module))):
+        assert all(other.may_bring(module) for _ in range(2))
+    assert waits == [False]

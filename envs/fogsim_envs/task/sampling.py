@@ -11,6 +11,7 @@ import numpy as np
 from fogsim.core.parameters import Range
 from fogsim.errors import InputError, UnknownNameError, shown
 from fogsim.scenario import Scenario, override
+from fogsim.scenario.loading import scenario_reader
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim_envs.hosting import load_first
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting
@@ -116,10 +117,14 @@ class EpisodeSource:
         else:
             self._scenarios = _several(distribution)
         self._kept: dict[tuple[str | Path, tuple[str, ...]], Scenario] = {}
+        self._readers: dict[str | Path, Callable[[Iterable[str]], Scenario]] = {}
 
     def first_scenario(self) -> Scenario:
         """A scenario of them, for what all have in common."""
-        return self._loaded(self._scenarios[0], (*self._defaults.overrides, *self._overrides))
+        scenario = self._loaded(self._scenarios[0], (*self._defaults.overrides, *self._overrides))
+        # An environment can be pickled until its first reset, and what reads a file cannot.
+        self._readers.clear()
+        return scenario
 
     @property
     def may_be_dark(self) -> bool:
@@ -158,7 +163,10 @@ class EpisodeSource:
         if (scenario, settings) not in self._kept:
             if len(self._kept) == _KEPT_SCENARIOS:
                 self._kept.pop(next(iter(self._kept)))
-            self._kept[scenario, settings] = load_first(scenario, settings)
+            read = self._readers.get(scenario)
+            if read is None:
+                self._readers[scenario] = scenario_reader(scenario)
+            self._kept[scenario, settings] = load_first(scenario, settings) if read is None else read(settings)
         return self._kept[scenario, settings]
 
 

@@ -23,14 +23,14 @@ def prepare_economy() -> None:
         defer_code()
 
 
-def begin_economy() -> Callable[[], None]:
-    """Save work from now on, if this version of numba is known.
+def begin_economy(*, unrolling: bool) -> Callable[[], None]:
+    """Save work from now on, if this version of numba is known, and unroll loops or not.
 
     Returns ends it: numba is as it was.
     """
     if numba.version_info.short not in KNOWN:
         return lambda: None
-    LinkedLibrary.deferring = True
+    LinkedLibrary.deferring, LinkedLibrary.unrolling = True, unrolling
     restored = [shortcut.take() for shortcut in SHORTCUTS]
 
     def end() -> None:

@@ -13,8 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
-from llvmlite.binding import ModuleRef, create_new_function_pass_manager  # type: ignore[import-untyped]
-from numba.core import caching, codegen
+from llvmlite.binding import (  # type: ignore[import-untyped]
+    ModuleRef,
+    create_new_function_pass_manager,
+    create_pass_builder,
+    create_pipeline_tuning_options,
+)
+from numba.core import caching, codegen, config
 from numba.core.environment import lookup_environment
 
 from fogsim.core.files.user_cache import read_entry, write_entry
@@ -86,6 +91,9 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
     # Whether what is compiled is put off so: within FogSim's kernels, and not within anybody else's
     deferring: ClassVar[bool] = False
 
+    # Whether loops are unrolled: it makes drawing faster, and other kernels only larger
+    unrolling: ClassVar[bool] = True
+
     _put_off = _is_own = False
 
     def add_ir_module(self, ir_module: Any) -> None:
@@ -121,7 +129,12 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
 
     def _optimize_linked(self) -> None:
         """As numba does, but once and at level 2: more makes nothing faster here, and takes longer."""
-        passes, builder = self._codegen._module_pass_manager(opt=2)
+        options = create_pipeline_tuning_options(2)
+        options.loop_vectorization, options.slp_vectorization = bool(config.LOOP_VECTORIZE), bool(config.SLP_VECTORIZE)
+        options.loop_unrolling = options.loop_interleaving = self.unrolling
+        builder = create_pass_builder(self._codegen._tm, options)
+        passes = builder.getModulePassManager()
+        passes.add_refprune_pass(codegen._parse_refprune_flags())
         passes.run(self._final_module, builder)
 
     def _is_linked_only(self) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from llvmlite.binding import ffi  # type: ignore[import-untyped]
-from numba.core import base, cgutils, codegen, cpu, ir, transforms, types
+from numba.core import base, cgutils, codegen, cpu, errors, ir, transforms, types
 from numba.core.postproc import PostProcessor, VariableLifetime
 from numba.core.runtime.context import NRTContext
 from numba.core.targetconfig import ConfigStack, TargetConfig
@@ -209,8 +209,23 @@ def _raise_mismatch(assigned: Any, assigned_to: Any) -> Callable[..., None]:  # 
     return refuse
 
 
-SHORTCUTS = (
+_COLOURS = [vars(errors)[name] for name in ("HighlightColorScheme",) if name in vars(errors)]
+"""What colours numba's messages, if colorama is installed."""
+
+
+def leave_plain(_: Any, message: str, *_styles: Any) -> str:
+    """Message without colours: numba makes hundreds that it drops, on the way to the signature that fits."""
+    return message
+
+
+SHORTCUTS: tuple[_UnobservedLock | Shortcut, ...] = (
     _UnobservedLock(),
+    # Without colorama numba has no colours.
+    *(
+        Shortcut(scheme, "_markup", leave_plain)
+        for name, scheme in vars(errors).items()
+        if name == "HighlightColorScheme"
+    ),
     Shortcut(BaseFunction, "get_call_type", _resolve_call),
     Shortcut(TargetConfig, "__eq__", compare_options),
     Shortcut(TargetConfig, "__hash__", hash_options),

@@ -23,6 +23,7 @@ _ONE = np.float32(1.0)
 _P0, _P1, _P2, _P3, _P4 = (np.float32(c) for c in (0.69314442, 0.24018671, 0.05531669, 0.00922838, 0.00095403))
 _ALONG = np.float32(0.1)
 _NEXT = np.uint32(1)
+_FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 @kernel
@@ -91,6 +92,23 @@ def add_airlight(
 
 
 @kernel
+def _mix_with_airlight(
+    luminance: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+    airlight: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """As `add_airlight`, but of transmittances (n,) and of one airlight (3,)."""
+    red, green, blue = airlight[0], airlight[1], airlight[2]
+    for u in range(np.uint64(transmittance.shape[0])):
+        kept, at = transmittance[u], _THREE * u
+        lost = _ONE - kept
+        out[at] = luminance[at] * kept + red * lost
+        out[at + _FIRST] = luminance[at + _FIRST] * kept + green * lost
+        out[at + _SECOND] = luminance[at + _SECOND] * kept + blue * lost
+
+
+@kernel
 def _smoothstep(station: np.float32, edge: np.float32) -> np.float32:
     t = min(max(station / edge + np.float32(0.5), np.float32(0.0)), _ONE)
     return t * t * (np.float32(3.0) - np.float32(2.0) * t)
@@ -150,22 +168,23 @@ def fog_rows(
     Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     headroom, extinction, banks = fog.headroom, fog.extinction, fog.banks
-    columns = distance.shape[1]
+    columns, has_top = distance.shape[1], headroom < np.float32(np.inf)
     length, towards = np.empty(columns, np.float32), np.empty(columns, np.float32)
     depth, transmittance = np.empty(columns, np.float32), np.empty(columns, np.float32)
     power = np.empty(columns, np.int32)
-    in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    fill_channels(fog.airlight, light)
     right_x, right_y, right_z = ray_map[0, 0], ray_map[1, 0], ray_map[2, 0]
     for v in range(top, bottom):
         first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
         first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
         first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
-        for u in range(columns):
+        # An endless path through fog shows nothing but airlight; through clear air, everything.
+        for u in range(0 if has_top else columns):
+            length[u] = min(distance[v, u], np.float32(ENDLESS))
+            depth[u] = length[u] * extinction
+        for u in range(columns if has_top else 0):
             x = first_x + right_x * np.float32(u)
             y = first_y + right_y * np.float32(u)
             z = first_z + right_z * np.float32(u)
-            # An endless path through fog shows nothing but airlight; through clear air, everything.
             below_top = headroom * math.sqrt(x * x + y * y + z * z) / max(z, _LEVEL)
             length[u] = min(distance[v, u], np.float32(ENDLESS), below_top)
             depth[u] = length[u] * extinction
@@ -177,5 +196,4 @@ def fog_rows(
                 towards[u] = (x * bank[0] + y * bank[1]) / math.sqrt(x * x + y * y + z * z)
             _add_bank(bank[2:], towards, length, depth)
         transmittances(depth, power, transmittance)
-        repeat_channels(transmittance, in_channels)
-        add_airlight(luminance[v], in_channels, light, out[v])
+        _mix_with_airlight(luminance[v], transmittance, fog.airlight, out[v])

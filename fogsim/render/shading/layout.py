@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
+
 Array = NDArray[np.float32]
 Wide = NDArray[np.float64]
 Numbers = NDArray[np.int32]
@@ -75,9 +77,21 @@ class Spans(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """The arrays of a `View`; the lamp response has no row if it is not wanted."""
+    """The arrays of a `View`, those of three channels flat, so that compilers know that pixels are 3 numbers apart.
+
+    The lamp response is empty if it is not wanted.
+    """
 
     radiance: Array
     distance: Array
     instance: Numbers
     response: Array
+
+
+ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)
+
+
+@kernel
+def first_of(v: np.uint64, u: np.uint64, columns: np.uint64) -> np.uint64:
+    """Index of a pixel's first channel in a picture of so many columns."""
+    return THREE * (v * columns + u)

@@ -13,7 +13,19 @@ from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zen
 from fogsim.render.projection import Lens, lens_of
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
-from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Spans, Wide
+from fogsim.render.shading.layout import (
+    ONE,
+    THREE,
+    TWO,
+    Copies,
+    Light,
+    Meshes,
+    Numbers,
+    Picture,
+    Spans,
+    Wide,
+    first_of,
+)
 from fogsim.render.shading.pavement import Asphalt, asphalt
 from fogsim.render.shading.road import shade_road
 from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces, shade_objects, shade_sky
@@ -110,6 +122,7 @@ def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row,
     span, surface, rays, member = spans.span, spans.surface, lens.rays, work.member
     texture, tint, radiance, response = work.texture, work.tint, picture.radiance, picture.response
     dry, drier, driest = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])
+    columns = np.uint64(picture.distance.shape[1])
     members, number = next_coplanar_spans(_TERRAIN, spans, 0, count, lens.lens, work, picture)
     while members > 0:
         k, row = span[member[0], 3], float(span[member[0], 0])
@@ -128,20 +141,24 @@ def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row,
         red, green, blue = np.float32(answer * red), np.float32(answer * green), np.float32(answer * blue)
         for place in range(members):
             left, right = np.uint64(span[member[place], 1]), np.uint64(span[member[place], 2])
+            line = first_of(v, np.uint64(0), columns)
             for u in range(left, right):
-                radiance[v, u, 0] = r * (texture[u] + dry * tint[u])
-                radiance[v, u, 1] = g * (texture[u] + drier * tint[u])
-                radiance[v, u, 2] = b * (texture[u] + driest * tint[u])
+                at = line + THREE * u
+                radiance[at] = r * (texture[u] + dry * tint[u])
+                radiance[at + ONE] = g * (texture[u] + drier * tint[u])
+                radiance[at + TWO] = b * (texture[u] + driest * tint[u])
             if len(response) > 0:
                 for u in range(left, right):
-                    response[v, u, 0], response[v, u, 1] = red * texture[u], green * texture[u]
-                    response[v, u, 2] = blue * texture[u]
+                    at = line + THREE * u
+                    response[at], response[at + ONE] = red * texture[u], green * texture[u]
+                    response[at + TWO] = blue * texture[u]
         members, number = next_coplanar_spans(_TERRAIN, spans, number, count, lens.lens, work, picture)
 
 
 _UNUSED = 2  # references to an array that only its list and the question itself hold
 _COUNTS_REFERENCES = hasattr(sys, "getrefcount")
 _MOST = 8  # arrays of a size that are kept
+_NO_RESPONSE = np.empty(0, np.float32)
 
 
 class Memory:
@@ -222,11 +239,12 @@ class Shading:
             drawing.record.view(np.int32).reshape(-1, 17),
             drawing.first,
         )
+        radiance = self._memory.empty((rows, columns, 3), np.float32)
+        distance = self._memory.empty((rows, columns), np.float32)
+        instance = self._memory.empty((rows, columns), np.int32)
+        response = self._memory.empty((rows, columns, 3), np.float32) if lamplight else None
         picture = Picture(
-            self._memory.empty((rows, columns, 3), np.float32),
-            self._memory.empty((rows, columns), np.float32),
-            self._memory.empty((rows, columns), np.int32),
-            self._memory.empty((rows, columns, 3) if lamplight else (0, 0, 3), np.float32),
+            radiance.reshape(-1), distance, instance, _NO_RESPONSE if response is None else response.reshape(-1)
         )
         lens = lens_of(camera, pose)
 
@@ -237,8 +255,7 @@ class Shading:
             shade_rows(triangle_ids, (top, bottom), self._scene, copies, lens, spans, self._rows[band], picture)
 
         self._bands.work(shade, rows, columns)
-        response = picture.response if lamplight else None
-        return View(picture.radiance, picture.distance, picture.instance, response)
+        return View(radiance, distance, instance, response)
 
     def _room(self, band: int, pixels: int, triangle_ids: int) -> Spans:
         """Memory for the spans of a band."""

@@ -8,7 +8,7 @@ from fogsim.core.jit import kernel
 from fogsim.render.projection import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
-from fogsim.render.shading.layout import Array, Picture, Spans, Wide
+from fogsim.render.shading.layout import ONE, THREE, TWO, Array, Picture, Spans, Wide, first_of
 from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
 from fogsim.render.shading.pavement import Asphalt, mean_of_stretches, reflectance_at
 from fogsim.render.shading.texture import ASPHALT, Noise, Row, set_texture
@@ -78,7 +78,7 @@ def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Pict
     """Asphalt of the members of a row of spans, darker where wheels roll."""
     span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
     share, radiance, response = work.tint, picture.radiance, picture.response
-    one, track = np.float32(1.0), np.float32(_TRACK)
+    one, track, columns = np.float32(1.0), np.float32(_TRACK), np.uint64(picture.distance.shape[1])
     for place in range(members):
         number = member[place]
         k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
@@ -103,14 +103,16 @@ def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Pict
         if asphalt.repairs > 0.0:
             _mend(surface, k, row, int(span[number, 1]), int(span[number, 2]), asphalt, share)
         # A loop of its own, since each alone spans in vector registers.
+        line = first_of(v, np.uint64(0), columns)
         for u in range(begin, np.uint64(span[number, 2])):
-            seen = texture[u] * share[u]
-            radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * seen, g * seen, b * seen
+            seen, at = texture[u] * share[u], line + THREE * u
+            radiance[at], radiance[at + ONE], radiance[at + TWO] = r * seen, g * seen, b * seen
         if len(response) > 0:
             per_mean = 3.0 * _ROAD_RESPONSE / max(red + green + blue, 3e-6)
             r, g, b = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
             for u in range(begin, np.uint64(span[number, 2])):
-                response[v, u, 0], response[v, u, 1], response[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
+                seen, at = texture[u], line + THREE * u
+                response[at], response[at + ONE], response[at + TWO] = r * seen, g * seen, b * seen
 
 
 @kernel
@@ -139,6 +141,7 @@ def _paint(members: int, spans: Spans, work: Row, picture: Picture) -> None:
     span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
     radiance, response, one = picture.radiance, picture.response, np.float32(1.0)
     lamplight, paint_response = len(response) > 0, np.float32(_LINE_RESPONSE)
+    columns = np.uint64(picture.distance.shape[1])
     for place in range(members):
         number = member[place]
         k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
@@ -175,9 +178,10 @@ def _paint(members: int, spans: Spans, work: Row, picture: Picture) -> None:
                     share *= dashed_share(s, far * (abs(sx - s * zx) + abs(sy - s * zy)))
                 # Paint is worn where the asphalt below is coarse.
                 worn, part = one + np.float32(0.5) * (texture[u] - one), np.float32(share)
-                for channel in range(np.uint64(3)):
-                    asphalt = radiance[v, u, channel]
-                    radiance[v, u, channel] = asphalt + part * (paint * worn - asphalt)
+                pixel = first_of(v, u, columns)
+                for at in range(pixel, pixel + THREE):
+                    asphalt = radiance[at]
+                    radiance[at] = asphalt + part * (paint * worn - asphalt)
                     if lamplight:
-                        asphalt = response[v, u, channel]
-                        response[v, u, channel] = asphalt + part * (paint_response * worn - asphalt)
+                        asphalt = response[at]
+                        response[at] = asphalt + part * (paint_response * worn - asphalt)

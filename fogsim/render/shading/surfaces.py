@@ -8,7 +8,19 @@ from fogsim.core.jit import kernel
 from fogsim.render.drawing import NEAR
 from fogsim.render.projection import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Picture, Spans, Wide
+from fogsim.render.shading.layout import (
+    ONE,
+    THREE,
+    TWO,
+    Array,
+    Copies,
+    Light,
+    Meshes,
+    Picture,
+    Spans,
+    Wide,
+    first_of,
+)
 from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
 from fogsim.values.fog import EVEN_LIGHT
@@ -35,7 +47,8 @@ def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> Non
     """Shade the spans of triangles without texture, and set their distances and instance ids (`lens` (3,))."""
     span, kinds, surface = spans.span, spans.kind, spans.surface
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
-    lamplight, depths = len(response) > 0, np.empty(distance.shape[1], np.float32)
+    lamplight, columns = len(response) > 0, np.uint64(distance.shape[1])
+    depths = np.empty(columns, np.float32)
     per_focal, one = np.float32(1.0 / lens[0]), np.float32(1.0)
     for number in range(count):
         k = span[number, 3]
@@ -61,11 +74,12 @@ def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> Non
         blue, blue_step = _along(surface, k, LIGHT + 6, begin, row)
         red_low, green_low, blue_low = _numbers(surface, k, LOW)
         red_high, green_high, blue_high = _numbers(surface, k, HIGH)
+        place = first_of(v, np.uint64(begin), columns)
         for i in range(length):
-            step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
-            radiance[v, u, 0] = min(max((red + red_step * step) * z, red_low), red_high)
-            radiance[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high)
-            radiance[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high)
+            step, z, at = np.float32(np.int32(i)), depths[i], place + THREE * i
+            radiance[at] = min(max((red + red_step * step) * z, red_low), red_high)
+            radiance[at + ONE] = min(max((green + green_step * step) * z, green_low), green_high)
+            radiance[at + TWO] = min(max((blue + blue_step * step) * z, blue_low), blue_high)
         if lamplight:
             red, red_step = _along(surface, k, _RESPONSE, begin, row)
             green, green_step = _along(surface, k, _RESPONSE + 3, begin, row)
@@ -73,11 +87,11 @@ def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> Non
             red_low, green_low, blue_low = _numbers(surface, k, _RESPONSE_LOW)
             red_high, green_high, blue_high = _numbers(surface, k, _RESPONSE_HIGH)
             for i in range(length):
-                step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
-                far = distance[v, u]
-                response[v, u, 0] = min(max((red + red_step * step) * z, red_low), red_high) / far
-                response[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high) / far
-                response[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high) / far
+                step, z, at = np.float32(np.int32(i)), depths[i], place + THREE * i
+                far = distance[v, np.uint64(begin) + i]
+                response[at] = min(max((red + red_step * step) * z, red_low), red_high) / far
+                response[at + ONE] = min(max((green + green_step * step) * z, green_low), green_high) / far
+                response[at + TWO] = min(max((blue + blue_step * step) * z, blue_low), blue_high) / far
 
 
 @kernel
@@ -102,7 +116,8 @@ def shade_sky(spans: Spans, count: int, rays: Wide, light: Light, picture: Pictu
     """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3 (`rays` (3, 3))."""
     span = spans.span
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
-    shares = np.empty(distance.shape[1], np.float32)
+    columns = np.uint64(distance.shape[1])
+    shares = np.empty(columns, np.float32)
     lamplight, nothing, far = len(response) > 0, np.float32(0.0), np.float32(np.inf)
     red, green, blue = np.float32(light.zenith[0]), np.float32(light.zenith[1]), np.float32(light.zenith[2])
     third, two_thirds = np.float32(1.0 / 3.0), np.float32(2.0 / 3.0)
@@ -120,20 +135,17 @@ def shade_sky(spans: Spans, count: int, rays: Wide, light: Light, picture: Pictu
             step = np.float32(np.int32(i))
             a, b, c = x + dx * step, y + dy * step, z + dz * step
             shares[i] = third + two_thirds * max(c / np.sqrt(a * a + b * b + c * c), nothing)
+        place = first_of(v, np.uint64(begin), columns)
         for i in range(np.uint64(end - begin)):
-            place, share = np.uint64(begin) + i, shares[i]
-            radiance[v, place, 0], radiance[v, place, 1], radiance[v, place, 2] = (
-                red * share,
-                green * share,
-                blue * share,
-            )
+            at, share = place + THREE * i, shares[i]
+            radiance[at], radiance[at + ONE], radiance[at + TWO] = red * share, green * share, blue * share
         for u in range(np.uint64(begin), np.uint64(end)):
             distance[v, u] = far
         for u in range(np.uint64(begin), np.uint64(end)):
             instance[v, u] = 0
         if lamplight:
-            for u in range(np.uint64(begin), np.uint64(end)):
-                response[v, u, 0], response[v, u, 1], response[v, u, 2] = nothing, nothing, nothing
+            for i in range(THREE * np.uint64(end - begin)):
+                response[place + i] = nothing
 
 
 @kernel

@@ -209,7 +209,7 @@ def _raise_mismatch(assigned: Any, assigned_to: Any) -> Callable[..., None]:  # 
     return refuse
 
 
-_COLOURS = [vars(errors)[name] for name in ("HighlightColorScheme",) if name in vars(errors)]
+_COLOURED = [scheme for name, scheme in vars(errors).items() if name == "HighlightColorScheme"]
 """What colours numba's messages, if colorama is installed."""
 
 
@@ -220,12 +220,7 @@ def leave_plain(_: Any, message: str, *_styles: Any) -> str:
 
 SHORTCUTS: tuple[_UnobservedLock | Shortcut, ...] = (
     _UnobservedLock(),
-    # Without colorama numba has no colours.
-    *(
-        Shortcut(scheme, "_markup", leave_plain)
-        for name, scheme in vars(errors).items()
-        if name == "HighlightColorScheme"
-    ),
+    *(Shortcut(scheme, "_markup", leave_plain) for scheme in _COLOURED),
     Shortcut(BaseFunction, "get_call_type", _resolve_call),
     Shortcut(TargetConfig, "__eq__", compare_options),
     Shortcut(TargetConfig, "__hash__", hash_options),

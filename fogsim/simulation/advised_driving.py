@@ -24,6 +24,10 @@ class AdvisedDriving:
         self._ask_lighting = _lighting_questions(lighting.make(LIGHTING_POLICIES), lighting.name)
         self._road = RoadAdvice(advice) if advice.sections else None
 
+    def periods_until_decision(self, index: int) -> int:
+        """For how many camera periods the command stays in force after that of a number."""
+        return self._frames - index % self._frames
+
     def decide(self, step: Step, previous: Command | None = None) -> Command:
         """Command for the next camera period; the one before between decisions."""
         previous = step.command if previous is None else previous

@@ -26,6 +26,9 @@ class Policy(Protocol):
     def decide(self, step: Step) -> Command:
         """Command for the next camera period."""
 
+    def periods_until_decision(self, index: int) -> int:
+        """For how many camera periods a command after that of a number stays in force."""
+
 
 def own_policy(config: RunConfig) -> Policy:
     """A run's own policy: advice and lamps, and the controller if there is one."""
@@ -47,6 +50,10 @@ class ControlledDriving:
         self._delayed: deque[float | None] = deque([None] * (int(whole) + 1))
         self._acceleration = 0.0
         self._has_intervened = False
+
+    def periods_until_decision(self, index: int) -> int:  # noqa: ARG002 - the protocol's
+        """One: actuators move in each."""
+        return 1
 
     def decide(self, step: Step) -> Command:
         """Command for the next camera period."""

@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Annotated, Protocol, Self
@@ -85,8 +85,9 @@ def run(
         step = loop.start(seed)
         yield step
         while step.ending is None:
-            step = loop.advance(policy.decide(step))
-            yield step
+            steps = loop.steps(policy.decide(step), policy.periods_until_decision(step.index))
+            for step in steps:
+                yield step
     warn_of_unplayed(config.name, step)
 
 
@@ -267,18 +268,21 @@ class ClosedLoop:
             raise SimulationError("the ego left the road as soon as it had appeared")
         return snapshot
 
-    def advance(self, command: Command) -> Step:
-        """Move by one camera period with a command in force.
+    def advance(self, command: Command, periods: int = 1) -> Step:
+        """Move by one camera period, or some, with a command in force.
 
         Parameters
         ----------
         command : Command
             Advice and lamps.
+        periods : int
+            How many camera periods, if the run does not end before.
 
         Returns
         -------
         Step
-            The finished instant. If the ego left the network on the way, what was last seen of it, with its ending.
+            The finished instant, with the collisions of all these periods. If the ego left the network on the way, what
+            was last seen of it, with its ending.
 
         Raises
         ------
@@ -287,26 +291,64 @@ class ClosedLoop:
         SimulationError
             If the run has not been started or is over.
         """
-        if self._step is None or self._step.ending is not None:
+        steps = self.steps(command, periods)
+        step = next(steps)
+        collisions = step.collisions
+        for step in steps:
+            collisions += step.collisions
+        return step if collisions is step.collisions else dataclasses.replace(step, collisions=collisions)
+
+    def steps(self, command: Command, periods: int) -> Iterator[Step]:
+        """Move as `advance` does, and give the step of each period.
+
+        Where nothing of a step can change the traffic, all of it is simulated first: drawing takes SUMO's memory out of
+        the processor's, which costs as much as a step of SUMO.
+
+        Parameters
+        ----------
+        command, periods
+            See `advance`.
+        """
+        step = self._step
+        if step is None or step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
-        if command is not self._step.command:
+        if command is not step.command:
             checked_command(command)
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
             # In clear air no one else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
-        begun = self._begin_what_is_due(self._step)
-        for_all = self._fleet.advised(command, self._step.equipped)
-        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, for_all)
-        snapshot, index = self._traffic.observe(), self._step.index + 1
+        runs_ahead = self._replays and self._timeline.is_idle and not self._fleet.is_there
+        while periods and step.ending is None:
+            begun = self._begin_what_is_due(step)
+            for_all = self._fleet.advised(command, step.equipped)
+            snapshots = self._snapshots(step.index, for_all, periods if runs_ahead else 1)
+            periods -= len(snapshots)
+            for snapshot in snapshots:
+                step = self._step = self._next_step(step, snapshot, command, begun)
+                yield step
+
+    def _snapshots(self, index: int, command: Command, periods: int) -> Sequence[TrafficSnapshot | None]:
+        """The traffic after each of some periods, if the run does not end before."""
+        found: list[TrafficSnapshot | None] = []
+        for last in range(index, index + periods):
+            advance_traffic(self._traffic, self._drivers_fog, self._periods, last, command)
+            snapshot = self._traffic.observe()
+            found.append(snapshot)
+            if snapshot is None or self._ending(last + 1, snapshot) is not None:
+                break
+        return found
+
+    def _next_step(
+        self, last: Step, snapshot: TrafficSnapshot | None, command: Command, begun: tuple[Begun, ...]
+    ) -> Step:
+        index = last.index + 1
         if snapshot is None:
             time = self._periods.time(index)
-            seen = dataclasses.replace(self._step, collisions=(), begun=())
+            seen = dataclasses.replace(last, collisions=(), begun=())
             step = dataclasses.replace(seen, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             step = self._complete_step(index, snapshot, command)
-        step = dataclasses.replace(step, begun=begun) if begun else step
-        self._step = self._with_unplayed(self._with_ending(step))
-        return self._step
+        return self._with_unplayed(self._with_ending(dataclasses.replace(step, begun=begun) if begun else step))
 
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
         """Let begin what the timeline asks for after a step."""

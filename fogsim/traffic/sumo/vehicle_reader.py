@@ -244,7 +244,10 @@ class VehicleReader:
 
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO reports one in every step while the vehicles overlap."""
-        hits, time = self._hits(), self._api.simulation.getTime
+        hits = self._hits()
+        if not hits:
+            return []
+        time = self._api.simulation.getTime
         return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
 
     def _impact_speed(self, hit: Any) -> float:

@@ -249,7 +249,8 @@ class ClosedLoop:
                 self._traffic.start(streams.traffic_seed)
                 snapshot = self._observe_ego()
         self._fleet.start_run(seed, self._traffic.network)
-        self._step = self._with_unplayed(self._with_ending(self._complete_step(0, snapshot, Command())))
+        first = self._complete_step(0, snapshot, self._ending(0, snapshot), Command())
+        self._step = self._with_unplayed(self._with_ending(first))
         return self._step
 
     def _enter_known_fog(self, patch_seed: int) -> None:
@@ -323,31 +324,39 @@ class ClosedLoop:
             for_all = self._fleet.advised(command, step.equipped)
             snapshots = self._snapshots(step.index, for_all, periods if runs_ahead else 1)
             periods -= len(snapshots)
-            for snapshot in snapshots:
-                step = self._step = self._next_step(step, snapshot, command, begun)
+            for snapshot, ending in snapshots:
+                step = self._step = self._next_step(step, snapshot, ending, command, begun)
                 yield step
 
-    def _snapshots(self, index: int, command: Command, periods: int) -> Sequence[TrafficSnapshot | None]:
-        """The traffic after each of some periods, if the run does not end before."""
-        found: list[TrafficSnapshot | None] = []
+    def _snapshots(
+        self, index: int, command: Command, periods: int
+    ) -> Sequence[tuple[TrafficSnapshot | None, Ending | None]]:
+        """The traffic after each of some periods, and why the run is over then; none after the end."""
+        found: list[tuple[TrafficSnapshot | None, Ending | None]] = []
         for last in range(index, index + periods):
             advance_traffic(self._traffic, self._drivers_fog, self._periods, last, command)
             snapshot = self._traffic.observe()
-            found.append(snapshot)
-            if snapshot is None or self._ending(last + 1, snapshot) is not None:
+            ending = Ending.LEFT_NETWORK if snapshot is None else self._ending(last + 1, snapshot)
+            found.append((snapshot, ending))
+            if ending is not None:
                 break
         return found
 
     def _next_step(
-        self, last: Step, snapshot: TrafficSnapshot | None, command: Command, begun: tuple[Begun, ...]
+        self,
+        last: Step,
+        snapshot: TrafficSnapshot | None,
+        ending: Ending | None,
+        command: Command,
+        begun: tuple[Begun, ...],
     ) -> Step:
         index = last.index + 1
         if snapshot is None:
             time = self._periods.time(index)
             seen = dataclasses.replace(last, collisions=(), begun=())
-            step = dataclasses.replace(seen, index=index, time=time, ending=Ending.LEFT_NETWORK)
+            step = dataclasses.replace(seen, index=index, time=time, ending=ending)
         else:
-            step = self._complete_step(index, snapshot, command)
+            step = self._complete_step(index, snapshot, ending, command)
         return self._with_unplayed(self._with_ending(dataclasses.replace(step, begun=begun) if begun else step))
 
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
@@ -397,8 +406,8 @@ class ClosedLoop:
             return step
         return dataclasses.replace(step, unplayed=self._traffic.unplayed() + self._timeline.unplayed(step))
 
-    def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
-        time, ending = self._periods.time(index), self._ending(index, snapshot)
+    def _complete_step(self, index: int, snapshot: TrafficSnapshot, ending: Ending | None, command: Command) -> Step:
+        time = self._periods.time(index)
         sent = () if self._step is None or self._config.reports.cameras is None else camera_messages(self._step)
         sent += self._equipment.look_from_roadside(time, snapshot.state)
         self._fleet.ask(index, time, snapshot, sent)
@@ -407,9 +416,10 @@ class ClosedLoop:
         return dataclasses.replace(step, equipped=equipped) if equipped else step
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:
-        ego = snapshot.state.ids[snapshot.ego]
-        if self._config.ends_on_collision and any(ego in (c.collider, c.victim) for c in snapshot.collisions):
-            return Ending.COLLISION
+        if snapshot.collisions and self._config.ends_on_collision:
+            ego = snapshot.state.ids[snapshot.ego]
+            if any(ego in (one.collider, one.victim) for one in snapshot.collisions):
+                return Ending.COLLISION
         if snapshot.route_position >= snapshot.route_length - self._config.stop_before_end:
             return Ending.ARRIVED
         return Ending.TIME if index >= self._periods.frames or snapshot.is_ended else None

@@ -91,8 +91,10 @@ def _way_places(way: KnownWay, place: float) -> tuple[NDArray[np.float64], NDArr
     if way.route is None:
         return None
     stations, at = way.stations, place + _WAY
-    ahead = _WAY[(at >= 0.0) & (at <= stations[-1])]
-    return ahead, _places(way.route, stations, place + ahead)
+    if at[0] >= 0.0 and at[-1] <= stations[-1]:
+        return _WAY.copy(), _places(way.route, stations, at)
+    is_there = (at >= 0.0) & (at <= stations[-1])
+    return _WAY[is_there], _places(way.route, stations, at[is_there])
 
 
 def _profile(ahead: NDArray[np.float64], known: NDArray[np.float64]) -> FogProfile:

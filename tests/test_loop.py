@@ -180,6 +180,20 @@ def test_a_restarted_loop_replays_a_fresh_one() -> None:
         assert drive(loop) == first
 
 
+def test_traffic_runs_ahead_of_the_pictures_and_no_farther_than_the_end() -> None:
+    def drive(periods: int) -> tuple[list[Step], float]:
+        with ClosedLoop(small("duration_s=1.2")) as loop:
+            steps = [loop.start(1)]
+            while steps[-1].ending is None:
+                steps.append(loop.advance(steps[-1].command, periods))
+            return steps, loop._traffic._run.roster.time
+
+    (single, ended), (ahead, ended_ahead) = drive(1), drive(5)
+    assert ahead[-1].ending is Ending.TIME
+    assert fingerprint(ahead) == fingerprint([*single[:-1:5], single[-1]])
+    assert ended_ahead == ended == ahead[-1].traffic.time
+
+
 def test_a_restarted_loop_lays_road_and_fog_along_the_egos_new_route(tmp_path: Path) -> None:
     (tmp_path / "demand.rou.xml").write_text(
         """<routes><routeDistribution id="ways">

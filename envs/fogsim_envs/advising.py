@@ -1,7 +1,6 @@
 """What environments have in common in which the agent advises the ego's speed and chooses its lamps."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 import gymnasium
@@ -14,7 +13,7 @@ from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import spread_advice, warned
-from fogsim.values import Collision, Ending, Step
+from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import Simulation, refuse_copies
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
@@ -110,13 +109,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
         before = self._step
         command = warned(spread_advice(chosen, self._advice, before.truth.sections), before, before.command)
-        collisions: tuple[Collision, ...] = ()
-        for _ in range(self._frames):
-            self._step = self._simulation.advance(command)
-            collisions += self._step.collisions
-            if self._step.ending is not None:
-                break
-        after = self._step = replace(self._step, collisions=collisions)
+        after = self._step = self._simulation.advance(command, self._frames)
         self._show(after)
         terms = reward_terms(before, after, self._weights, self._standard)
         truncated = after.ending is Ending.TIME

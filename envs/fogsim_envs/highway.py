@@ -113,9 +113,9 @@ class HighwayLoop:
             self._loop = self._built()
             return self._loop.start(seed)
 
-    def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `ClosedLoop.advance`."""
-        return self._loop.advance(command)
+    def advance(self, command: Command, periods: int = 1) -> Step:
+        """Move by some camera periods; see `ClosedLoop.advance`."""
+        return self._loop.advance(command, periods)
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""

@@ -39,7 +39,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
                     elif loop is None:
                         answer = SimulationError("the host was asked for a run before it got a scenario")
                     else:
-                        answer = loop.start(argument) if verb == "start" else loop.advance(argument)
+                        answer = loop.start(argument) if verb == "start" else loop.advance(*argument)
             except FogSimError as error:
                 answer = error
             connection.send(("done", answer))

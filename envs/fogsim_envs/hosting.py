@@ -45,8 +45,8 @@ class Simulation(Protocol):
     def start(self, seed: int) -> Step:
         """Begin a run; see `fogsim.simulation.loop.ClosedLoop.start`."""
 
-    def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.simulation.loop.ClosedLoop.advance`."""
+    def advance(self, command: Command, periods: int = 1) -> Step:
+        """Move by some camera periods; see `fogsim.simulation.loop.ClosedLoop.advance`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -225,9 +225,9 @@ class HostedLoop(_Host):
         """Begin a run; see `fogsim.simulation.loop.ClosedLoop.start`."""
         return cast("Step", self._start(seed))
 
-    def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.simulation.loop.ClosedLoop.advance`."""
-        return cast("Step", self._ask("advance", command))
+    def advance(self, command: Command, periods: int = 1) -> Step:
+        """Move by some camera periods; see `fogsim.simulation.loop.ClosedLoop.advance`."""
+        return cast("Step", self._ask("advance", (command, periods)))
 
 
 class _HostedTraffic(_Host):
@@ -239,7 +239,7 @@ class _HostedTraffic(_Host):
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
         """Move by one camera period; see `fogsim.simulation.traffic_run.TrafficRun.advance`."""
-        return cast("tuple[TrafficStep, float]", self._ask("advance", command))
+        return cast("tuple[TrafficStep, float]", self._ask("advance", (command,)))
 
 
 def checked_timeout(timeout: float) -> float | None:

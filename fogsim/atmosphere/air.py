@@ -120,9 +120,8 @@ class Air:
             shining.append(self._road.sources(lights.own, camera, pose, field))
         if lights.beams is not None and has_fog:
             shining.append(glow_of_beams(lights.beams, pose, field))
-        sources = joined_sources(shining)
-        if len(sources.intensity):
-            self._halos.add(radiance, view, camera, pose, field, sources)
+        if any(len(one.intensity) for one in shining):
+            self._halos.add(radiance, view, camera, pose, field, joined_sources(shining))
         return radiance
 
     def transmittance(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:

@@ -23,7 +23,19 @@ FileName = Annotated[str, "a file"]
 Check = Callable[[Any], str | None]
 """From a value to what was expected; None if the value fits."""
 
-_Checks = tuple[list[tuple[str, Check | None]], dict[str, Check]]
+_Checks = tuple[list[tuple[str, tuple[type, ...], Check]], dict[str, tuple[tuple[type, ...], Check]]]
+
+
+@dataclass(frozen=True, slots=True)
+class _InstanceCheck:
+    """Check that a value is an instance of one of some classes."""
+
+    kinds: tuple[type, ...]
+    expected: str
+
+    def __call__(self, value: object) -> str | None:
+        return None if isinstance(value, self.kinds) else self.expected
+
 
 _NOTHING = object()
 """A value that fits no checked annotation; its check says what is expected."""
@@ -87,11 +99,13 @@ def checked_parameters(target: C) -> C:
     @functools.wraps(call)
     def checked(*arguments: Any, **options: Any) -> Any:
         by_place, by_name = checks()
-        for (name, check), value in zip(by_place, arguments, strict=False):
-            if check is not None and (expected := check(value)) is not None:
+        for (name, kinds, check), value in zip(by_place, arguments, strict=False):
+            # Classes are looked at here: a call for each argument would cost more than the rest.
+            if not isinstance(value, kinds) and (expected := check(value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
         for name, value in options.items():
-            if name in by_name and (expected := by_name[name](value)) is not None:
+            kinds, check = by_name.get(name, _UNCHECKED)
+            if not isinstance(value, kinds) and (expected := check(value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
         try:
             return call(*arguments, **options)
@@ -120,7 +134,22 @@ def _argument_checks(signature: inspect.Signature) -> _Checks:
         if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
     }
     positional = [name for name in checks if signature.parameters[name].kind is not inspect.Parameter.KEYWORD_ONLY]
-    return [(name, checks[name]) for name in positional], {name: one for name, one in checks.items() if one is not None}
+    by_name = {name: (_sure_kinds(one), one or _accept) for name, one in checks.items()}
+    return [(name, *by_name[name]) for name in positional], by_name
+
+
+def _accept(_: object) -> None:
+    """Take any value."""
+
+
+def _sure_kinds(check: Check | None) -> tuple[type, ...]:
+    """Classes whose instances pass a check."""
+    if check is None:
+        return (object,)
+    return check.kinds if isinstance(check, _InstanceCheck) else ()
+
+
+_UNCHECKED = (object,), _accept
 
 
 def _call_mistake(
@@ -207,7 +236,7 @@ def check_of(annotation: Any, *, classes: bool) -> Check | None:
     elif origin is Literal:
         check = _literal_check(parts)
     elif annotation == FileName:
-        check = _instance_check((str,), parts[1])
+        check = _InstanceCheck((str,), parts[1])
     elif origin is Annotated:
         interval = next((part for part in parts if isinstance(part, Range)), None)
         check = check_of(parts[0], classes=classes) if interval is None else _plain_check(parts[0], interval)
@@ -228,6 +257,10 @@ def _union_check(checks: Sequence[Check | None]) -> Check | None:
     if len(known) < len(checks):
         return None
     may_be_none = any(check(None) is None for check in known)
+    classes = [check for check in known if isinstance(check, _InstanceCheck)]
+    if len(classes) == len(known):
+        kinds = tuple(kind for one in classes for kind in one.kinds)
+        return _InstanceCheck(kinds, " or ".join(one.expected for one in classes))
 
     def check(value: object) -> str | None:
         if value is None and may_be_none:
@@ -299,7 +332,7 @@ def _plain_check(kind: object, interval: Range) -> Check | None:
         return _number_check(int, Integral, interval, f"a whole number{'' if interval is _FINITE else within}")
     for plain, expected in ((bool, "true or false"), (str, "text"), (NoneType, "nothing")):
         if kind is plain:
-            return _instance_check((plain, np.bool_) if plain is bool else (plain,), expected)
+            return _InstanceCheck((plain, np.bool_) if plain is bool else (plain,), expected)
     return None
 
 
@@ -324,7 +357,7 @@ def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check 
         return None
     plain = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
     named: str = getattr(kind, "EXPECTED", _WORDS.get(kind, plain))
-    check = _instance_check((os.PathLike if kind is Path else kind,), named)
+    check: Check = _InstanceCheck((os.PathLike if kind is Path else kind,), named)
     if kind is np.ndarray and parts:
         check = _array_check(get_args(parts[1])[0])
     elif kind in (Mapping, dict) and parts:
@@ -336,10 +369,6 @@ def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check 
 
 def _protocol_check(attributes: Sequence[str], expected: str) -> Check:
     return lambda value: None if all(hasattr(value, name) for name in attributes) else expected
-
-
-def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
-    return lambda value: None if isinstance(value, kinds) else expected
 
 
 def _array_check(scalar: type[np.generic]) -> Check:

@@ -176,6 +176,7 @@ class GridFilter:
         self._extinction = np.exp(self._log_extinction)
         self._offset = (self._log_extinction[1] - self._log_extinction[0]) * np.arange(-(CELLS - 1), CELLS)
         self._steps: dict[tuple[float, bool], Floats] = {}
+        self._common_walk = 0.0, np.zeros(0)
         self.reset()
 
     def reset(self) -> None:
@@ -256,7 +257,9 @@ class GridFilter:
         """The probability, spread by what all images of the methods in use have wrong in common."""
         if self._common == 0.0:
             return self._probability.copy()
-        return _folded(convolution(self._probability, self._walk(self._common)))
+        if self._common != self._common_walk[0]:
+            self._common_walk = self._common, self._walk(self._common)
+        return _folded(convolution(self._probability, self._common_walk[1]))
 
     def _advance(self, time: float) -> None:
         if not math.isfinite(time):

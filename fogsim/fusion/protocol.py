@@ -136,7 +136,8 @@ class DatedFusion:
         # Reports inform only a fusion that knows of places.
         if (reports and belief.profile is not None) or any(one.valid or one.bounds is not None for one in estimates):
             self._last = time
-        return replace(belief, age=time - self._last)
+        age = time - self._last
+        return belief if belief.age == age else replace(belief, age=age)
 
 
 @functools.cache

@@ -40,10 +40,11 @@ class RadarShadow:
     def __init__(self, structures: Sequence[Structure]) -> None:
         self._solid = obstructions_of(one for one in structures if one.kind is not StructureKind.HEDGE)
         self._leaves = obstructions_of(one for one in structures if one.kind is StructureKind.HEDGE)
+        self._is_there = bool(self._solid) or bool(self._leaves)
 
     def __bool__(self) -> bool:
         """Whether there is anything that could be in the way."""
-        return bool(self._solid) or bool(self._leaves)
+        return self._is_there
 
     def share_of_reach(self, radar: ArrayLike, rear: ArrayLike) -> float:
         """Share of its reach in the open that a radar has toward a vehicle, 0 … 1.

@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Annotated, Protocol, Self
@@ -20,6 +20,7 @@ from fogsim.simulation.timeline import Timeline
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
 from fogsim.values import (
     Begun,
+    Collision,
     Command,
     Ending,
     FogField,
@@ -248,7 +249,8 @@ class ClosedLoop:
                 self._traffic.start(streams.traffic_seed)
                 snapshot = self._observe_ego()
         self._fleet.start_run(seed, self._traffic.network)
-        self._step = self._with_unplayed(self._with_ending(self._complete_step(0, snapshot, Command())))
+        first = self._complete_step(0, snapshot, self._ending(0, snapshot), Command())
+        self._step = self._with_unplayed(self._with_ending(first))
         return self._step
 
     def _enter_known_fog(self, patch_seed: int) -> None:
@@ -267,18 +269,24 @@ class ClosedLoop:
             raise SimulationError("the ego left the road as soon as it had appeared")
         return snapshot
 
-    def advance(self, command: Command) -> Step:
-        """Move by one camera period with a command in force.
+    def advance(self, command: Command, periods: int = 1) -> Step:
+        """Move by one camera period, or some, with a command in force.
+
+        Where nothing of a step can change the traffic, that of all periods is simulated first: drawing takes SUMO's
+        memory out of the processor's, which costs as much as a step of SUMO.
 
         Parameters
         ----------
         command : Command
             Advice and lamps.
+        periods : int
+            How many camera periods, if the run does not end before.
 
         Returns
         -------
         Step
-            The finished instant. If the ego left the network on the way, what was last seen of it, with its ending.
+            The finished instant, with the collisions of all these periods. If the ego left the network on the way, what
+            was last seen of it, with its ending.
 
         Raises
         ------
@@ -287,26 +295,56 @@ class ClosedLoop:
         SimulationError
             If the run has not been started or is over.
         """
-        if self._step is None or self._step.ending is not None:
+        step = self._step
+        if step is None or step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
-        if command is not self._step.command:
+        if command is not step.command:
             checked_command(command)
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
             # In clear air no one else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
-        begun = self._begin_what_is_due(self._step)
-        for_all = self._fleet.advised(command, self._step.equipped)
-        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, for_all)
-        snapshot, index = self._traffic.observe(), self._step.index + 1
+        runs_ahead = self._replays and self._timeline.is_idle and not self._fleet.is_there
+        collisions: tuple[Collision, ...] = ()
+        while periods > 0 and step.ending is None:
+            begun = self._begin_what_is_due(step)
+            for_all = self._fleet.advised(command, step.equipped)
+            snapshots = self._snapshots(step.index, for_all, periods if runs_ahead else 1)
+            periods -= len(snapshots)
+            for snapshot, ending in snapshots:
+                step = self._step = self._next_step(step, snapshot, ending, command, begun)
+                collisions += step.collisions
+        return step if collisions == step.collisions else dataclasses.replace(step, collisions=collisions)
+
+    def _snapshots(
+        self, index: int, command: Command, periods: int
+    ) -> Sequence[tuple[TrafficSnapshot | None, Ending | None]]:
+        """The traffic after each of some periods, and why the run is over then; none after the end."""
+        found: list[tuple[TrafficSnapshot | None, Ending | None]] = []
+        for last in range(index, index + periods):
+            advance_traffic(self._traffic, self._drivers_fog, self._periods, last, command)
+            snapshot = self._traffic.observe()
+            ending = Ending.LEFT_NETWORK if snapshot is None else self._ending(last + 1, snapshot)
+            found.append((snapshot, ending))
+            if ending is not None:
+                break
+        return found
+
+    def _next_step(
+        self,
+        last: Step,
+        snapshot: TrafficSnapshot | None,
+        ending: Ending | None,
+        command: Command,
+        begun: tuple[Begun, ...],
+    ) -> Step:
+        index = last.index + 1
         if snapshot is None:
             time = self._periods.time(index)
-            seen = dataclasses.replace(self._step, collisions=(), begun=())
-            step = dataclasses.replace(seen, index=index, time=time, ending=Ending.LEFT_NETWORK)
+            seen = dataclasses.replace(last, collisions=(), begun=())
+            step = dataclasses.replace(seen, index=index, time=time, ending=ending)
         else:
-            step = self._complete_step(index, snapshot, command)
-        step = dataclasses.replace(step, begun=begun) if begun else step
-        self._step = self._with_unplayed(self._with_ending(step))
-        return self._step
+            step = self._complete_step(index, snapshot, ending, command)
+        return self._with_unplayed(self._with_ending(dataclasses.replace(step, begun=begun) if begun else step))
 
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
         """Let begin what the timeline asks for after a step."""
@@ -355,8 +393,8 @@ class ClosedLoop:
             return step
         return dataclasses.replace(step, unplayed=self._traffic.unplayed() + self._timeline.unplayed(step))
 
-    def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
-        time, ending = self._periods.time(index), self._ending(index, snapshot)
+    def _complete_step(self, index: int, snapshot: TrafficSnapshot, ending: Ending | None, command: Command) -> Step:
+        time = self._periods.time(index)
         sent = () if self._step is None or self._config.reports.cameras is None else camera_messages(self._step)
         sent += self._equipment.look_from_roadside(time, snapshot.state)
         self._fleet.ask(index, time, snapshot, sent)
@@ -365,9 +403,10 @@ class ClosedLoop:
         return dataclasses.replace(step, equipped=equipped) if equipped else step
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:
-        ego = snapshot.state.ids[snapshot.ego]
-        if self._config.ends_on_collision and any(ego in (c.collider, c.victim) for c in snapshot.collisions):
-            return Ending.COLLISION
+        if snapshot.collisions and self._config.ends_on_collision:
+            ego = snapshot.state.ids[snapshot.ego]
+            if any(ego in (one.collider, one.victim) for one in snapshot.collisions):
+                return Ending.COLLISION
         if snapshot.route_position >= snapshot.route_length - self._config.stop_before_end:
             return Ending.ARRIVED
         return Ending.TIME if index >= self._periods.frames or snapshot.is_ended else None

@@ -1,5 +1,7 @@
 """Where every vehicle and person is at one instant, and what the traffic lights show."""
 
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -259,7 +261,9 @@ def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np
 
     Takes `heard` [m/s].
     """
-    return np.fromiter([heard.get(vehicle, np.inf) for vehicle in ids] if heard else (), np.float64)
+    if not heard:
+        return np.empty(0)
+    return np.fromiter(map(heard.get, ids, itertools.repeat(math.inf)), np.float64, len(ids))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
+import functools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,6 +37,7 @@ from fogsim.values import (
     FogField,
     FogReport,
     Frame,
+    Lamp,
     Observation,
     RoadNetwork,
     RunningFault,
@@ -48,6 +50,12 @@ from fogsim.values.fault import FaultKind, SignFault, Where
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.result_checks import checked_estimate
 from fogsim.values.script import Actions
+
+
+@functools.lru_cache(maxsize=1024)
+def _switched_on(lamps: int) -> Lamp:
+    """Lamps that are switched on, of those of `TrafficState.lamps`."""
+    return ALL_LAMPS & lamps
 
 
 class _RunParts(NamedTuple):
@@ -315,7 +323,7 @@ class EgoEquipment:
             signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
             # 0 would be unknown.
             camera_setback=max(self._rig.setback, 0.001),
-            lamps=ALL_LAMPS & int(state.lamps[ego]),
+            lamps=_switched_on(int(state.lamps[ego])),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,
             right=right,

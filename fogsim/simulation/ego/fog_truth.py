@@ -24,6 +24,8 @@ _EYES = np.array([0.0, 0.0, 1.2])
 _WAY = np.arange(-200.0, 1001.0, 25.0)
 """Distances ahead along the route at which the true fog is reported [m]."""
 
+_NO_PLACES = np.empty((0, 3))
+
 
 @dataclass(frozen=True)
 class KnownWay:
@@ -59,9 +61,16 @@ def fog_truth(
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
-    here, drivers = _extinctions(fog, eye, traffic)
+    on_way = None if way is None or place is None else _way_places(way, place)
+    way_places = _NO_PLACES if on_way is None else on_way[1]
+    drivers = _NO_PLACES if traffic is None else traffic.position
+    places = np.empty((1 + len(drivers) + len(way_places), 3))
+    places[0] = eye
+    np.add(drivers, _EYES, out=places[1 : 1 + len(drivers)])
+    np.add(way_places, _EYES, out=places[1 + len(drivers) :])
+    found = extinction(fog, places)
     return Truth(
-        extinction=here,
+        extinction=float(found[0]),
         extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight,
         camera=camera,
         pose=pose,
@@ -71,20 +80,25 @@ def fog_truth(
         route=None if way is None else way.route,
         carriageways={} if way is None else way.carriageways,
         faults=faults,
-        vehicle_extinctions=drivers,
-        profile=None if way is None or place is None else _way_profile(fog, way, place),
+        vehicle_extinctions=None if traffic is None else found[1 : 1 + len(drivers)],
+        profile=None if on_way is None else _profile(on_way[0], found[1 + len(drivers) :]),
         illuminance=illuminance,
     )
 
 
-def _way_profile(fog: FogField, way: KnownWay, place: float) -> FogProfile | None:
-    """The fog along a route about a place on it [m]; None where no route is known."""
+def _way_places(way: KnownWay, place: float) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Those of `_WAY` about a place that are on the route (n,), and their places (n, 3) [m]; None without a route."""
     if way.route is None:
         return None
-    stations = way.stations
-    ahead = _WAY[(place + _WAY >= 0.0) & (place + _WAY <= stations[-1])]
-    known = np.log(np.maximum(extinction(fog, _places(way.route, stations, place + ahead) + _EYES), THINNEST))
-    return FogProfile(ahead, known, np.zeros(ahead.size))
+    stations, at = way.stations, place + _WAY
+    if at[0] >= 0.0 and at[-1] <= stations[-1]:
+        return _WAY.copy(), _places(way.route, stations, at)
+    is_there = (at >= 0.0) & (at <= stations[-1])
+    return _WAY[is_there], _places(way.route, stations, at[is_there])
+
+
+def _profile(ahead: NDArray[np.float64], known: NDArray[np.float64]) -> FogProfile:
+    return FogProfile(ahead, np.log(np.maximum(known, THINNEST)), np.zeros(ahead.size))
 
 
 @kernel
@@ -99,19 +113,6 @@ def _places(route: NDArray[np.float64], stations: NDArray[np.float64], at: NDArr
                 slope = (route[low + 1, axis] - route[low, axis]) / (stations[low + 1] - stations[low])
                 out[i, axis] = slope * (at[i] - stations[low]) + route[low, axis]
     return out
-
-
-def _extinctions(
-    fog: FogField, eye: NDArray[np.float64], traffic: TrafficState | None
-) -> tuple[float, NDArray[np.float64] | None]:
-    """Extinction coefficients at a camera, and at the eyes of the drivers of some traffic, if there is any [1/m]."""
-    if traffic is None:
-        return float(extinction(fog, eye)), None
-    places = np.empty((1 + len(traffic.position), 3))
-    places[0] = eye
-    np.add(traffic.position, _EYES, out=places[1:])
-    found = extinction(fog, places)
-    return float(found[0]), found[1:]
 
 
 def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:

@@ -57,13 +57,13 @@ class EgoSensors:
     def lead(self, snapshot: TrafficSnapshot, faults: Faults, streams: Streams) -> LeadMeasurement | None:
         """The vehicle ahead by radar."""
         speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._sensors.radar, faults)
-        share = self._share_of_reach(snapshot)
+        share = self._share_of_reach(snapshot) if self._shadow else 1.0
         measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot), share)
         return faulty_lead(measured, faults)
 
     def _share_of_reach(self, snapshot: TrafficSnapshot) -> float:
         """What stands between the ego's front bumper and its leader's rear leaves of the radar's reach [-]."""
-        rear = _rear(snapshot) if self._shadow else None
+        rear = _rear(snapshot)
         if rear is None:
             return 1.0
         return self._shadow.share_of_reach(snapshot.state.position[snapshot.ego] + (0.0, 0.0, HEIGHT), rear)

@@ -134,6 +134,11 @@ class EquippedFleet:
         self._pool_of: dict[str, int] = {}
         self._routes: tuple[RoutePlaces, RoadNetwork] | None = None
 
+    @property
+    def is_there(self) -> bool:
+        """Whether any vehicle may be equipped."""
+        return bool(self._pools)
+
     def start_run(self, seed: int, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> None:
         """Begin a run."""
         if not self._pools:

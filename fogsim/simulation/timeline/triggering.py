@@ -47,6 +47,11 @@ class Timeline:
         self._seen: set[str] = set()
         self._ends: list[Begun] = []
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether there is nothing to watch."""
+        return not self._entries and self._end is None
+
     def due(self, step: TrafficStep) -> Due:
         """Take in a finished step, and say what begins after it.
 

@@ -196,6 +196,8 @@ class Lamps:
 
     def shown(self, state: TrafficState, time: float) -> TrafficState:
         """A state with the lamps as they are (`time` [s])."""
+        if not (self._switches or self._indicating):
+            return state
         self._indicating = {v: one for v, one in self._indicating.items() if time < one.ends}
         touched = {v for v in (*self._switches, *self._indicating) if v in state.ids}
         if not touched:

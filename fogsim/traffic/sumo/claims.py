@@ -126,7 +126,7 @@ class LoadMark:
 
     def check(self) -> None:
         """Refuse another simulation."""
-        if not self.is_there():
+        if self._read("", self._key) != self._value:
             raise SimulationError(
                 "the simulation was loaded again while FogSim was using it: attach to it, or start the run, again"
             )

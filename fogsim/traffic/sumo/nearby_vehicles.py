@@ -72,7 +72,8 @@ class NearbyVehicles:
             self._removals = roster.removals
             self._set_near([v for v in self._near if v in roster.present])
         # Plain numbers: mostly some ten are due, for which arrays would cost three times as much.
-        distances = [math.dist(place[:2], here[:2]) for place in map(self._position, far)]
+        there, dist = here[:2], math.dist
+        distances = [dist(place[:2], there) for place in map(self._position, far)]
         come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])
@@ -98,8 +99,9 @@ class NearbyVehicles:
     def _schedule_far(self, vehicles: Sequence[str], distances: Sequence[float]) -> list[str]:
         """Those near; the others wait until they could have come near."""
         rate, radius = self._highest_rate(), self._radius
-        waits = {v: (away - radius) / rate for v, away in zip(vehicles, distances, strict=True) if away > radius}
-        self._far.add_each(tuple(waits), [min(wait, _MAX_WAIT) for wait in waits.values()], self._roster.time)
+        far = {v: (away - radius) / rate for v, away in zip(vehicles, distances, strict=True) if away > radius}
+        waits = {v: wait if wait < _MAX_WAIT else _MAX_WAIT for v, wait in far.items()}
+        self._far.add_each(tuple(waits), tuple(waits.values()), self._roster.time)
         return [v for v in vehicles if v not in waits]
 
     def _highest_rate(self) -> float:

@@ -213,11 +213,10 @@ class VehicleReader:
         """What never changes; looked up again when other vehicles are near."""
         if self._constants is None or self._constants.ids is not ids:
             kinds, numbers = self._bodies.look_up(ids)
-            length, width, height = numbers[:, :3].T
-            body = (kinds, length, width, height, numbers[:, 3:6])
-            self._constants = _Constants(
-                ids, None if self._ego is None else ids.index(self._ego), *body, *numbers[:, 6:].T
-            )
+            # Each in memory of its own, as those who read them in each step need it.
+            length, width, height, *_, speed_factor, top_speed = np.ascontiguousarray(numbers.T)
+            paint, ego = np.ascontiguousarray(numbers[:, 3:6]), None if self._ego is None else ids.index(self._ego)
+            self._constants = _Constants(ids, ego, kinds, length, width, height, paint, speed_factor, top_speed)
         return self._constants
 
     def _dynamic_state(self) -> _DynamicState:
@@ -244,7 +243,10 @@ class VehicleReader:
 
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO reports one in every step while the vehicles overlap."""
-        hits, time = self._hits(), self._api.simulation.getTime
+        hits = self._hits()
+        if not hits:
+            return []
+        time = self._api.simulation.getTime
         return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
 
     def _impact_speed(self, hit: Any) -> float:

@@ -39,7 +39,7 @@ class LaneOffsets:
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Move those under way to where they are at a time [s]."""
-        for vehicle, glide in list(self._glides.items()):
+        for vehicle, glide in list(self._glides.items()) if self._glides else ():
             if vehicle in present and not is_off_lanes(self._api, vehicle):
                 self._api.vehicle.setLateralLanePosition(vehicle, glide.offset(time))
             if time >= glide.begun + glide.duration:

@@ -127,7 +127,7 @@ class _SignalControl:
 
     def update(self, time: float) -> None:
         """Give back the lights whose time is over (`time` [s])."""
-        for signal in [one for one, end in self._until.items() if time >= end - 1e-9]:
+        for signal in [one for one, end in self._until.items() if time >= end - 1e-9] if self._until else ():
             self._give_back(signal)
 
     def release(self) -> None:
@@ -255,7 +255,8 @@ class ScriptedActions:
     def play(self, time: float, present: Collection[str]) -> None:
         """Go on with what has begun, for the next step (`time` [s])."""
         self._signals.update(time)
-        self._end_changes(time, present)
+        if self._changing:
+            self._end_changes(time, present)
         if not self._playing.is_idle or self._paths.vehicles:
             self._play(time, present)
         self._offsets.play(time + self._step, present)

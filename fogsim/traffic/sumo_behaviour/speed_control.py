@@ -88,6 +88,9 @@ class SpeedControl:
 
     def __init__(self, api: Api, step_length: float) -> None:
         self._vehicles = api.vehicle
+        names = ("getAcceleration", "getDecel", "getSpeedWithoutTraCI", "getSpeed", "getAllowedSpeed", "setSpeed")
+        getters = [vehicle_getter(api, name) for name in names]
+        self._acceleration, self._deceleration, self._planned, self._speed, self._allowed, self._set_speed = getters
         self._step_length = step_length
         self._leader = Leaders(api).within(_LEADER_RANGE)
         self._held: set[str] = set()
@@ -160,25 +163,24 @@ class SpeedControl:
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
         self._held.add(vehicle)
         # Off the lanes there is nothing to be held to.
-        limit = UNKNOWN if self._brakes_hard(vehicle) else float(self._vehicles.getAllowedSpeed(vehicle))
+        limit = UNKNOWN if self._brakes_hard(vehicle) else float(self._allowed(vehicle))
         if limit == UNKNOWN:
-            self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
+            self._set_speed(vehicle, _SUMO_DRIVES)
             return
         # Advice does not make a driver faster than the road and the vehicle allow.
         allowed = min(target, limit)
-        speed = self._vehicles.getSpeed(vehicle)
-        self._vehicles.setSpeed(vehicle, decelerated_speed(speed, allowed, deceleration, self._step_length))
+        speed = self._speed(vehicle)
+        self._set_speed(vehicle, decelerated_speed(speed, allowed, deceleration, self._step_length))
 
     def _brakes_hard(self, vehicle: str) -> bool:
         """Whether the driver brakes harder by himself, or would, than SUMO lets a vehicle whose speed is set.
 
         That is the type's ``decel``, and in an emergency a driver needs ``emergencyDecel``.
         """
-        get = self._vehicles
-        excess = -get.getAcceleration(vehicle) - get.getDecel(vehicle)
+        excess = -self._acceleration(vehicle) - self._deceleration(vehicle)
         if abs(excess) > _SAME:
             return bool(excess > 0.0)
-        return bool(get.getSpeedWithoutTraCI(vehicle) < get.getSpeed(vehicle) - _SAME)
+        return bool(self._planned(vehicle) < self._speed(vehicle) - _SAME)
 
 
 class SumoDesiredSpeeds:
@@ -258,7 +260,7 @@ class SumoDesiredSpeeds:
     def _drivers(self) -> list[str]:
         """Everyone on the road but the ego and trains, which go by their signals."""
         # In SUMO's order, in which it finds them faster.
-        return sorted(v for v in self._roster.present if v != self._ego and v not in self._trains)
+        return sorted(self._roster.present.difference(self._trains, () if self._ego is None else (self._ego,)))
 
     def _choose_on_entry(self, new: Sequence[str], command: Command) -> None:
         """Let new drivers choose; those who enter have driven in that fog before, past the signs with the advice."""

@@ -66,8 +66,11 @@ class TopSpeedControl:
 
     def update(self, time: float, present: Collection[str]) -> None:
         """Lower further the top speeds that are being lowered (`time` [s])."""
-        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
-        for vehicle, row in list(self._falling.items()) if self._falling else ():
+        before, self._updated_at = self._updated_at, time
+        if not self._falling:
+            return
+        passed = min(max(time - before, 0.0), _MAX_INTERVAL)
+        for vehicle, row in list(self._falling.items()):
             if vehicle not in present:
                 del self._falling[vehicle]
                 continue
@@ -142,8 +145,11 @@ class SpeedShareControl:
 
     def update(self, time: float, present: Collection[str]) -> None:
         """Lower further the shares that are being lowered (`time` [s])."""
-        passed, self._updated_at = min(max(time - self._updated_at, 0.0), _MAX_INTERVAL), time
-        for vehicle, (row, rate) in list(self._falling.items()) if self._falling else ():
+        before, self._updated_at = self._updated_at, time
+        if not self._falling:
+            return
+        passed = min(max(time - before, 0.0), _MAX_INTERVAL)
+        for vehicle, (row, rate) in list(self._falling.items()):
             if vehicle not in present:
                 del self._falling[vehicle]
                 continue

@@ -43,7 +43,8 @@ class DriversPerception:
         """Pass to SUMO's drivers, before a step, what they do not see."""
         self._roster.update()
         own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in lamps_of.items()}
-        own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
+        for vehicle in lamps.vehicles:
+            own_lamps[vehicle] = lamps.switched(vehicle, own_lamps.get(vehicle, int(OTHERS_LAMPS)))
         for part in self._parts:
             part.update(own_lamps)
 

@@ -122,8 +122,10 @@ class JunctionSight:
             "getSpeed", "getPosition3D", "getLaneID", "getLanePosition"
         )
         length, self._directions = getter(api, "lane", "getLength"), LaneDirections(api)
-        self._lane_length = functools.cache(lambda lane: float(length(lane)) if lane else 0.0)
-        self._is_two_way = functools.cache(self._directions.is_two_way)
+        # Length [m], and whether somebody may overtake on it.
+        self._known_lane = functools.cache(
+            lambda lane: (float(length(lane)) if lane else 0.0, self._directions.is_two_way(lane))
+        )
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
         self._certainly_hidden = view.sight.hidden_distance(view.fog.minimum_extinction, _BRIGHTEST)
@@ -178,8 +180,8 @@ class JunctionSight:
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `_ALONG_A_LANE` (`speed` [m/s])."""
         lane = self._lane(driver)
-        length = self._lane_length(lane)
-        if length < _LONG_LANE or (self._is_two_way(lane) and self._directions.is_against(driver, lane)):
+        length, is_two_way = self._known_lane(lane)
+        if length < _LONG_LANE or (is_two_way and self._directions.is_against(driver, lane)):
             return False
         fastest = speed + _FASTEST_GAIN
         reach = _STANDING_REACH + fastest * (self._reaction_time + 2.0 * _MAX_PAUSE + _ALONG_A_LANE)

@@ -282,7 +282,10 @@ class Perception:
         followers, leaders, ways = zip(*near, strict=True) if near else ((), (), ())
         speeds = zip(map(speed, followers), map(speed, leaders), ways, strict=True)
         # Until the gap could have changed by so much.
-        pauses = [min(way / (abs(other - own) + _CLOSING), MAX_PAUSE) for own, other, way in speeds]
+        pauses = [
+            pause if (pause := way / (abs(other - own) + _CLOSING)) < MAX_PAUSE else MAX_PAUSE
+            for own, other, way in speeds
+        ]
         if doubtful:
             pauses += self._decide_by_sight(doubtful, own_lamps)
         self._due.schedule(calm, MAX_PAUSE)

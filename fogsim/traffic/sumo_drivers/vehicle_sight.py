@@ -272,7 +272,7 @@ class VehicleSight:
         depths = self._fog.optical_depth(eyes, lines[:, END:LINE]) if known is None else known * looks[0]
         # Mostly the body is seen, whatever lamps are lit.
         seen = np.asarray(depths <= self._sight.depth_limits(looks))
-        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)}
+        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)} if own_lamps else ()
         if dazzling:
             seen &= [observer not in dazzling for observer, _ in pairs]
         doubtful = (~seen).nonzero()[0]

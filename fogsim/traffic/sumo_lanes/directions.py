@@ -34,6 +34,7 @@ class LaneDirections:
         self._angle = vehicle_getter(api, "getAngle")
         self._lane_angle = getter(api, "lane", "getAngle")
         self._distance, self._length = vehicle_getter(api, "getDistance"), getter(api, "lane", "getLength")
+        self._lane, self._station = vehicle_getter(api, "getLaneID"), vehicle_getter(api, "getLanePosition")
         self._opposite = OppositeEdges(api)
         self._known: dict[str, tuple[str, bool]] = {}
 
@@ -59,7 +60,7 @@ class LaneDirections:
         return edge.startswith(":") or bool(self._opposite.of(edge))
 
     def _turns_back(self, vehicle: str, lane: str) -> bool:
-        turn = self._angle(vehicle) - self._lane_angle(lane, self._get.getLanePosition(vehicle))
+        turn = self._angle(vehicle) - self._lane_angle(lane, self._station(vehicle))
         if math.cos(math.radians(turn)) >= 0.0:
             return False
         # The angle of a long vehicle is that of the chord between its ends, whatever its lane does.
@@ -69,7 +70,7 @@ class LaneDirections:
     def driven(self, vehicle: str, lane: str | None = None) -> float:
         """Distance that a vehicle has driven [m]; SUMO's own jumps where it overtakes on the oncoming lane."""
         distance = float(self._distance(vehicle))
-        lane = self._get.getLaneID(vehicle) if lane is None else lane
+        lane = self._lane(vehicle) if lane is None else lane
         if self.is_against(vehicle, lane):
-            distance += float(self._length(lane)) - 2.0 * float(self._get.getLanePosition(vehicle))
+            distance += float(self._length(lane)) - 2.0 * float(self._station(vehicle))
         return distance

@@ -124,11 +124,12 @@ class LongBodies:
     def _bend(
         self, state: TrafficState, row: int, sections: tuple[_Section, ...]
     ) -> "tuple[int, tuple[_Section, ...], list[_Point]] | None":
-        x, y, z = state.position[row].tolist()
-        joints = self._joints(state.ids[row], state.lane[row], sections, (x, y, z))
+        joints = self._joints(state.ids[row], state.lane[row], sections, state.position[row])
         return None if joints is None else (row, sections, joints)
 
-    def _joints(self, vehicle: str, lane: str, sections: tuple[_Section, ...], front: _Point) -> list[_Point] | None:
+    def _joints(
+        self, vehicle: str, lane: str, sections: tuple[_Section, ...], front: Sequence[float] | NDArray[np.float64]
+    ) -> list[_Point] | None:
         """Where sections begin and end, one after another [m]; None if they are in a straight line as one body."""
         if not lane or self._directions.is_against(vehicle, lane):
             return None
@@ -139,7 +140,7 @@ class LongBodies:
         lanes = self._lanes_behind(vehicle, lane, sections[-1].end - station)
         # Vehicles need not be in the middle of their lanes, and glide from one lane to another.
         x, y, z = self._point(lanes, station)
-        aside = front[0] - x, front[1] - y, front[2] - z
+        aside = float(front[0]) - x, float(front[1]) - y, float(front[2]) - z
         joints = [self._point(lanes, station - s) for section in sections for s in section[1:]]
         joints = [(x + aside[0], y + aside[1], z + aside[2]) for x, y, z in joints]
         return None if may_be_rigid and _are_in_line(joints) else joints

@@ -33,7 +33,9 @@ class LightsAhead:
 
     def next_of(self, vehicle: str) -> Light | None:
         """The next light of a vehicle; None without one."""
-        lights = self._lights(vehicle) if self._has_lights else ()
+        if not self._has_lights:
+            return None
+        lights = self._lights(vehicle)
         light: Light | None = next((one for one in lights if one[1] >= 0 and one[3] in SIGNAL_COLOURS), None)
         if light is None or not self._directions.is_against(vehicle, lane := self._lane(vehicle)):
             return light

@@ -47,13 +47,20 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
 
     Takes `extinctions` (m,) [1/m].
     """
-    luminance, noise = bins.luminance, bins.noise
-    strips, count = luminance.shape
+    strips, count = bins.luminance.shape
     best, best_k, best_airlight = np.inf, extinctions[0], prior.airlight
     scale = (_GRAINY * prior.airlight) ** 2
     stride = max(count // 36, 1)
     value = np.empty((count + stride - 1) // stride)
-    base = np.ones(value.size)
+    base, place, seen = np.ones(value.size), np.empty(strips * value.size, np.int64), 0
+    luminance, noise = np.empty(place.size), np.empty(place.size)
+    for strip in range(strips):
+        for j in range(value.size):
+            if bins.noise[strip, j * stride] > 0.0:
+                luminance[seen], noise[seen] = bins.luminance[strip, j * stride], bins.noise[strip, j * stride]
+                place[seen] = j
+                seen += 1
+    before, left, spread, weight = np.empty(seen), np.empty(seen), np.empty(seen), np.empty(seen)
     for k in extinctions:
         darker, likely = darkness_by_sky(prior, k, bins.eye)
         level, on = eye_level(k, bins.eye, bins.darker.shape[0]) if darker > 0.0 else (0, 0.0)
@@ -62,30 +69,37 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
             value[j], _, _ = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[0, i], k)
             if darker > 0.0:
                 base[j] = 1.0 - darker * darkening(bins, i, level, on, prior.shift)[0] * (1.0 - value[j])
-        airlight, drop, total, product, apart = likely, 0.0, 0.0, 1.0, 0.0
+        for i in range(seen):
+            before[i], left[i] = base[place[i]], value[place[i]]
+            spread[i] = noise[i] + scale * (left[i] ** 2 + 0.02)
+        airlight, drop = likely, 0.0
         for iteration in range(4):
-            s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
-            for strip in range(strips):
-                for j in range(value.size):
-                    i = j * stride
-                    if noise[strip, i] <= 0.0:
-                        continue
-                    t, spread = value[j], noise[strip, i] + scale * (value[j] ** 2 + 0.02)
-                    rest = luminance[strip, i] - airlight * base[j] - drop * t
-                    weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
-                    if iteration == 3:
-                        total, product = with_factor(total, product, 1.0 + rest * rest / spread)
-                    y, one = luminance[strip, i] - likely * base[j], base[j]
-                    s0, s1, s2 = s0 + weight * one * one, s1 + weight * one * t, s2 + weight * t * t
-                    r0, r1 = r0 + weight * one * y, r1 + weight * t * y
+            # In a loop of its own, which is vectorised, for these are divisions.
+            for i in range(seen):
+                rest = luminance[i] - airlight * before[i] - drop * left[i]
+                weight[i] = 1.0 / (spread[i] + rest * rest) if iteration else 1.0 / spread[i]
             off = airlight - likely
             known = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
-            apart, s0 = known * off * off, s0 + known
+            apart = known * off * off
+            if iteration == 3:
+                total, product = 0.0, 1.0
+                for i in range(seen):
+                    rest = luminance[i] - airlight * before[i] - drop * left[i]
+                    total, product = with_factor(total, product, 1.0 + rest * rest / spread[i])
+                total += math.log(product) + apart
+                if not total < best:
+                    break
+                best, best_k = total, k
+            s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
+            for i in range(seen):
+                y, one, t = luminance[i] - likely * before[i], before[i], left[i]
+                s0, s1, s2 = s0 + weight[i] * one * one, s1 + weight[i] * one * t, s2 + weight[i] * t * t
+                r0, r1 = r0 + weight[i] * one * y, r1 + weight[i] * t * y
+            s0 += known
             determinant = max(s0 * s2 - s1 * s1, 1e-12)
             airlight = likely + (s2 * r0 - s1 * r1) / determinant
             drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
             drop = max(drop, -airlight)
-        total += math.log(product) + apart
-        if total < best:
-            best, best_k, best_airlight = total, k, airlight
+            if iteration == 3:
+                best_airlight = airlight
     return best_k, best_airlight

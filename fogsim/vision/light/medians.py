@@ -161,4 +161,5 @@ def quantile_among(values: NDArray[np.floating[Any]], share: float) -> float:
     _put_in_place(values, below)
     lower = float(values[below])
     upper = float(values[below + 1 :].min()) if below + 1 < values.size else lower
-    return lower + (place - below) * (upper - lower)
+    share = place - below
+    return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)

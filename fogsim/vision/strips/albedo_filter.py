@@ -214,6 +214,40 @@ def with_factor(logarithm: float, product: float, factor: float) -> tuple[float,
 
 
 @kernel
+def _mark_outliers(
+    columns: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    veil: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    changes: NDArray[np.float64],
+    i: int,
+    airlight: float,
+    joint: NDArray[np.float64],
+    line: NDArray[np.float64],
+    used: NDArray[np.uint8],
+) -> None:
+    """Note which strips show road on one bin: all by what lies nearer, so that none comes before another."""
+    size = joint.shape[0]
+    for strip in range(used.shape[0]):
+        first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes, i)
+        for j in (0, 2, 3, first, first + 1, size):
+            line[j] = _shown(joint, shares, first, j)
+        innovation, total = columns[strip, i, 0] - line[size], _variance(line, shares, first) + noise[strip, i]
+        used[strip, i] = USED if innovation * innovation <= _OUTLIER**2 * total else 0
+
+
+@kernel
+def _learn(joint: NDArray[np.float64], line: NDArray[np.float64], total: float, gain: NDArray[np.float64]) -> None:
+    """Condition states on a bin, from its covariance with them and its variance; `gain` is room."""
+    # Named tuples of arrays would be counted by reference, bin by bin; and divisions apart are vectorised.
+    for a in range(gain.size):
+        gain[a] = line[a] / total
+    for a in range(gain.size):
+        for j in range(joint.shape[1]):
+            joint[a, j] -= gain[a] * line[j]
+
+
+@kernel
 def whiten(
     residuals: Residuals, changes: NDArray[np.float64], albedo: Albedo, airlight: float, reject: bool, out: Whitened
 ) -> float:
@@ -230,13 +264,8 @@ def whiten(
     for i in range(count):
         if i:
             _predict(joint, kept, changes, i, albedo)
-        # All by what lies nearer, so that no strip comes before another.
-        for strip in range(strips if reject else 0):
-            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes, i)
-            for j in (0, 2, 3, first, first + 1, size):
-                line[j] = _shown(joint, shares, first, j)
-            innovation, total = columns[strip, i, 0] - line[size], _variance(line, shares, first) + noise[strip, i]
-            used[strip, i] = USED if innovation * innovation <= _OUTLIER**2 * total else 0
+        if reject:
+            _mark_outliers(columns, scale, veil, noise, changes, i, airlight, joint, line, used)
         for strip in range(strips):
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
@@ -253,11 +282,7 @@ def whiten(
             for j in range(width):
                 line[size + j] -= columns[strip, i, j]
                 out.innovations[strip, i, j] = -line[size + j] * weight
-            for a in range(size):
-                gain[a] = line[a] / total
-            for a in range(size):
-                for j in range(joint.shape[1]):
-                    joint[a, j] -= gain[a] * line[j]
+            _learn(joint, line, total, gain)
     out.constants[:] = joint[_FIRST::2, size : size + width]
     return log_determinant + math.log(product)
 

@@ -109,7 +109,7 @@ def _block_means(
             row_luminance(image.pixels[:, blocks[i] * width : (blocks[i] + 1) * width], image.tables, row, line)
             total = 0.0
             for value in line:
-                total += value
+                total += float(value)
             means[row - first, i] = total / width
     return means
 

@@ -154,7 +154,7 @@ class JointRoad:
     ) -> None:
         self._camera, self._check, self._even_airlight = camera, ObservationCheck(camera), even_airlight
         self._horizon = calibrated_horizon(camera, pitch_deviation)
-        self._impossible = why_no_road(camera)
+        self._impossible, self._unseen = why_no_road(camera), unseen_course(camera, self._horizon)
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
         self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
@@ -340,10 +340,9 @@ class JointRoad:
         A straight road's horizon is weighed with the point in which its lines meet.
         """
         seen = seen_lines(pixels, self._camera, self._horizon)
-        unseen = unseen_course(self._camera, self._horizon)
         if seen is None:
-            return self._horizon, unseen, 0
-        course = road_course(seen, pixels, self._camera, self._horizon) or unseen
+            return self._horizon, self._unseen, 0
+        course = road_course(seen, pixels, self._camera, self._horizon) or self._unseen
         if not course.is_straight:
             return course.horizon, course, None
         point = vanishing_point_of(seen, self._camera, self._horizon)

@@ -74,10 +74,14 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     middles = (np.arange(camera.width // per_block) + 0.5) * per_block
     aside = np.flatnonzero(np.abs(middles - camera.principal_point[0]) > _OWN_LANE * camera.width)
     sky = _block_means(pixels, top, last, per_block, aside)
-    airlight = quantile(sky, _BRIGHTEST) if aside.size else 0.0
+    brightest = sky.max(initial=0.0)
+    # With the airlight, which is no brighter, less is dark.
+    if not brightest > 0.0 or _over(sky[first - top :], brightest).min() >= _DARKER:
+        return 0.0
+    airlight = quantile(sky, _BRIGHTEST)
     if not airlight > 0.0:
         return 0.0
-    above = (sky[first - top :] / airlight).mean(axis=0, dtype=np.float64)
+    above = _over(sky[first - top :], airlight)
     if above.min() >= _DARKER:
         return 0.0
     depth = -np.log1p(-np.clip(above, 0.0, _DARKER)) / extinction
@@ -89,18 +93,23 @@ def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, 
     return float(((counted >= _LEAST_ROWS) & (brighter > 0.5 * counted)).mean())
 
 
+def _over(sky: NDArray[np.float32], airlight: float) -> NDArray[np.float64]:
+    """Mean of each block of some rows over the airlight (blocks,) [-]."""
+    return np.asarray((sky / airlight).mean(axis=0, dtype=np.float64))
+
+
 @kernel
 def _block_means(
     image: LinearPixels, first: int, end: int, width: int, blocks: NDArray[np.int64]
 ) -> NDArray[np.float32]:
     """Mean luminance of rows of some blocks of so many columns (rows, blocks)."""
-    means, line = np.empty((end - first, blocks.size), np.float32), np.empty(image.pixels.shape[1], np.float32)
+    means, line = np.empty((end - first, blocks.size), np.float32), np.empty(width, np.float32)
     for row in range(first, end):
-        row_luminance(image.pixels, image.tables, row, line)
         for i in range(blocks.size):
+            row_luminance(image.pixels[:, blocks[i] * width : (blocks[i] + 1) * width], image.tables, row, line)
             total = 0.0
-            for value in line[blocks[i] * width : (blocks[i] + 1) * width]:
-                total += value
+            for value in line:
+                total += float(value)
             means[row - first, i] = total / width
     return means
 

@@ -11,7 +11,7 @@ from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.light.medians import median_among
+from fogsim.vision.light.medians import median_among, quantile_among
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, pixel_luminance
 
 _BRIGHT_SHARE = 0.75
@@ -85,11 +85,11 @@ def _lit(image: LinearPixels, rows: NDArray[np.int64], strips: NDArray[np.int64]
     """Which of `_SHOWN` a view's rows (n,) show, with columns of what is overhead, if any."""
     cols, above_road, road = image.pixels.shape[1], rows[:-_ROAD_ROWS], rows[-_ROAD_ROWS:]
     lane = _row_medians(image, road, strips[0])
-    sky = _ascending(image, above_road, 0, cols, _SKY_STEP)
-    above = _sorted_quantile(sky, _BRIGHT_SHARE)
+    sky = _pixels(image, above_road, 0, cols, _SKY_STEP)
+    above = quantile_among(sky, _BRIGHT_SHARE)
     if last > first:
-        overhead = _ascending(image, above_road, first, min(last, cols), 1)
-        above = min(above, _sorted_quantile(overhead, _BRIGHT_SHARE))
+        overhead = _pixels(image, above_road, first, min(last, cols), 1)
+        above = min(above, quantile_among(overhead, _BRIGHT_SHARE))
     # The median of the rows: those that are not seen count as the brightest.
     seen, dark = 0, 0
     for value in lane:
@@ -98,16 +98,16 @@ def _lit(image: LinearPixels, rows: NDArray[np.int64], strips: NDArray[np.int64]
     if dark <= lane.size // 2 < seen:
         return 1
     shining = 0
-    while shining < sky.size and sky[sky.size - 1 - shining] >= _LAMP:
-        shining += 1
-    if shining < _LAMPS_SHARE * sky.size or _sorted_quantile(sky, 0.5) >= _DARK_SKY:
+    for light in sky:
+        shining += light >= _LAMP
+    if shining < _LAMPS_SHARE * sky.size or quantile_among(sky, 0.5) >= _DARK_SKY:
         return 0
     return 2 if _has_beam(lane, _row_medians(image, road, strips[1]), _row_medians(image, road, strips[2])) else 0
 
 
 @kernel
-def _ascending(image: LinearPixels, rows: NDArray[np.int64], first: int, end: int, step: int) -> NDArray[np.float32]:
-    """Pixels in every which column from both sides inward, in ascending order: of a mirrored image the same."""
+def _pixels(image: LinearPixels, rows: NDArray[np.int64], first: int, end: int, step: int) -> NDArray[np.float32]:
+    """Pixels in every which column from both sides inward: of a mirrored image the same."""
     out, count = np.empty(rows.size * (end - first + 1), np.float32), 0
     for row in rows:
         for col in range(0, (end - first + 1) // 2, step):
@@ -116,16 +116,7 @@ def _ascending(image: LinearPixels, rows: NDArray[np.int64], first: int, end: in
         for col in range(0, (end - first) // 2, step):
             out[count] = pixel_luminance(image, row, end - 1 - col)
             count += 1
-    return np.sort(out[:count])
-
-
-@kernel
-def _sorted_quantile(values: NDArray[np.float32], share: float) -> float:
-    """What a share of ascending numbers lie below, linear between neighbours."""
-    place = share * (values.size - 1)
-    below = int(place)
-    lower, upper = float(values[below]), float(values[min(below + 1, values.size - 1)])
-    return lower + (place - below) * (upper - lower)
+    return out[:count]
 
 
 @functools.lru_cache(maxsize=8)

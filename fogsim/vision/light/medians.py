@@ -94,18 +94,20 @@ def span_medians(
 
 @kernel
 def sort_few(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Sort a few dozen numbers, which quicksort is slow for, by counting for each those that come before it.
+    """Sort a few dozen numbers, which quicksort is slow for, by counting for each those that are less.
 
     Takes `values` (n,), `out` (n,).
     """
+    out[:] = np.nan
     # 32 bits, as the numbers have: else half as many fit into a register.
     for i in range(values.size):
         value, before = values[i], np.int32(0)
         for j in range(values.size):
             before += np.int32(values[j] < value)
-        for j in range(i):
-            before += np.int32(values[j] == value)
         out[before] = value
+    # Equal ones share a place: those that they leave behind it are theirs.
+    for i in range(1, values.size):
+        out[i] = out[i - 1] if np.isnan(out[i]) else out[i]
 
 
 @kernel
@@ -116,9 +118,9 @@ def median_of_few(values: NDArray[np.float32], ordered: NDArray[np.float32]) -> 
 
 
 @kernel
-def median_among(values: NDArray[np.floating[Any]]) -> float:
-    """Median of numbers as `np.median` finds it, whose code takes half a second to compile (`values` (n,))."""
-    rest, low, high, half = values.copy(), 0, values.size - 1, values.size // 2
+def _put_in_place(rest: NDArray[np.floating[Any]], place: int) -> None:
+    """Exchange numbers until none before a place is greater than those behind it (`rest` (n,))."""
+    low, high = 0, rest.size - 1
     while low < high:
         pivot, i, j = rest[(low + high) // 2], low, high
         while i <= j:
@@ -130,15 +132,34 @@ def median_among(values: NDArray[np.floating[Any]]) -> float:
                 rest[i], rest[j] = rest[j], rest[i]
                 i += 1
                 j -= 1
-        if half <= j:
+        if place <= j:
             high = j
-        elif half >= i:
+        elif place >= i:
             low = i
         else:
             break
+
+
+@kernel
+def median_among(values: NDArray[np.floating[Any]]) -> float:
+    """Median of numbers as `np.median` finds it, whose code takes half a second to compile (`values` (n,))."""
+    rest, half = values.copy(), values.size // 2
+    _put_in_place(rest, half)
     if values.size % 2:
         return float(rest[half])
     below = rest[0]
     for i in range(1, half):
         below = max(below, rest[i])
     return float((below + rest[half]) / 2)
+
+
+@kernel
+def quantile_among(values: NDArray[np.floating[Any]], share: float) -> float:
+    """What a share of numbers lie below, linear between neighbours; their order changes (`values` (n,))."""
+    place = share * (values.size - 1)
+    below = int(place)
+    _put_in_place(values, below)
+    lower = float(values[below])
+    upper = float(values[below + 1 :].min()) if below + 1 < values.size else lower
+    share = place - below
+    return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)

@@ -57,10 +57,10 @@ def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.fl
 @kernel
 def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
     """Luminance of a pixel [linear grey levels]."""
-    total = np.float32(0.0)
-    for channel in range(image.pixels.shape[2]):
-        total += image.tables[channel, image.pixels[row, col, channel]]
-    return float(total)
+    pixels, tables = image.pixels, image.tables
+    if pixels.shape[2] == 1:
+        return float(tables[0, pixels[row, col, 0]])
+    return float(tables[0, pixels[row, col, 0]] + tables[1, pixels[row, col, 1]] + tables[2, pixels[row, col, 2]])
 
 
 @kernel
@@ -111,7 +111,10 @@ def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple
     cols, channels = pixels.shape[1], pixels.shape[2]
     each, some = np.zeros(channels), 0
     for row in rows:
-        for col in range(side, cols - side):
+        most = 0
+        for value in pixels[row].ravel()[side * channels : (cols - side) * channels]:
+            most = max(most, value)
+        for col in range(side, cols - side if most == largest else side):
             is_any = False
             for channel in range(channels):
                 is_saturated = pixels[row, col, channel] == largest

@@ -73,7 +73,7 @@ class Residuals(NamedTuple):
 class Whitened(NamedTuple):
     """What the filter makes of them."""
 
-    innovations: NDArray[np.float64]  # (strips, n, m): Over their standard deviations; 0 where a bin is not used
+    innovations: NDArray[np.float64]  # (strips, n, m): Of bins in use, over their standard deviations
     constants: NDArray[np.float64]  # (strips, m): What each column says of the strips' constants
     used: NDArray[np.uint8]  # (strips, n) uint8: `USED`, `HIDDEN` or 0
 
@@ -117,14 +117,16 @@ _WHOLE = 8
 
 @kernel
 def _predict(
-    joint: NDArray[np.float64], kept: NDArray[np.float64], change: NDArray[np.float64], albedo: Albedo
+    joint: NDArray[np.float64], kept: NDArray[np.float64], changes: NDArray[np.float64], i: int, albedo: Albedo
 ) -> None:
     """Predict drift (states 0, 1: value, slope), uneven airlight (3) and patches (5, 7, …) a step farther.
 
     What of each column stays is written down; of others than these it is 1.
     """
-    f00, f01, f10, f11, keep, cloud = change[0], change[1], change[2], change[3], change[4], change[7]
-    size, kept[_FIRST - 1] = joint.shape[0], cloud
+    f00, f01, f10, f11 = changes[i, 0], changes[i, 1], changes[i, 2], changes[i, 3]
+    keep, cloud = changes[i, 4], changes[i, 7]
+    size = joint.shape[0]
+    kept[_FIRST - 1] = cloud
     for a in range(_FIRST + 1, size, 2):
         kept[a] = keep
     for j in range(joint.shape[1]):
@@ -178,18 +180,22 @@ class Shares(NamedTuple):
 
 
 @kernel
-def _shares(scale: float, veil: float, airlight: float, change: NDArray[np.float64]) -> Shares:
-    return Shares(scale * change[5], (airlight - veil) * change[8], veil, scale, scale * change[6])
+def _shares(scale: float, veil: float, airlight: float, changes: NDArray[np.float64], i: int) -> Shares:
+    return Shares(scale * changes[i, 5], (airlight - veil) * changes[i, 8], veil, scale, scale * changes[i, 6])
 
 
 @kernel
-def _show(joint: NDArray[np.float64], shares: Shares, strip: int, out: NDArray[np.float64]) -> float:
-    """What a bin shows of states: its covariance with all, and its mean under each column; returns its variance."""
-    for j in range(out.size):
-        total = joint[0, j] * shares.drift + joint[2, j] * shares.sheen + joint[3, j] * shares.cloud
-        out[j] = total + joint[strip, j] * shares.constant + joint[strip + 1, j] * shares.patches
-    total = out[0] * shares.drift + out[2] * shares.sheen + out[3] * shares.cloud
-    return float(total + out[strip] * shares.constant + out[strip + 1] * shares.patches)
+def _shown(joint: NDArray[np.float64], shares: Shares, strip: int, j: int) -> float:
+    """What a bin shows of states: its covariance with one, or its mean under a column."""
+    total = joint[0, j] * shares.drift + joint[2, j] * shares.sheen + joint[3, j] * shares.cloud
+    return float(total + joint[strip, j] * shares.constant + joint[strip + 1, j] * shares.patches)
+
+
+@kernel
+def _variance(line: NDArray[np.float64], shares: Shares, strip: int) -> float:
+    """Variance of what a bin shows of states, from its covariances with them."""
+    total = line[0] * shares.drift + line[2] * shares.sheen + line[3] * shares.cloud
+    return float(total + line[strip] * shares.constant + line[strip + 1] * shares.patches)
 
 
 @kernel
@@ -209,21 +215,36 @@ def with_factor(logarithm: float, product: float, factor: float) -> tuple[float,
 
 @kernel
 def _mark_outliers(
-    residuals: Residuals,
+    columns: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    veil: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    changes: NDArray[np.float64],
     i: int,
-    change: NDArray[np.float64],
     airlight: float,
     joint: NDArray[np.float64],
-    room: NDArray[np.float64],
+    line: NDArray[np.float64],
     used: NDArray[np.uint8],
 ) -> None:
     """Note which strips show road on one bin: all by what lies nearer, so that none comes before another."""
+    size = joint.shape[0]
     for strip in range(used.shape[0]):
-        shares = _shares(residuals.scale[strip, i], residuals.veil[strip, i], airlight, change)
-        total = _show(joint, shares, _FIRST + 2 * strip, room)
-        innovation = residuals.columns[strip, i, 0] - room[joint.shape[0]]
-        is_road = innovation * innovation <= _OUTLIER**2 * (total + residuals.noise[strip, i])
-        used[strip, i] = USED if is_road else 0
+        first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes, i)
+        for j in (0, 2, 3, first, first + 1, size):
+            line[j] = _shown(joint, shares, first, j)
+        innovation, total = columns[strip, i, 0] - line[size], _variance(line, shares, first) + noise[strip, i]
+        used[strip, i] = USED if innovation * innovation <= _OUTLIER**2 * total else 0
+
+
+@kernel
+def _learn(joint: NDArray[np.float64], line: NDArray[np.float64], total: float, gain: NDArray[np.float64]) -> None:
+    """Condition states on a bin, from its covariance with them and its variance; `gain` is room."""
+    # Named tuples of arrays would be counted by reference, bin by bin; and divisions apart are vectorised.
+    for a in range(gain.size):
+        gain[a] = line[a] / total
+    for a in range(gain.size):
+        for j in range(joint.shape[1]):
+            joint[a, j] -= gain[a] * line[j]
 
 
 @kernel
@@ -238,31 +259,30 @@ def whiten(
     strips, count, width = columns.shape
     joint, used = _begun(strips, width, albedo), out.used
     size, line, kept = joint.shape[0], np.empty(joint.shape[1]), np.ones(joint.shape[1])
+    gain = np.empty(size)
     log_determinant, product = 0.0, 1.0
     for i in range(count):
         if i:
-            _predict(joint, kept, changes[i], albedo)
+            _predict(joint, kept, changes, i, albedo)
         if reject:
-            _mark_outliers(residuals, i, changes[i], airlight, joint, line, used)
+            _mark_outliers(columns, scale, veil, noise, changes, i, airlight, joint, line, used)
         for strip in range(strips):
-            out.innovations[strip, i, :] = 0.0
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
                 continue
             if used[strip, i] != USED:
                 log_determinant += _cost_without(used[strip, i], noise[strip, i], airlight)
                 continue
-            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
-            total = _show(joint, shares, first, line) + noise[strip, i]
+            first, shares = _FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes, i)
+            for j in range(line.size):
+                line[j] = _shown(joint, shares, first, j)
+            total = _variance(line, shares, first) + noise[strip, i]
             log_determinant, product = with_factor(log_determinant, product, total)
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
                 line[size + j] -= columns[strip, i, j]
                 out.innovations[strip, i, j] = -line[size + j] * weight
-            for a in range(size):
-                share = line[a] / total
-                for j in range(joint.shape[1]):
-                    joint[a, j] -= share * line[j]
+            _learn(joint, line, total, gain)
     out.constants[:] = joint[_FIRST::2, size : size + width]
     return log_determinant + math.log(product)
 

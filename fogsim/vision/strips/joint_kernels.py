@@ -174,10 +174,12 @@ def eye_level(k: float, eye: float, levels: int) -> tuple[int, float]:
 
 
 @kernel
-def darkening(bins: Bins, i: int, level: int, on: float, shift: float) -> tuple[float, float, float]:
+def darkening(
+    darker: NDArray[np.float64], darker_by_row: NDArray[np.float64], i: int, level: int, on: float, shift: float
+) -> tuple[float, float, float]:
     """How the airlight darkens toward a bin, with its derivatives by the logarithm of k and by the horizon's row."""
-    low, high = bins.darker[level, i], bins.darker[level + 1, i]
-    by_row = bins.darker_by_row[level, i] * (1.0 - on) + bins.darker_by_row[level + 1, i] * on
+    low, high = darker[level, i], darker[level + 1, i]
+    by_row = darker_by_row[level, i] * (1.0 - on) + darker_by_row[level + 1, i] * on
     return low + on * (high - low) + shift * by_row, (high - low) / DEPTH_STEP, by_row
 
 
@@ -193,7 +195,7 @@ def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float, d
             value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
             before = airlight
             if darker > 0.0:
-                before *= 1.0 - darker * darkening(bins, i, level, on, shift)[0]
+                before *= 1.0 - darker * darkening(bins.darker, bins.darker_by_row, i, level, on, shift)[0]
             found[count] = before + (bins.luminance[strip, i] - before) / max(value, 1e-6)
             count += 1
     return median_among(found[:count]) if count else 0.0
@@ -215,7 +217,7 @@ def _linearise(bins: Bins, strip: int, theta: NDArray[np.float64], road: float, 
         columns[i, 2] = (1.0 - value) * open_part
         columns[i, 3] = drop * by_shift * open_part
         if not is_even:
-            darker, by_log, by_row = darkening(bins, i, level, on, theta[2])
+            darker, by_log, by_row = darkening(bins.darker, bins.darker_by_row, i, level, on, theta[2])
             lost, missing = 1.0 - value, theta[1] * theta[4] * open_part
             bright -= theta[1] * theta[4] * darker * lost
             columns[i, 1] -= missing * (by_log / max(theta[0], 1e-5) * lost - darker * by_k)

@@ -40,6 +40,58 @@ def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, flo
 
 
 @kernel
+def _seen(bins: Bins, stride: int) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of every so many bins with data: which of these they are, luminance and noise, strip by strip."""
+    strips, count = bins.luminance.shape
+    luminance, noise = np.empty(strips * count), np.empty(strips * count)
+    place, seen = np.empty(strips * count, np.int64), 0
+    for strip in range(strips):
+        for i in range(0, count, stride):
+            if bins.noise[strip, i] > 0.0:
+                place[seen], luminance[seen], noise[seen] = i // stride, bins.luminance[strip, i], bins.noise[strip, i]
+                seen += 1
+    return place[:seen], luminance[:seen], noise[:seen]
+
+
+@kernel
+def _cost(
+    luminance: NDArray[np.float64],
+    base: NDArray[np.float64],
+    left: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    airlight: float,
+    drop: float,
+) -> float:
+    """Minus the logarithm of Cauchy's law of the residuals."""
+    total, product = 0.0, 1.0
+    for i in range(luminance.size):
+        rest = luminance[i] - airlight * base[i] - drop * left[i]
+        total, product = with_factor(total, product, 1.0 + rest * rest / spread[i])
+    return total + math.log(product)
+
+
+@kernel
+def _weighted_line(
+    luminance: NDArray[np.float64],
+    base: NDArray[np.float64],
+    left: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    likely: float,
+    known: float,
+) -> tuple[float, float]:
+    """Airlight and drop of least squares, the former known about a likely one."""
+    s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(luminance.size):
+        y, one, t = luminance[i] - likely * base[i], base[i], left[i]
+        s0, s1, s2 = s0 + weight[i] * one * one, s1 + weight[i] * one * t, s2 + weight[i] * t * t
+        r0, r1 = r0 + weight[i] * one * y, r1 + weight[i] * t * y
+    s0 += known
+    determinant = max(s0 * s2 - s1 * s1, 1e-12)
+    airlight = likely + (s2 * r0 - s1 * r1) / determinant
+    return airlight, max(min((s0 * r1 - s1 * r0) / determinant, 0.0), -airlight)
+
+
+@kernel
 def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: JointPrior) -> tuple[float, float]:
     """Extinction and airlight that best fit all strips as one road of constant albedo, in Cauchy's norm.
 
@@ -47,13 +99,18 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
 
     Takes `extinctions` (m,) [1/m].
     """
-    luminance, noise = bins.luminance, bins.noise
-    strips, count = luminance.shape
     best, best_k, best_airlight = np.inf, extinctions[0], prior.airlight
     scale = (_GRAINY * prior.airlight) ** 2
-    stride = max(count // 36, 1)
-    value = np.empty((count + stride - 1) // stride)
-    base = np.ones(value.size)
+    stride = max(bins.below.size // 36, 1)
+    place, luminance, noise = _seen(bins, stride)
+    value = np.empty((bins.below.size + stride - 1) // stride)
+    clear = np.ones(value.size)
+    base, left, spread, weight = (
+        np.empty(place.size),
+        np.empty(place.size),
+        np.empty(place.size),
+        np.empty(place.size),
+    )
     for k in extinctions:
         darker, likely = darkness_by_sky(prior, k, bins.eye)
         level, on = eye_level(k, bins.eye, bins.darker.shape[0]) if darker > 0.0 else (0, 0.0)
@@ -61,31 +118,24 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
             i = j * stride
             value[j], _, _ = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[0, i], k)
             if darker > 0.0:
-                base[j] = 1.0 - darker * darkening(bins, i, level, on, prior.shift)[0] * (1.0 - value[j])
-        airlight, drop, total, product, apart = likely, 0.0, 0.0, 1.0, 0.0
+                by_bin = darkening(bins.darker, bins.darker_by_row, i, level, on, prior.shift)
+                clear[j] = 1.0 - darker * by_bin[0] * (1.0 - value[j])
+        for i in range(place.size):
+            base[i], left[i] = clear[place[i]], value[place[i]]
+            spread[i] = noise[i] + scale * (left[i] ** 2 + 0.02)
+        airlight, drop = likely, 0.0
         for iteration in range(4):
-            s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
-            for strip in range(strips):
-                for j in range(value.size):
-                    i = j * stride
-                    if noise[strip, i] <= 0.0:
-                        continue
-                    t, spread = value[j], noise[strip, i] + scale * (value[j] ** 2 + 0.02)
-                    rest = luminance[strip, i] - airlight * base[j] - drop * t
-                    weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
-                    if iteration == 3:
-                        total, product = with_factor(total, product, 1.0 + rest * rest / spread)
-                    y, one = luminance[strip, i] - likely * base[j], base[j]
-                    s0, s1, s2 = s0 + weight * one * one, s1 + weight * one * t, s2 + weight * t * t
-                    r0, r1 = r0 + weight * one * y, r1 + weight * t * y
             off = airlight - likely
             known = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
-            apart, s0 = known * off * off, s0 + known
-            determinant = max(s0 * s2 - s1 * s1, 1e-12)
-            airlight = likely + (s2 * r0 - s1 * r1) / determinant
-            drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
-            drop = max(drop, -airlight)
-        total += math.log(product) + apart
-        if total < best:
-            best, best_k, best_airlight = total, k, airlight
+            if iteration == 3:
+                total = _cost(luminance, base, left, spread, airlight, drop) + known * off * off
+                if not total < best:
+                    break
+                best, best_k = total, k
+            # In a loop of its own, which is vectorised, for these are divisions.
+            for i in range(place.size):
+                rest = luminance[i] - airlight * base[i] - drop * left[i]
+                weight[i] = 1.0 / (spread[i] + rest * rest) if iteration else 1.0 / spread[i]
+            airlight, drop = _weighted_line(luminance, base, left, weight, likely, known)
+            best_airlight = airlight if iteration == 3 else best_airlight
     return best_k, best_airlight

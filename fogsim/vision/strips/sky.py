@@ -57,12 +57,14 @@ def sky_rows(
         centre, kept = float(ordered[count // 2 if has_sun else count - 1 - count // _SKY_SHARE]), 0
         reach = max(2.5 * floor, _SKY_WIDTH * centre)
         for _ in range(4):
-            total, kept = 0.0, 0
+            total, kept, before = 0.0, 0, centre
             for value in ordered:
                 if abs(float(value) - centre) <= reach:
                     total += float(value)
                     kept += 1
             centre = total / kept
+            if centre == before:
+                break
         bright[i], share[i] = centre, kept / count
     return bright, share
 
@@ -159,15 +161,17 @@ def sky_shading(
     """
     cols, count = image.pixels.shape[1], _SHADING_COLS
     level = median_among(bright)
-    height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
+    height = (axis[2] - rows) / axis[3]
     found = np.array([level, 0.0, 0.0, 0.0, 0.0])
     covariance: NDArray[np.float64] = np.eye(5)
-    seen, aside = np.empty((rows.size, count)), np.empty(count)
+    seen, off, aside = np.empty((rows.size, count)), np.empty((rows.size, count)), np.empty(count)
     for j in range(count):
         col = even_column(j, count, -0.5, cols - 0.5)
         aside[j] = (col - axis[0]) / axis[3]
         for i in range(rows.size):
             seen[i, j] = pixel_luminance(image, rows[i], col)
+            y = (axis[1] - rows[i]) / axis[3]
+            off[i, j] = 1.0 - 1.0 / (1.0 + aside[j] * aside[j] + y * y) ** 2
     number = 0
     for relative in _SHADING_SCALES:
         spread = (relative * level) ** 2 + (2.0 * noise) ** 2
@@ -176,19 +180,19 @@ def sky_shading(
         bend = _LEAST_BEND + _BENDING * abs(found[2]) / level
         for a, deviation in ((1, _TILT), (2, _BRIGHTENING), (3, bend), (4, _VIGNETTING)):
             normal[a, a] = spread / (deviation * level) ** 2
-        number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
+        number, squares = _add_sky(seen, off, aside, height, found, spread, normal, right)
         inverse = inverse_of(normal)
         found = times(inverse, right)
         covariance = inverse * (_ALIKE * max(squares / max(number, 1), noise * noise))
-    return found, covariance, number / seen.size, _scatter(seen, aside, height, above_axis, found, noise)
+    return found, covariance, number / seen.size, _scatter(seen, off, aside, height, found, noise)
 
 
 @kernel
 def _scatter(
     seen: NDArray[np.float64],
+    off: NDArray[np.float64],
     aside: NDArray[np.float64],
     height: NDArray[np.float64],
-    above_axis: NDArray[np.float64],
     found: NDArray[np.float64],
     noise: float,
 ) -> float:
@@ -196,23 +200,22 @@ def _scatter(
     apart = np.empty(seen.size)
     for i in range(height.size):
         for j in range(aside.size):
-            apart[i * aside.size + j] = abs(seen[i, j] - _shaded(aside[j], height[i], above_axis[i], found))
+            apart[i * aside.size + j] = abs(seen[i, j] - _shaded(aside[j], height[i], off[i, j], found))
     return math.sqrt(max((1.4826 * median_among(apart)) ** 2 - noise * noise, 0.0))
 
 
 @kernel
-def _shaded(x: float, height: float, y: float, found: NDArray[np.float64]) -> float:
-    """Luminance of a sky of some shading at a place."""
-    off = 1.0 - 1.0 / (1.0 + x * x + y * y) ** 2
+def _shaded(x: float, height: float, off: float, found: NDArray[np.float64]) -> float:
+    """Luminance of a sky of some shading at a place (`off` 1 − cos⁴ of its angle to the camera's axis)."""
     return float(found[0] + found[1] * x + (found[2] + found[3] * height) * height - found[4] * off)
 
 
 @kernel
 def _add_sky(
     seen: NDArray[np.float64],
+    off: NDArray[np.float64],
     aside: NDArray[np.float64],
     height: NDArray[np.float64],
-    above_axis: NDArray[np.float64],
     found: NDArray[np.float64],
     spread: float,
     normal: NDArray[np.float64],
@@ -220,20 +223,24 @@ def _add_sky(
 ) -> tuple[int, float]:
     """Add pixels to the normal equations of a sky's shading; returns how many lie near, and their squares."""
     number, squares, shapes = 0, 0.0, np.ones(5)
+    square, weight = np.empty(aside.size), np.empty(aside.size)
     for i in range(height.size):
-        y = above_axis[i]
+        # In a loop of its own, which is vectorised, for these are divisions.
         for j in range(aside.size):
-            off = 1.0 - 1.0 / (1.0 + aside[j] * aside[j] + y * y) ** 2
-            rest = seen[i, j] - _shaded(aside[j], height[i], y, found)
-            if rest * rest < 4.0 * spread:
+            rest = seen[i, j] - _shaded(aside[j], height[i], off[i, j], found)
+            square[j] = rest * rest
+            weight[j] = 1.0 / (1.0 + square[j] / spread) ** 2
+        shapes[2], shapes[3] = height[i], height[i] ** 2
+        for j in range(aside.size):
+            if square[j] < 4.0 * spread:
                 number += 1
-                squares += rest * rest
-            weight = 1.0 / (1.0 + rest * rest / spread) ** 2
-            shapes[1], shapes[2], shapes[3], shapes[4] = aside[j], height[i], height[i] ** 2, -off
+                squares += square[j]
+            shapes[1], shapes[4] = aside[j], -off[i, j]
             for a in range(5):
-                right[a] += weight * seen[i, j] * shapes[a]
+                share = weight[j] * shapes[a]
+                right[a] += weight[j] * seen[i, j] * shapes[a]
                 for b in range(a, 5):
-                    normal[a, b] += weight * shapes[a] * shapes[b]
+                    normal[a, b] += share * shapes[b]
     for a in range(5):
         for b in range(a):
             normal[a, b] = normal[b, a]

@@ -115,9 +115,12 @@ def _along(curves: StripCurves, road: _Road, prior: JointPrior, start: tuple[flo
     out = np.empty((len(tries), 4))
     for i in range(len(tries)):
         piece, curvature, over = int(tries[i, 0]), tries[i, 1], int(tries[i, 2])
-        around, sag, cost = _around(road.ahead, road.before, prior, piece, curvature)
-        shift = road.seen_from.horizon + around.shift - road.seen_from.horizon
-        bins = thinned_bins(curves, lay_along(road.straight, road.seen_from, shift, sag, road.bend, road.sides), around)
+        # Tries of one course follow one another.
+        if i == 0 or piece != int(tries[i - 1, 0]) or curvature != tries[i - 1, 1]:
+            around, sag, cost = _around(road.ahead, road.before, prior, piece, curvature)
+            shift = road.seen_from.horizon + around.shift - road.seen_from.horizon
+            along = lay_along(road.straight, road.seen_from, shift, sag, road.bend, road.sides)
+            bins = thinned_bins(curves, along, around)
         one = _EVERY[over]
         albedo = Albedo(one[0], one[1], one[2], one[3], one[4], one[5], 0.0)
         fog = even_fog_over(bins, albedo, around, (start[0], start[1], around.shift), _CHANCES[over])

@@ -201,21 +201,26 @@ def _neighbouring(light: NDArray[np.float32], about: float, noise: float, axis: 
 @kernel
 def _mean(part: NDArray[np.float32], about: float, noise: float) -> float:
     """Mean of the pixels of the sky in a part; NaN if too few are."""
-    middle, core = about, np.empty(part.size, np.float32)
+    core, count = np.empty(part.size, np.float32), 0
+    reach, least = np.float32(_ALIKE * about + 4.0 * noise), max(_LEAST_SEEN * part.size, 1.0)
+    for row in range(part.shape[0]):
+        for col in range(part.shape[1]):
+            core[count] = part[row, col]
+            count += abs(part[row, col] - np.float32(about)) <= reach
+    if count < least:
+        return np.nan
+    middle = float(np.float32(median_among(core[:count])))
     # What is cut off about a first middle is lopsided, so that it is looked for again about the next.
-    for step in range(3):
-        reach = np.float32((_ALIKE * about + 4.0 * noise, max(4.0 * noise, 1.0), max(3.0 * noise, 1.0))[step])
+    for reach in (np.float32(max(4.0 * noise, 1.0)), np.float32(max(3.0 * noise, 1.0))):
         count, total = 0, 0.0
         for row in range(part.shape[0]):
             for col in range(part.shape[1]):
-                value = part[row, col]
-                if abs(value - np.float32(middle)) <= reach:
-                    core[count] = value
-                    total += float(value)
+                if abs(part[row, col] - np.float32(middle)) <= reach:
+                    total += float(part[row, col])
                     count += 1
-        if count < max(_LEAST_SEEN * part.size, 1.0):
+        if count < least:
             return np.nan
-        middle = float(np.float32(median_among(core[:count]))) if step == 0 else total / count
+        middle = total / count
     return middle
 
 

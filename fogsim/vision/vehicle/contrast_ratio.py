@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.vision.light.luminance import darker_by
-from fogsim.vision.light.medians import median_among, quantile
+from fogsim.vision.light.medians import median_among, quantile, quantile_among
 from fogsim.vision.vehicle.patch import INDEPENDENT, Patch, Placement, downsample_to, pixel_grid
 
 Floats = NDArray[np.float64]
@@ -185,12 +185,12 @@ def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRati
     lateral, height = cell_centres(-side, side, cell, 2), cell_centres(reference.heights[0], TOP, cell, 3)
     shown, shown_noise = resample(reference, lateral, height, cell)
     seen, seen_noise = resample(picture, lateral, height, cell)
-    own = _own_deviation(shown, math.sqrt(shown_noise))
-    if own is None:
+    own = _own_variance(shown, math.sqrt(shown_noise))
+    if not own.size:
         return None
-    sure = shown**2 / (seen_noise + shown_noise + own**2)
+    sure = shown**2 / (seen_noise + shown_noise + own)
     first = _weighted_median(seen / np.where(np.abs(shown) > 1e-9, shown, 1e-9), sure)
-    weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own**2, False)
+    weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own, False)
     count = int((weight > 0).sum())
     if count < max(_LEAST_KEPT * shown.size, 6):
         return None
@@ -200,7 +200,7 @@ def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRati
     # Noise of the reference flattens the line.
     power -= by_noise
     ratio *= 1.0 + by_noise / power
-    spread = seen_noise + ratio**2 * (shown_noise + INDEPENDENT * own**2)
+    spread = seen_noise + ratio**2 * (shown_noise + INDEPENDENT * own)
     deviation = math.sqrt(float((weight**2 * shown**2 * spread).sum())) / power
     lever = abs(float((weight * shown).sum())) / power
     visible = math.sqrt(power / float(weight.sum()) / max(seen_noise, 1e-12))
@@ -244,7 +244,7 @@ def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Flo
     most = quantile(near, 0.95)
     if most <= 2.0 * noise:
         return np.zeros_like(near), np.zeros_like(near)
-    shading = _shading_deviation(near, most, 1.0)
+    shading = _shading_deviation(near, most)
     down, across = np.gradient(near)
     change = np.abs(down) + np.abs(across)
     gain = np.maximum(near, 0.0)
@@ -253,22 +253,32 @@ def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Flo
     return _line_through_airlight(gain, far, first, noise**2, own, True)[0], gain
 
 
-def _own_deviation(shown: Floats, noise: float) -> Floats | None:
-    """Deviation of each cell's own contrast between two pictures; None if nothing stands out of the noise."""
-    most = quantile(shown, 0.95)
+@kernel
+def _own_variance(shown: Floats, noise: float) -> Floats:
+    """Variance of each cell's own contrast between two pictures; none if nothing stands out of the noise."""
+    most = quantile_among(shown.copy().ravel(), 0.95)
     if most <= 2.0 * noise:
-        most = quantile(np.abs(shown), 0.95)
+        most = quantile_among(np.abs(shown).ravel(), 0.95)
         if most <= 2.0 * noise:
-            return None
-    down, across = np.gradient(shown)
-    shading = _shading_deviation(shown, most)
-    return np.asarray(np.sqrt(shading**2 + _MISPLACED**2 * (down**2 + across**2)), np.float64)
+            return np.zeros((0, 0))
+    (rows, cols), own, through = shown.shape, np.empty(shown.shape), most / (1.0 - _DARKEST)
+    for i in range(rows):
+        up, low = max(i - 1, 0), min(i + 1, rows - 1)
+        for j in range(cols):
+            left, right = max(j - 1, 0), min(j + 1, cols - 1)
+            down, across = (
+                (shown[low, j] - shown[up, j]) / (low - up),
+                (shown[i, right] - shown[i, left]) / (right - left),
+            )
+            shading = _SHADING * through * max(1.0 - shown[i, j] / through, _DARKEST)
+            own[i, j] = math.sqrt(shading**2 + _MISPLACED**2 * (down**2 + across**2)) ** 2
+    return own
 
 
-def _shading_deviation(contrast: Floats, most: float, brightest: float = math.inf) -> Floats:
-    """Deviation of contrasts by shading: a share of the luminance, at most so bright, that the fog lets through."""
+def _shading_deviation(contrast: Floats, most: float) -> Floats:
+    """Deviation of contrasts by shading: a share of the luminance, at most the sky's, that the fog lets through."""
     through = most / (1.0 - _DARKEST)
-    luminance = np.clip(1.0 - contrast / through, _DARKEST, brightest)
+    luminance = np.clip(1.0 - contrast / through, _DARKEST, 1.0)
     return np.asarray(_SHADING * through * luminance, np.float64)
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.core.linear_algebra import inverse_of, matrix_product
-from fogsim.vision.light.medians import median, row_medians
+from fogsim.vision.light.medians import median, median_among
 from fogsim.vision.vehicle.contrast_ratio import RearPicture, cell_centres, common_cell, resample
 from fogsim.vision.vehicle.patch import (
     INDEPENDENT,
@@ -270,12 +271,12 @@ def register_rear(
     template, _ = resample(reference, lateral, height, cell)
     beside = (np.abs(lateral) > 0.5 * reference.width) | (height[:, None] < 0.0)
     template = np.where(beside, template * behind.contrast_ratio(height)[:, None], template)
-    template = _less_road_beside(template, lateral, reference)
+    template = _less_road_beside(template, lateral, 0.5 * reference.width)
     wide = cell * np.arange(-across, across + 1), cell * np.arange(-up, up + 1)
     lateral = np.concatenate([lateral[0] + wide[0][:across], lateral, lateral[-1] + wide[0][across + 1 :]])
     height = np.concatenate([height[0] + wide[1][:up], height, height[-1] + wide[1][up + 1 :]])
     seen, _ = resample(picture, lateral, height, cell)
-    seen = _less_road_beside(seen, lateral, reference)
+    seen = _less_road_beside(seen, lateral, 0.5 * reference.width)
     if float(template.std()) < 1e-4:
         return None
     known = 0.5 * (wide[1][:, None] / pitch) ** 2 + 0.5 * (wide[0] / aside) ** 2
@@ -285,8 +286,12 @@ def register_rear(
     return picture.displaced(right, high), float(found.correlation[found.row, found.col])
 
 
-def _less_road_beside(contrast: Floats, lateral: Floats, reference: RearPicture) -> Floats:
-    """Contrast less that of the road next to the vehicle at the same height: near road fades into far road upwards."""
-    beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * _ASIDE
-    outer = contrast[:, beside] if beside.any() else contrast[:, [0, -1]]
-    return np.asarray(contrast - row_medians(outer)[:, None], np.float64)
+@kernel
+def _less_road_beside(contrast: Floats, lateral: Floats, half: float) -> Floats:
+    """Contrast less that of the road beyond half a width at the same height: near road fades into far road upwards."""
+    outer, out = np.flatnonzero(np.abs(lateral) > half + 0.3 * _ASIDE), np.empty(contrast.shape)
+    if outer.size == 0:
+        outer = np.array([0, lateral.size - 1])
+    for row in range(len(contrast)):
+        out[row] = contrast[row] - median_among(contrast[row][outer])
+    return out

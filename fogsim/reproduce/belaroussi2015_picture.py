@@ -1,16 +1,14 @@
 """A picture like the paper's figures 3 and 4: the detector's curve, and estimated against true visibility."""
 
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.result import Cell
 
 _MARKS = ("o", "s", "^", "D")
@@ -26,10 +24,7 @@ def picture(
     left, right = figure.subplots(1, 2)
     _draw_ranges(left, ranges)
     _draw_estimates(right, records, [name for name, _ in ranges], published)
-    FigureCanvasAgg(figure)
-    drawn = BytesIO()
-    figure.savefig(drawn, format="png")
-    return np.asarray(Image.open(drawn).convert("RGB"))
+    return figure_image(figure)
 
 
 def _draw_ranges(axes: Axes, ranges: Sequence[tuple[str, OperatingRange]]) -> None:

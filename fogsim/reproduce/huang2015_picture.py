@@ -2,19 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.estimators import make
 from fogsim.estimators.huang2015_comparison import BODY_HALF_WIDTH, BODY_HEIGHTS
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.render import Renderer
+from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
@@ -36,7 +34,6 @@ class Tracked:
 def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArray[np.uint8]:
     """Draw a row of patches over range for each fog, and confidence curves below them."""
     figure = Figure(figsize=(12.8, 3.2 + 1.7 * len(shown)), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
     grid = figure.add_gridspec(len(shown) + 1, 1, height_ratios=[*([1.0] * len(shown)), 2.0])
     found = _patches(renderer, chase, [row.visibility for row in shown])
     for i, row in enumerate(shown):
@@ -46,9 +43,7 @@ def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArr
     plots = figure.add_subfigure(grid[len(shown)]).subplots(1, len(shown), squeeze=False)[0]
     for axes, row in zip(plots, shown, strict=True):
         _curves(axes, row)
-    drawn = BytesIO()
-    figure.savefig(drawn, format="png")
-    return np.asarray(Image.open(drawn).convert("RGB"))
+    return figure_image(figure)
 
 
 def _patches(

@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.reproduce.airlight.conditions import Condition, airlight
+from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.result import Cell
 from fogsim.units import extinction_from_visibility
 from fogsim.values.fog import AIRLIGHT_SHARE
@@ -37,10 +35,7 @@ def picture(records: Records) -> NDArray[np.uint8]:
         _draw_method(one, method, here)
     for one in axes[2 + len(methods) :]:
         one.set_axis_off()
-    FigureCanvasAgg(figure)
-    drawn = BytesIO()
-    figure.savefig(drawn, format="png")
-    return np.asarray(Image.open(drawn).convert("RGB"))
+    return figure_image(figure)
 
 
 def _draw_airlight(axes: Axes) -> None:

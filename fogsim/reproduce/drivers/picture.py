@@ -1,17 +1,14 @@
 """A picture of drivers in fog: speed, overdriving and close following against visibility, with what is published."""
 
-from io import BytesIO
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME
 from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SEEING, SPARSE, Case, Plan, Results, interval
+from fogsim.reproduce.figure_image import figure_image
 from fogsim.units import KMH_PER_MPS
 
 _COLOURS = {DEFAULT: "tab:blue", SEEING: "tab:orange"}
@@ -22,7 +19,6 @@ _CLEAR_AT = 600.0
 def picture(results: Results, plan: Plan) -> NDArray[np.uint8]:
     """Draw it (rows, cols, 3)."""
     figure = Figure(figsize=(12.8, 8.6), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(2, 2)
     _draw_speed(panels[0, 0], results, plan)
     _draw_overdriving(panels[0, 1], results, plan)
@@ -30,9 +26,7 @@ def picture(results: Results, plan: Plan) -> NDArray[np.uint8]:
     _draw_ttc(panels[1, 1], results, plan)
     for axes in panels.flat:
         _finish(axes, plan, columns=2 if axes in panels[1] else 1)
-    drawn = BytesIO()
-    figure.savefig(drawn, format="png")
-    return np.asarray(Image.open(drawn).convert("RGB"))
+    return figure_image(figure)
 
 
 def _finish(axes: Axes, plan: Plan, columns: int) -> None:

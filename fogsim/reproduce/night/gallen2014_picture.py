@@ -1,18 +1,16 @@
 """Images like figures 2, 11 and 14 of gallen2014, and the halos' Br50 on four drives."""
 
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import high_beam
+from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.night.limits import veil_luminance
 
 Records = Sequence[Mapping[str, Any]]
@@ -30,10 +28,7 @@ def picture(drives: Records, fogs: Records, threshold: float) -> NDArray[np.uint
         _draw_halos(halos, drives, threshold)
     for axes in (eleven, fourteen, halos):
         axes.set_visible(axes.has_data())
-    FigureCanvasAgg(figure)
-    drawn = BytesIO()
-    figure.savefig(drawn, format="png")
-    return np.asarray(Image.open(drawn).convert("RGB"))
+    return figure_image(figure)
 
 
 def _draw_veil(axes: Axes) -> None:

@@ -169,9 +169,9 @@ def _engine(
 
     from fogsim.study import RayCluster
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import CoverageCheck, check_outcome, check_to_file
+    from fogsim.testing.execution import CoverageCheck, check_outcome
 
-    check = None if odd is None else CoverageCheck(odd)
+    work = check_outcome if odd is None else CoverageCheck(odd)
     if chosen is CampaignEngine.RAY:
-        return RayCluster(address, processes, check_outcome if check is None else check.outcome)
-    return ProcessPool(processes or os.cpu_count() or 1, check_to_file if check is None else check.to_file)
+        return RayCluster(address, processes, work)
+    return ProcessPool(processes or os.cpu_count() or 1, work)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.conditions import Always, Condition, Eventually, Finding, Whenever
-from fogsim.core.files.atomic import write_json, write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder
 from fogsim.scenario import Scenario
@@ -105,13 +105,10 @@ class KeepFailures:
 
     findings: Mapping[str, tuple[Finding, ...]]
 
-    def __call__(self, scenario: Scenario, seed: int, result: Path) -> str | None:
-        """Run a case again into the folder next to `result`; return what went wrong."""
-        folder = result.with_suffix("")
+    def __call__(self, scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
+        """Run a case again into a folder; the outcome."""
         folder.mkdir(exist_ok=True)
-        outcome = outcome_of(lambda: _kept(scenario, seed, self.findings[folder.name], folder))
-        write_json(result, outcome)
-        return outcome.get("message")
+        return outcome_of(lambda: _kept(scenario, seed, self.findings[folder.name], folder))
 
 
 def _conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:

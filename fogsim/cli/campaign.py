@@ -137,7 +137,7 @@ def _report(
     from fogsim.testing.campaign.comparison import CASES, changes_text
     from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
     from fogsim.testing.campaign.running import as_test
-    from fogsim.testing.odd.coverage_files import remove_coverage, write_coverage
+    from fogsim.testing.odd.coverage_watch import remove_coverage, write_coverage
     from fogsim.testing.shrinking import smallest_text
 
     write_cases(out / CASES, campaign, found)

@@ -17,8 +17,7 @@ from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.scenario import Scenario
 from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign
 from fogsim.testing.execution import CoverageCheck, ThisProcess
-from fogsim.testing.odd.coverage_files import write_coverage
-from fogsim.testing.odd.coverage_watch import CoverageWatch
+from fogsim.testing.odd.coverage_watch import CoverageWatch, write_coverage
 from fogsim.testing.odd.odd_file import read_odd
 from fogsim.testing.results import finding_to_json
 from fogsim.units import extinction_from_visibility

@@ -173,7 +173,7 @@ def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) 
 
 def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> None:
     """Report failures to GitHub by file and line, if it runs this."""
-    from fogsim.testing.annotations import annotations
+    from fogsim.testing.junit import annotations
 
     if os.environ.get("GITHUB_ACTIONS") == "true":
         for line in annotations(outcomes, settings):

@@ -10,9 +10,9 @@ from fogsim.advice import ADVISERS
 from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
+from fogsim.scenario.build import traffic_setup
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.parts.methods import DISPLAYS
-from fogsim.scenario.parts.traffic import traffic_setup
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.wording.non_defaults import shown_value

@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from fogsim.core.interruption import Interruption
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
-from fogsim.dataset.directory import DatasetDirectory
-from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
+from fogsim.dataset.directory import (
+    DEPTH_UNIT,
+    TRANSMISSION_UNIT,
+    DatasetDirectory,
+    encoded_depth,
+    encoded_transmission,
+)
 from fogsim.dataset.ground_truth import (
     SemanticClass,
     depth,

@@ -15,7 +15,7 @@ import numpy as np
 from fogsim.camera import CameraConfig
 from fogsim.core.randomness import spawn_streams
 from fogsim.core.registry import MethodConfig, Registry
-from fogsim.dataset.encoding import png
+from fogsim.dataset.directory import png
 from fogsim.errors import InputError
 from fogsim.estimators.protocol import Calibrations, TakesCalibrations
 from fogsim.explore.recorded_drive import Moment, RecordedDrive

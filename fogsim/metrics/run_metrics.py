@@ -9,7 +9,7 @@ from fogsim.core.registry import Registry
 from fogsim.errors import SimulationError
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
-from fogsim.metrics.estimation.fog_warnings import FogWarnings
+from fogsim.metrics.estimation.belief_ahead import FogWarnings
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definitions_of
 from fogsim.metrics.motion import Comfort, Compliance, Motion

@@ -15,8 +15,7 @@ from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.watch import SignWatch, Watched
 from fogsim.reproduce.figure_image import figure_image
-from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
-from fogsim.reproduce.result import Cell, Reproduction, Rows, Watch, unwatched
+from fogsim.reproduce.result import Cell, PaperCell, Reproduction, Rows, Watch, chosen_tables, unwatched
 from fogsim.values import Camera, Observation, Response
 
 _MARKS = ("o", "s", "^", "D")

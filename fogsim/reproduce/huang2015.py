@@ -30,8 +30,7 @@ from fogsim.reproduce.huang2015_figures import (
     seen_visibility,
     wanted_cases,
 )
-from fogsim.reproduce.paper_cells import chosen_tables
-from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
+from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, chosen_tables, unwatched
 from fogsim.reproduce.road_sweeps import DRIVES, steps_of, swept
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Observation

@@ -7,8 +7,7 @@ from math import inf
 
 import numpy as np
 
-from fogsim.reproduce.paper_cells import PaperCell
-from fogsim.reproduce.result import Cell, Rows
+from fogsim.reproduce.result import Cell, PaperCell, Rows
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 

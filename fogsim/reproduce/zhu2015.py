@@ -13,8 +13,17 @@ from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES, GROWTH, GROWTH_SHARE
 from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, seen_road
 from fogsim.recorders.style import font
-from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
-from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.reproduce.result import (
+    Cell,
+    PaperCell,
+    Reproduction,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    found_visibility,
+    unwatched,
+)
 from fogsim.reproduce.road_sweeps import CAMERA, DRIVES, Moment, drive, observed, over_growths, steps_of, swept
 from fogsim.values import Camera, Estimate, FogCategory, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION

@@ -28,8 +28,7 @@ from fogsim.scenario.parts.sensors import (
     reports_config,
     sensors_config,
 )
-from fogsim.scenario.roads.departures import entering_vehicles
-from fogsim.scenario.roads.files import actors_of, traffic_files
+from fogsim.scenario.roads.files import actors_of, entering_vehicles, traffic_files
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.timeline import (
     actions_of,

@@ -17,8 +17,7 @@ from fogsim.estimators import make
 from fogsim.render import Renderer
 from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.huang2015_chase import drawn
-from fogsim.reproduce.paper_cells import chosen_tables
-from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
+from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, chosen_tables, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA, SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, FogField, Frame, LeadMeasurement, Observation, View

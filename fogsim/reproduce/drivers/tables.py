@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
-from fogsim.reproduce.drivers.findings import FINDINGS
-from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME, Measures
+from fogsim.reproduce.drivers.findings import FINDINGS, Finding, Look, Verdict
 from fogsim.reproduce.drivers.plan import (
     DEFAULT,
     MEDIUM,
@@ -24,8 +23,7 @@ from fogsim.reproduce.drivers.plan import (
     Results,
     interval,
 )
-from fogsim.reproduce.drivers.published import Finding, Look, Verdict
-from fogsim.reproduce.drivers.road import PairMeasures
+from fogsim.reproduce.drivers.road import BRAKING, THINKING_TIME, Measures, PairMeasures
 from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.result import Cell, Rows, TitledTable
 from fogsim.units import KMH_PER_MPS, finite_or_none

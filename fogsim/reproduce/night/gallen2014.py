@@ -28,8 +28,17 @@ from fogsim.estimators.night.veil_correlation import (
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.night.limits import limits, veil_luminance
-from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
-from fogsim.reproduce.result import Reproduction, Rows, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.reproduce.result import (
+    PaperCell,
+    Reproduction,
+    Rows,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    found_visibility,
+    unwatched,
+)
 from fogsim.values import Camera, Lamp, Observation, Response
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import Pixels

@@ -20,7 +20,7 @@ _REACH = 250.0
 """Distance ahead and behind in which vehicles count for the traffic density [m]."""
 
 
-def is_inside(bank: FogBank, position: NDArray[np.float64]) -> bool:
+def _is_inside(bank: FogBank, position: NDArray[np.float64]) -> bool:
     """Whether a position (3,) [m] is between the beginning and the end of a bank."""
     east, north, _ = position
     along = (east - bank.origin[0]) * bank.axis[0] + (north - bank.origin[1]) * bank.axis[1]
@@ -43,7 +43,7 @@ def _is_in_any_bank(moment: Moment) -> bool | None:
     row, fog = moment.row(EGO), moment.step.truth.fog
     if row is None or fog is None:
         return None
-    return any(is_inside(bank, moment.traffic.position[row]) for bank in fog.banks)
+    return any(_is_inside(bank, moment.traffic.position[row]) for bank in fog.banks)
 
 
 _OF_SURROUNDINGS = {
@@ -136,7 +136,7 @@ def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | Non
     row, fog = moment.row(vehicle), moment.step.truth.fog
     if row is None or fog is None or int(number) >= len(fog.banks):
         return None
-    return is_inside(fog.banks[int(number)], moment.traffic.position[row])
+    return _is_inside(fog.banks[int(number)], moment.traffic.position[row])
 
 
 def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callable[[Moment, str], float | bool | None]:

@@ -94,7 +94,7 @@ def is_dark(observation: Observation) -> bool:
     return observation.light is not None and observation.light.illuminance < DAY_ILLUMINANCE
 
 
-def would_dazzle(observation: Observation, near_lead: float) -> bool:
+def _would_dazzle(observation: Observation, near_lead: float) -> bool:
     """Whether high beams might dazzle somebody, as far as the vehicle knows (`near_lead` [m])."""
     light, lead = observation.light, observation.lead
     return light is None or light.oncoming or light.preceding or (lead is not None and lead.distance < near_lead)
@@ -164,7 +164,7 @@ class Gallen2014:
             return LampChoice(BY_DAY)
         has_high = Lamp.HIGH_BEAM in previous.lamps
         enough = self.low_beam_below * (1.0 if has_high else 1.0 + self.hysteresis)
-        high = is_dark(observation) and visibility >= enough and not would_dazzle(observation, self.near_lead)
+        high = is_dark(observation) and visibility >= enough and not _would_dazzle(observation, self.near_lead)
         rules = FogLampRules(self.rear_fog_below, self.front_fog_below, self.hysteresis, self.quantile)
         low = rules.lamps(belief, previous.lamps)
         return settled(HIGH_BEAMS | low & Lamp.REAR_FOG if high else low, time, previous, self.dwell)

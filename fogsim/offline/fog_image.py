@@ -64,7 +64,7 @@ class FogLayer:
         return kept, lost * slant_share(around, sine, lost)
 
 
-def elevation_sines(camera: Camera) -> Floats:
+def _elevation_sines(camera: Camera) -> Floats:
     """Sines of the elevations of a pinhole's rays, (rows, cols)."""
     rows, columns = np.indices((camera.height, camera.width), dtype=np.float64)
     rays = ray_from_pixel(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))
@@ -108,7 +108,7 @@ def fog_image(
         kept = np.exp(-extinction * distance)
         added = 1.0 - kept
     else:
-        slopes = elevation_sines(camera) if sines is None else sines
+        slopes = _elevation_sines(camera) if sines is None else sines
         kept, added = layer.light(distance, slopes, visibility, camera.mount_height)
     light = exposure_of(colours[..., :channels] / full, camera.response, camera.black_level)
     air = exposure_of(airlight[:channels] / full, camera.response, camera.black_level)
@@ -140,7 +140,7 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0
     return np.asarray(colours[brightest].mean(axis=0))
 
 
-def in_layer(
+def _in_layer(
     airlight: NDArray[np.float64], image: Pixels, camera: Camera, layer: FogLayer | None
 ) -> NDArray[np.float64]:
     """Pixel values of the level airlight in a layer, from those of a uniform one."""
@@ -169,7 +169,7 @@ def fog_file(
     read = (image, depth.path) if isinstance(depth, DepthMap) else (image,)
     refuse_unwritable_image(out, "--out", overwrite=overwrite, read=read)
     pixels = read_image(image)
-    refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
+    _refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
     try:
         largest_value(pixels if pixels.ndim == 2 else pixels[..., :3], camera)
     except InputError as error:
@@ -180,14 +180,14 @@ def fog_file(
         distance, share, sines = depth.distance(), BRIGHTEST_ABOVE_ROAD, depth.sines()
     colours = min(3, 1 if pixels.ndim == 2 else pixels.shape[2])
     if airlight is None:
-        air = in_layer(airlight_of(pixels, distance, share), pixels, camera, layer)
+        air = _in_layer(airlight_of(pixels, distance, share), pixels, camera, layer)
     else:
-        air = given_airlight(airlight, colours, pixels, camera)
+        air = _given_airlight(airlight, colours, pixels, camera)
     write_image(out, fog_image(pixels, distance, visibility, camera, air, layer, sines))
     return air[::-1]
 
 
-def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None:
+def _refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None:
     """Raise InputError if images have another size (columns, rows) than their camera's."""
     if size != (camera.width, camera.height):
         raise InputError(
@@ -196,7 +196,7 @@ def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None
         )
 
 
-def given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
+def _given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
     """A user's airlight as pixel values, blue first as images are stored; InputError if number or range do not fit."""
     full = _full_scale(pixels, camera)
     if len(airlight) not in (1, colours):
@@ -224,7 +224,7 @@ def fog_video(
     """
     camera = road.calibration.camera
     refuse_unfit_video(out, video.paths, camera, kind="fogged", overwrite=overwrite)
-    refuse_other_size(video.path, video.size, camera)
+    _refuse_other_size(video.path, video.size, camera)
     distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
     damage = ""
@@ -251,5 +251,5 @@ def _airlight(
 ) -> NDArray[np.float64]:
     """Airlight of a video, given or from the sky of its first frame, red first."""
     if given is not None:
-        return np.asarray(given_airlight(given, 3, first, camera)[::-1])
-    return in_layer(airlight_of(first, distance, BRIGHTEST_ABOVE_ROAD), first, camera, layer)
+        return np.asarray(_given_airlight(given, 3, first, camera)[::-1])
+    return _in_layer(airlight_of(first, distance, BRIGHTEST_ABOVE_ROAD), first, camera, layer)

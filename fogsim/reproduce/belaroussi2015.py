@@ -21,7 +21,7 @@ from fogsim.values import Camera, Observation, Response
 _MARKS = ("o", "s", "^", "D")
 
 
-def picture(
+def _picture(
     records: Sequence[Mapping[str, Cell]],
     ranges: Sequence[tuple[str, OperatingRange]],
     published: Mapping[float, float | None],
@@ -170,7 +170,7 @@ def reproduce(
                 watch(number * share + approaches + image // 10, total)
         records += found
     watch(total, total)
-    drawing = picture(records, list(zip([setup.name for setup in setups], ranges, strict=True)), PUBLISHED)
+    drawing = _picture(records, list(zip([setup.name for setup in setups], ranges, strict=True)), PUBLISHED)
     cells = tuple(cell for setup in setups for cell in paper_cells(setup.name, records))
     return Reproduction("belaroussi2015", tuple(records), _table(records), _NOTES, drawing, cells=cells)
 

@@ -42,14 +42,14 @@ _COLOURS = {"published": "tab:orange", "corrected": "tab:blue"}
 
 
 @dataclass(frozen=True, slots=True)
-class Tracked:
+class _Tracked:
     """Estimates by variant after the vehicle was followed in fog of a true V_met [m]."""
 
     visibility: float
     estimates: Mapping[str, Estimate]
 
 
-def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArray[np.uint8]:
+def _picture(renderer: Renderer, chase: Chase, shown: Sequence[_Tracked]) -> NDArray[np.uint8]:
     """Draw a row of patches over range for each fog, and confidence curves below them."""
     figure = Figure(figsize=(12.8, 3.2 + 1.7 * len(shown)), dpi=100, layout="constrained")
     grid = figure.add_gridspec(len(shown) + 1, 1, height_ratios=[*([1.0] * len(shown)), 2.0])
@@ -97,7 +97,7 @@ def _patch(axes: Axes, piece: NDArray[np.uint8], window: tuple[float, float, flo
         axes.plot(sides, ends, color="tab:green", linewidth=1.2)
 
 
-def _curves(axes: Axes, row: Tracked) -> None:
+def _curves(axes: Axes, row: _Tracked) -> None:
     distance = np.linspace(0.0, 200.0, 201)
     true = extinction_from_visibility(row.visibility)
     axes.plot(distance, 100.0 * image_confidence(true, distance), color="black", linewidth=1.0, label="true")
@@ -169,8 +169,8 @@ def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = u
             alike = {case: last for case, last in cases.items() if (case.back, case.noisy) == way}
             results |= _followed(renderer, alike, rng, steps) if alike else {}
         rough = _rough(renderer, road, rng, steps)
-        shown = [Tracked(v, {name: results[Case(v)][name][LAST] for name in VARIANTS}) for v in _PICTURED]
-        drawing = picture(renderer, Chase(CAMERA, VEHICLE, samples=SAMPLES), shown)
+        shown = [_Tracked(v, {name: results[Case(v)][name][LAST] for name in VARIANTS}) for v in _PICTURED]
+        drawing = _picture(renderer, Chase(CAMERA, VEHICLE, samples=SAMPLES), shown)
         steps.advance()
         sweeps: list[dict[str, Cell]] = []
         more_tables: tuple[TitledTable, ...] = ()

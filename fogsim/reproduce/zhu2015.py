@@ -42,7 +42,7 @@ _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 RED, _BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 210, 0)
 
 
-def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
+def _picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
     """Draw an instant in four fogs, as published on the left and corrected on the right: (rows, cols, 3) uint8."""
     rows = []
     for visibility in _PICTURED:
@@ -215,7 +215,7 @@ def reproduce(
             }
             swept_records, tables = swept("zhu2015", Zhu2015Repair, renderer, steps, sweeps, left_open)
             shown += tables
-    drawing = picture(pictured[-1], CAMERA)
+    drawing = _picture(pictured[-1], CAMERA)
     steps.advance()
     cells = tuple(cell for cell in paper_cells(records) if cell.place.removeprefix("table ") in chosen)
     return Reproduction(

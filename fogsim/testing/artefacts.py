@@ -56,7 +56,7 @@ _ALARM, _LIMIT = "#cf3a34", "#9a6700"
 _PANEL_HEIGHT = 1.25
 
 
-class SignalLog:
+class _SignalLog:
     """Signals of some conditions, step by step."""
 
     def __init__(self, conditions: Iterable[Condition]) -> None:
@@ -83,7 +83,7 @@ def _limits(condition: Condition) -> list[tuple[Reference, Quantity]]:
     ]
 
 
-def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
+def _plot_signals(log: _SignalLog, title: str, failures: Sequence[float]) -> str:
     """Draw signals over time as SVG, with marks where something failed [s]."""
     shown = list(log.values)[:_MOST_PANELS]
     figure = Figure(figsize=(WIDTH, 0.7 + _PANEL_HEIGHT * len(shown)), layout="constrained")
@@ -98,7 +98,7 @@ def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
     return svg_of(figure, title)
 
 
-def _draw(axes: Axes, signal: Reference, log: SignalLog) -> None:
+def _draw(axes: Axes, signal: Reference, log: _SignalLog) -> None:
     unit, values = SIGNALS[signal.signal].stated_in, log.values[signal]
     texts = sorted({text for text in map(_text, values) if text is not None})
     if texts:
@@ -235,7 +235,7 @@ def _kept(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Pa
 
 def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Path) -> None:
     instants = [one.time for one in findings if one.time is not None]
-    logs = {_title_of(one): SignalLog(_conditions_of(scenario, one)) for one in findings}
+    logs = {_title_of(one): _SignalLog(_conditions_of(scenario, one)) for one in findings}
     has_frames = scenario.traffic.has_ego and scenario.renderer != NO_RENDERER
     steps: Iterable[TrafficStep] = run(scenario, seed) if scenario.traffic.has_ego else run_traffic(scenario, seed)
     video = VideoRecorder(folder / _VIDEO, scenario.clocks.camera_period_s) if has_frames and instants else None
@@ -255,4 +255,4 @@ def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Pa
             video.close(complete)
     for title, log in logs.items():
         if log.values:
-            write_text(folder / f"{title}.svg", plot_signals(log, title, instants))
+            write_text(folder / f"{title}.svg", _plot_signals(log, title, instants))

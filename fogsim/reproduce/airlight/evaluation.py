@@ -56,7 +56,7 @@ _CONDITIONS = (
 """What is varied over land of albedo 0.1, one thing at a time."""
 
 
-def airlight(condition: Condition, elevation: float, distance: float | None = None) -> float:
+def _airlight(condition: Condition, elevation: float, distance: float | None = None) -> float:
     """Airlight up to the road, or to a distance [m], over the path's loss, in E / π, by elevation [degrees]."""
     slope = math.sin(math.radians(elevation))
     if distance is None:
@@ -71,7 +71,7 @@ def airlight(condition: Condition, elevation: float, distance: float | None = No
     return float(seen[0, 0, 1]) / -math.expm1(-extinction * distance)
 
 
-def conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTable]]:
+def _conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTable]]:
     """Airlight by albedo, and by what else there may be."""
     lands = [replace(_USUAL, name=f"albedo {albedo:g}", albedo=albedo) for albedo in ALBEDOS]
     records: list[Mapping[str, Cell]] = []
@@ -82,7 +82,7 @@ def conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTab
     ):
         rows = [("", *(f"{elevation:g}°" for elevation in ELEVATIONS))]
         for kind in kinds:
-            found = [airlight(kind, elevation) for elevation in ELEVATIONS]
+            found = [_airlight(kind, elevation) for elevation in ELEVATIONS]
             rows.append((kind.name, *(f"{one:.3f}" for one in found)))
             records += [
                 {"paper": "airlight", "condition": kind.name, "elevation_deg": elevation, "airlight": one}
@@ -100,7 +100,7 @@ _ROAD = 0.1
 _COLOURS = {0.05: "C3", 0.1: "C1", 0.2: "C2", 0.4: "C0", 0.8: "C4"}
 
 
-def picture(records: Records) -> NDArray[np.uint8]:
+def _picture(records: Records) -> NDArray[np.uint8]:
     """Draw the airlight by elevation, a dark road's luminance by distance, and estimates with a car's camera."""
     methods = list(dict.fromkeys(str(one["method"]) for one in records))
     figure = Figure(figsize=(15.0, 8.4), dpi=90, layout="constrained")
@@ -120,7 +120,7 @@ def _draw_airlight(axes: Axes) -> None:
     up = np.concatenate((-np.geomspace(15.0, 0.5, 40), [0.0], np.geomspace(0.5, 30.0, 40)))
     for albedo, colour in _COLOURS.items():
         over = Condition("", albedo)
-        axes.plot(up, [airlight(over, one) for one in up.tolist()], colour, label=f"ρ {albedo:g}")
+        axes.plot(up, [_airlight(over, one) for one in up.tolist()], colour, label=f"ρ {albedo:g}")
     axes.axhline(AIRLIGHT_SHARE, color="0.5", ls="--", label="Koschmieder, ρ 0.1")
     axes.axvline(0.0, color="0.8", lw=1)
     axes.set(xlabel="elevation [°]", ylabel="airlight / (1 − T), over E/π", title="Airlight up to road or sky")
@@ -133,8 +133,8 @@ def _draw_road(axes: Axes) -> None:
         over = Condition("", albedo)
         through = np.exp(-extinction_from_visibility(over.visibility) * far)
         down = -np.degrees(np.arcsin(over.eye / far))
-        light = [airlight(over, one, reach) for one, reach in zip(down.tolist(), far.tolist(), strict=True)]
-        seen = 1.0 - (np.array(light) * (1.0 - through) + _ROAD * through) / airlight(over, 0.0)
+        light = [_airlight(over, one, reach) for one, reach in zip(down.tolist(), far.tolist(), strict=True)]
+        seen = 1.0 - (np.array(light) * (1.0 - through) + _ROAD * through) / _airlight(over, 0.0)
         name = "Koschmieder" if albedo is None else f"land of albedo {albedo:g}"
         axes.semilogy(far, seen, color=colour, ls="--" if albedo is None else "-", label=name)
     axes.axhline(0.05, color="0.8", lw=1)
@@ -253,9 +253,9 @@ def reproduce(
         )
         for height in plan.heights
     )
-    sweeps, by_elevation = conditions()
+    sweeps, by_elevation = _conditions()
     shown = (*by_elevation, *tables)
-    return Reproduction("airlight", tuple(records), tables[0].rows, _NOTES, picture(records), shown, tuple(sweeps))
+    return Reproduction("airlight", tuple(records), tables[0].rows, _NOTES, _picture(records), shown, tuple(sweeps))
 
 
 def drive_alone(

@@ -46,7 +46,7 @@ from fogsim.vision.light.pixel_kernels import Pixels
 Record = Mapping[str, Any]
 
 
-def picture(drives: Sequence[Record], fogs: Sequence[Record], threshold: float) -> NDArray[np.uint8]:
+def _picture(drives: Sequence[Record], fogs: Sequence[Record], threshold: float) -> NDArray[np.uint8]:
     """Draw the veil's luminance, scores by reference, estimated over true visibility, and the drives' halos, if run."""
     figure = Figure(figsize=(13.0, 9.0), dpi=90, layout="constrained")
     (two, eleven), (fourteen, halos) = figure.subplots(2, 2)
@@ -189,7 +189,7 @@ def reproduce(
         cells += limit_cells()
     steps.advance()
     records = (*drives, *fogs, *road)
-    drawn = picture(drives, fogs, least)
+    drawn = _picture(drives, fogs, least)
     return Reproduction("gallen2014", records, tables[0].rows, _NOTES, drawn, tuple(tables), cells=tuple(cells))
 
 

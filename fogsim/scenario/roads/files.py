@@ -91,7 +91,7 @@ def road_layout(scenario: ScenarioFile) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    sections = vehicles_of(scenario)
+    sections = _vehicles_of(scenario)
     placed = place_actors([_actor(name, sections) for name in sections])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
@@ -125,12 +125,12 @@ def _actors_on(net: Path, scenario: ScenarioFile) -> str:
     for name, way in edges.items():
         for edge in way:
             if edge not in ways.edges:
-                raise PlacementError(name, no_edge(edge, net))
+                raise PlacementError(name, _no_edge(edge, net))
     check_placement(placed, ways)
     return actors_text(ways, placed)
 
 
-def no_edge(edge: str, net: Path) -> str:
+def _no_edge(edge: str, net: Path) -> str:
     """Say that a network has no such edge, and which it has."""
     known = read_net_edges(net, ())
     if known is None:
@@ -179,7 +179,7 @@ def actors_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
 
 
-def vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
+def _vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     """Actors of a scenario that are vehicles, by their ids."""
     return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
 
@@ -292,7 +292,7 @@ def _on_net(vehicle: str, action: DepartAction, scenario: ScenarioFile) -> Enter
     ways = read_ways(net, {first: action.edges})
     for edge in action.edges:
         if edge not in ways.edges:
-            raise PlacementError(vehicle, no_edge(edge, net))
+            raise PlacementError(vehicle, _no_edge(edge, net))
     length = ways.edges[first].length
     if (action.position_m or 0.0) > length:
         raise PlacementError(vehicle, f"position_m counts along {first!r}, which is {length:.0f} m long")

@@ -21,8 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from harness import Row, lines_of, mean, parse_options, publish
 
-from fogsim.calibration.sign_calibration import measure_operating_range
-from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed
+from fogsim.calibration.sign_calibration import PoseNoise, SignDrive, measure_operating_range, observed
 from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast

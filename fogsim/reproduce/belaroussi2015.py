@@ -8,14 +8,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fogsim.calibration.sign_calibration import cropped, measure_operating_range
-from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed, sign_beside
+from fogsim.calibration.sign_calibration import (
+    PoseNoise,
+    SignDrive,
+    cropped,
+    measure_operating_range,
+    observed,
+    sign_beside,
+)
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.watch import SignWatch, Watched
-from fogsim.reproduce.figure_image import figure_image
-from fogsim.reproduce.result import Cell, PaperCell, Reproduction, Rows, Watch, chosen_tables, unwatched
+from fogsim.reproduce.result import Cell, PaperCell, Reproduction, Rows, Watch, chosen_tables, figure_image, unwatched
 from fogsim.values import Camera, Observation, Response
 
 _MARKS = ("o", "s", "^", "D")

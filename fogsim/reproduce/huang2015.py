@@ -14,7 +14,6 @@ from fogsim.estimators.huang2015_comparison import BODY_HALF_WIDTH, BODY_HEIGHTS
 from fogsim.estimators.huang2015_medians import Huang2015Repair
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.render import Renderer
-from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.huang2015_chase import Chase, drawn, fogged
 from fogsim.reproduce.huang2015_figures import (
     LAST,
@@ -30,7 +29,17 @@ from fogsim.reproduce.huang2015_figures import (
     seen_visibility,
     wanted_cases,
 )
-from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, chosen_tables, unwatched
+from fogsim.reproduce.result import (
+    Cell,
+    Reproduction,
+    Rows,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    figure_image,
+    unwatched,
+)
 from fogsim.reproduce.road_sweeps import DRIVES, steps_of, swept
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Observation

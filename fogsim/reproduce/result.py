@@ -3,10 +3,14 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from typing import Literal
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.values import Estimate
@@ -157,3 +161,11 @@ class Reproduction:
     def all_tables(self) -> tuple[TitledTable, ...]:
         """All tables, one or several."""
         return self.tables or (TitledTable(self.paper, self.table),)
+
+
+def figure_image(figure: Figure) -> NDArray[np.uint8]:
+    """Image (rows, cols, 3) of a figure."""
+    FigureCanvasAgg(figure)
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png")
+    return np.asarray(Image.open(drawn).convert("RGB"))

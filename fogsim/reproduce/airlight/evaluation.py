@@ -15,9 +15,18 @@ from fogsim.calibration.staged_road import StagedVehicle, foggy_radiance, road_r
 from fogsim.camera import Sensor, expose
 from fogsim.estimators import make
 from fogsim.render import Renderer
-from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.huang2015_chase import drawn
-from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, chosen_tables, unwatched
+from fogsim.reproduce.result import (
+    Cell,
+    Reproduction,
+    Rows,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    figure_image,
+    unwatched,
+)
 from fogsim.reproduce.road_sweeps import CAMERA, SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, FogField, Frame, LeadMeasurement, Observation, View

@@ -24,8 +24,7 @@ from fogsim.reproduce.drivers.plan import (
     interval,
 )
 from fogsim.reproduce.drivers.road import BRAKING, THINKING_TIME, Measures, PairMeasures
-from fogsim.reproduce.figure_image import figure_image
-from fogsim.reproduce.result import Cell, Rows, TitledTable
+from fogsim.reproduce.result import Cell, Rows, TitledTable, figure_image
 from fogsim.units import KMH_PER_MPS, finite_or_none
 
 _COLOURS = {DEFAULT: "tab:blue", SEEING: "tab:orange"}

@@ -26,7 +26,6 @@ from fogsim.estimators.night.veil_correlation import (
     visibility_by_parabola,
 )
 from fogsim.lighting.beams import high_beam, low_beam
-from fogsim.reproduce.figure_image import figure_image
 from fogsim.reproduce.night.limits import limits, veil_luminance
 from fogsim.reproduce.result import (
     PaperCell,
@@ -36,6 +35,7 @@ from fogsim.reproduce.result import (
     TitledTable,
     Watch,
     chosen_tables,
+    figure_image,
     found_visibility,
     unwatched,
 )

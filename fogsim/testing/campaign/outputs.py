@@ -143,7 +143,7 @@ def write_report(
         if campaign.earlier
         else [],
         space=[(name, _distribution(axis)) for name, axis in campaign.space.axes.items()],
-        _maps=[
+        maps=[
             (caption, data_url(svg_of(figure, caption).encode(), "image/svg+xml"))
             for caption, figure in _maps(campaign, found)
         ],

@@ -19,8 +19,7 @@ from itertools import islice
 from pathlib import Path
 
 from harness import Row, lines_of, parse_options, progress, publish
-from traffic import configuration
-from traffic_town import has_programs, town_configuration
+from traffic import configuration, has_programs, town_configuration
 
 import fogsim
 from fogsim.scenario.loading import clock_settings, scenario_from_config

@@ -63,7 +63,7 @@ def reproduced(name: str) -> "Reproduction":
 
 def paper_cells(name: str) -> Rows:
     """Every published figure of a paper next to ours, misses in bold, and how many are reached."""
-    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts  # noqa: PLC0415 - as above
+    from fogsim.reproduce.result import CELL_HEADING, reached_counts  # noqa: PLC0415 - as above
 
     cells = reproduced(name).cells
     reached = map(str, reached_counts(cells))

@@ -30,7 +30,7 @@ P_SHOWN = 0.05
 Column = tuple[str, str, float, int]
 
 SPEED: Column = ("traffic_mean_speed_mps", "mean speed [km/h]", 3.6, 1)
-SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
+DEVIATION: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
 OVERDRIVEN: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven in fog [m per vehicle-km]", 1.0, 0)
 MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin in fog, by distance [m]", 1.0, 0)
 CONFLICTS: Column = ("traffic_conflicts_per_cohort_vehicle", "conflicts per 100 vehicles", 100.0, 1)
@@ -39,6 +39,15 @@ DELAY: Column = ("traffic_delay_s_per_cohort_vehicle", "delay [s per vehicle]", 
 SIGNS = (SPEED, DELAY, OVERDRIVEN, MARGIN, CONFLICTS, COLLISIONS)
 EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m per km in fog]", 1.0, 0)
 CLOSEST: Column = ("minimum_time_to_collision_s", "least time to collision of the ego [s]", 1.0, 1)
+ADVISED: Column = ("advised_time_share", "advised [% of time]", 100.0, 0)
+HIGH_BEAMS: Column = ("high_beam_time_share", "high beams [% of time]", 100.0, 0)
+BANK_KNOWN: Column = ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0)
+ADVICE: Sequence[Column] = (
+    ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
+    ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
+    ADVISED,
+)
+DRIVING: Sequence[Column] = (EGO, OVERDRIVEN, ("collisions", "collisions a run", 1.0, 2))
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
     "message_sign": SIGNS,
@@ -51,26 +60,11 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         EGO,
         CLOSEST,
     ),
-    "estimators_in_the_loop": (
-        ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
-        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
-        ("advised_time_share", "advised [% of time]", 100.0, 0),
-        EGO,
-        OVERDRIVEN,
-        ("collisions", "collisions a run", 1.0, 2),
-    ),
-    "night_estimators_in_the_loop": (
-        ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
-        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
-        ("advised_time_share", "advised [% of time]", 100.0, 0),
-        ("high_beam_time_share", "high beams [% of time]", 100.0, 0),
-        EGO,
-        OVERDRIVEN,
-        ("collisions", "collisions a run", 1.0, 2),
-    ),
+    "estimators_in_the_loop": (*ADVICE, *DRIVING),
+    "night_estimators_in_the_loop": (*ADVICE, HIGH_BEAMS, *DRIVING),
     "who_tells_of_the_bank": (
         ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
-        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
+        BANK_KNOWN,
         ("belief_200_m_ahead_median_error_percent", "belief 200 m ahead: error [%]", 1.0, 0),
         ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
         EGO,
@@ -78,8 +72,8 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         CLOSEST,
     ),
     "which_sensor": (
-        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
-        ("advised_time_share", "advised [% of time]", 100.0, 0),
+        BANK_KNOWN,
+        ADVISED,
         ("mean_speed_mps", "speed of the ego [km/h]", 3.6, 0),
         EGO,
         CLOSEST,
@@ -87,14 +81,14 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
     ),
     "lighting_policies": (
         ("mean_own_sight_m", "own sight [m]", 1.0, 1),
-        ("high_beam_time_share", "high beams [% of time]", 100.0, 0),
+        HIGH_BEAMS,
         ("glare_dealt_time_share", "glare dealt [% of time]", 100.0, 1),
         ("glare_dealt_s", "glare dealt [driver-s]", 1.0, 1),
         ("max_glare_dealt_cdpm2", "largest veil dealt [cd/m²]", 1.0, 2),
         ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
         ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
-    "field_sizes": (SPEED, SPREAD, OVERDRIVEN, MARGIN, ("traffic_collisions", "collisions a run", 1.0, 2)),
+    "field_sizes": (SPEED, DEVIATION, OVERDRIVEN, MARGIN, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 

@@ -38,7 +38,7 @@ from fogsim.errors import FogSimError, LeftOutWarning, RenamedWarning, UnplayedW
 from fogsim.estimators import ESTIMATORS
 from fogsim.estimators.learned.onnx_model import read_model
 from fogsim.offline.camera_file import load_calibration
-from fogsim.offline.drive.sign_file import load_sign_file
+from fogsim.offline.drive.sign_watch import load_sign_file
 from fogsim.offline.drive.track_file import load_track
 from fogsim.offline.input_paths import find_source
 from fogsim.scenario.loading import load_cases, load_scenario

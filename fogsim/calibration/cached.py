@@ -16,9 +16,9 @@ from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
+from fogsim.calibration.halo_calibration import measure_halo_threshold
 from fogsim.calibration.lit_fog import lit_fog
-from fogsim.calibration.sign_calibration import measure_operating_range
+from fogsim.calibration.sign_calibration import Watch, measure_operating_range
 from fogsim.calibration.veil_references import usual_references
 from fogsim.core.files.user_cache import cache_directory, keep_newest, read_entry, write_entry
 from fogsim.estimators.night.halos import HaloThreshold

@@ -1,10 +1,11 @@
 """Which halos part fog from clear nights with a camera: many staged scenes, exposures and strengths of lamps."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from fogsim.calibration.sign_calibration import Watch
 from fogsim.calibration.staged_night import GLARE, NightRoad, NightScene, NightVehicle
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import NEAREST, HaloThreshold, largest_sharpness, mean_steepness
@@ -16,9 +17,6 @@ _FOGS = (200.0, 100.0, 50.0)
 
 _EXPOSURES, _STRENGTHS = (0.6, 1.6), (0.6, 1.6)
 """Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""
-
-Watch = Callable[[int, int], None]
-"""Called with the number of finished scenes and of all."""
 
 _LIT = Lamp.POSITION | Lamp.LOW_BEAM
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.calibration.sign_drives import sign_beside
+from fogsim.calibration.sign_calibration import sign_beside
 from fogsim.calibration.staged_road import StagedVehicle, staged_traffic, straight_road
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose, metered_luminance, sensor_at
 from fogsim.camera.exposure import wanted_saturation as saturation_for

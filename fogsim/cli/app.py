@@ -34,14 +34,14 @@ from fogsim.core.interruption import ProgramSignals, leave, leave_on_signals
 from fogsim.errors import FogSimError, MethodError
 
 
-class FileKind(StrEnum):
+class _FileKind(StrEnum):
     """Types of files that users write."""
 
     SCENARIO = "scenario"
     STUDY = "study"
 
 
-def new_command(
+def _new_command(
     name: Annotated[str, typer.Argument(help="Name of the new scenario, and of its folder.")],
     source: Annotated[str, typer.Option("--from", help="Scenario name, file or folder to copy.")],
     parent: Annotated[Path, typer.Option("--in", help="Parent of the new folder.")] = Path(),
@@ -54,14 +54,14 @@ def new_command(
     stdout.print(f"next: edit {escape(str(parent / name))}/scenario.yaml, then fogsim run {escape(str(parent / name))}")
 
 
-def schema_command(
-    kind: Annotated[FileKind, typer.Argument(help="Type of the file.")] = FileKind.SCENARIO,
+def _schema_command(
+    kind: Annotated[_FileKind, typer.Argument(help="Type of the file.")] = _FileKind.SCENARIO,
 ) -> None:
     """Print the JSON schema of scenario or study files, which lets editors complete and check them."""
     from fogsim.scenario.json_schema import json_schema, scenario_json_schema
     from fogsim.study.plan import StudyFile
 
-    schema = scenario_json_schema() if kind == FileKind.SCENARIO else json_schema(StudyFile)
+    schema = scenario_json_schema() if kind == _FileKind.SCENARIO else json_schema(StudyFile)
     typer.echo(json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False))
 
 
@@ -100,8 +100,8 @@ app.command("view")(view_command)
 app.command("recover")(recover_command)
 app.command("list")(list_command)
 app.command("validate")(validate_command)
-app.command("new")(new_command)
-app.command("schema")(schema_command)
+app.command("new")(_new_command)
+app.command("schema")(_schema_command)
 app.command("signs")(signs_command)
 app.command("dataset")(dataset_command)
 app.command("fog")(fog_command)

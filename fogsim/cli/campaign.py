@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from fogsim.testing.shrinking import SmallestCase
 
 
-class CampaignEngine(StrEnum):
+class _CampaignEngine(StrEnum):
     """Values of `--engine`."""
 
     LOCAL = "local"
     RAY = "ray"
 
 
-class FirstDraws(StrEnum):
+class _FirstDraws(StrEnum):
     """Values of `--first`."""
 
     SOBOL = "sobol"
@@ -43,8 +43,8 @@ def campaign_command(
         int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Concurrent runs. Default: one per core.")
     ] = None,
     engine: Annotated[
-        CampaignEngine, typer.Option(help="Where to run: processes on this machine, or a Ray cluster.")
-    ] = CampaignEngine.LOCAL,
+        _CampaignEngine, typer.Option(help="Where to run: processes on this machine, or a Ray cluster.")
+    ] = _CampaignEngine.LOCAL,
     address: Annotated[
         str | None, typer.Option(help="With --engine ray: as in fogsim study. Default: $RAY_ADDRESS, or local.")
     ] = None,
@@ -54,7 +54,7 @@ def campaign_command(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws, 0 by default.")] = None,
     first: Annotated[
-        FirstDraws | None, typer.Option(help="How the first cases fill the space, sobol by default.")
+        _FirstDraws | None, typer.Option(help="How the first cases fill the space, sobol by default.")
     ] = None,
     against: Annotated[
         Path | None,
@@ -72,7 +72,7 @@ def campaign_command(
     from fogsim.testing.campaign.running import load_campaign, run_campaign, smallest_failing
 
     _refuse_clashes(file, out, junit, against, {"--budget": budget, "--seed": seed, "--first": first})
-    if address is not None and engine is CampaignEngine.LOCAL:
+    if address is not None and engine is _CampaignEngine.LOCAL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
     chosen = with_timeout(settings, method_timeout)
     campaign = load_campaign(
@@ -97,7 +97,7 @@ def campaign_command(
             found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
             progress.update(task, description="searching the smallest failing case")
             # One case after another: a cluster would be connected to for each.
-            smallest = smallest_failing(campaign, found, out, _engine(CampaignEngine.LOCAL, None, 1))
+            smallest = smallest_failing(campaign, found, out, _engine(_CampaignEngine.LOCAL, None, 1))
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished cases are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None
@@ -137,7 +137,7 @@ def _report(
     from fogsim.testing.campaign.comparison import CASES, changes_text
     from fogsim.testing.campaign.outputs import counts_text, rate_text, write_campaign_junit, write_cases, write_report
     from fogsim.testing.campaign.running import as_test
-    from fogsim.testing.odd.coverage_files import remove_coverage, write_coverage
+    from fogsim.testing.odd.coverage_watch import remove_coverage, write_coverage
     from fogsim.testing.shrinking import smallest_text
 
     write_cases(out / CASES, campaign, found)
@@ -163,15 +163,15 @@ def _report(
 
 
 def _engine(
-    chosen: CampaignEngine, address: str | None, processes: int | None, odd: "OddFile | None" = None
+    chosen: _CampaignEngine, address: str | None, processes: int | None, odd: "OddFile | None" = None
 ) -> "Engine":
     import os
 
     from fogsim.study import RayCluster
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import CoverageCheck, check_outcome, check_to_file
+    from fogsim.testing.execution import CoverageCheck, check_outcome
 
-    check = None if odd is None else CoverageCheck(odd)
-    if chosen is CampaignEngine.RAY:
-        return RayCluster(address, processes, check_outcome if check is None else check.outcome)
-    return ProcessPool(processes or os.cpu_count() or 1, check_to_file if check is None else check.to_file)
+    work = check_outcome if odd is None else CoverageCheck(odd)
+    if chosen is _CampaignEngine.RAY:
+        return RayCluster(address, processes, work)
+    return ProcessPool(processes or os.cpu_count() or 1, work)

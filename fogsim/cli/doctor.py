@@ -28,7 +28,7 @@ _PACKAGES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class _Finding:
     """Result of one check; `detail` is the version, or the problem and its fix."""
 
     subject: str
@@ -42,7 +42,7 @@ def doctor_command(
     ] = False,
 ) -> None:
     """List what works on this machine, what is missing, and how to install it."""
-    findings = examine()
+    findings = _examine()
     width = max(len(finding.subject) for finding in findings)
     for finding in findings:
         mark = "[green]fine   [/]" if finding.works else "[red]missing[/]"
@@ -53,27 +53,27 @@ def doctor_command(
         compile_command()
 
 
-def examine() -> list[Finding]:
+def _examine() -> list[_Finding]:
     """Check Python, packages, SUMO, the renderers and the video encoder."""
-    findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
+    findings = [_Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
     findings += [_package(name) for name in _PACKAGES]
     findings += [_try("SUMO", _sumo), _try("renderer opengl", _gl), _try("renderer cpu", _cpu)]
     findings += [_try("renderer auto", _auto), _try("video encoder", _ffmpeg)]
     return findings
 
 
-def _package(name: str) -> Finding:
+def _package(name: str) -> _Finding:
     try:
-        return Finding(name, True, version(name))
+        return _Finding(name, True, version(name))
     except PackageNotFoundError:
-        return Finding(name, False, f"not installed: pip install {name}")
+        return _Finding(name, False, f"not installed: pip install {name}")
 
 
-def _try(subject: str, check: Callable[[], str]) -> Finding:
+def _try(subject: str, check: Callable[[], str]) -> _Finding:
     try:
-        return Finding(subject, True, check())
+        return _Finding(subject, True, check())
     except (FogSimError, ImportError, OSError) as error:  # a library may be missing or incomplete
-        return Finding(subject, False, str(error))
+        return _Finding(subject, False, str(error))
 
 
 def _sumo() -> str:

@@ -78,7 +78,7 @@ def _evaluated(name: str, evaluation: "Evaluation", *, quick: bool, table: str |
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:
-    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts
+    from fogsim.reproduce.result import CELL_HEADING, reached_counts
 
     if as_json:
         cells = [{"paper": done.paper, "table": "cells", **cell.record()} for cell in done.cells]

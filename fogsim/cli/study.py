@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario
 
 
-class EngineName(StrEnum):
+class _EngineName(StrEnum):
     """Values of `--engine`."""
 
     POOL = "pool"
@@ -32,8 +32,8 @@ def study_command(
         int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Concurrent runs. Default: one per core.")
     ] = None,
     engine: Annotated[
-        EngineName, typer.Option(help="Where to run: processes on this machine, or a Ray cluster.")
-    ] = EngineName.POOL,
+        _EngineName, typer.Option(help="Where to run: processes on this machine, or a Ray cluster.")
+    ] = _EngineName.POOL,
     address: Annotated[
         str | None,
         typer.Option(help="With --engine ray: HOST:PORT of the head, auto or local. Default: $RAY_ADDRESS, or local."),
@@ -49,9 +49,9 @@ def study_command(
     from fogsim.study import RayCluster, load_study, run_study
     from fogsim.study.plan import grid_text
 
-    if address is not None and engine is EngineName.POOL:
+    if address is not None and engine is _EngineName.POOL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
-    on_ray = engine is EngineName.RAY
+    on_ray = engine is _EngineName.RAY
     runner = {"engine": RayCluster(address, processes)} if on_ray else {"processes": processes}
     may_import = import_nothing if check else CodeNotice()
     with counting_bar(stderr, "checking the scenario of each cell") as watch:

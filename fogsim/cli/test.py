@@ -115,7 +115,7 @@ def _asked_for(
 
 def _run(tests: "Sequence[FogTest]", out: Path, processes: int, *, exit_first: bool) -> "list[FileOutcome]":
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import check_to_file
+    from fogsim.testing.execution import check_outcome
     from fogsim.testing.session import run_cases
 
     total = sum(len(test.runs) for test in tests)
@@ -126,7 +126,7 @@ def _run(tests: "Sequence[FogTest]", out: Path, processes: int, *, exit_first: b
             failures = f", {failed} failed" if failed else ""
             progress.update(task, completed=done, description=f"{done} of {total} runs{failures}")
 
-        engine = ProcessPool(processes, check_to_file)
+        engine = ProcessPool(processes, check_outcome)
         return run_cases(tests, out, engine, first_failure_ends=exit_first, watch=show)
 
 
@@ -161,19 +161,19 @@ def _print_line(outcome: str, text: str) -> None:
 
 def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) -> None:
     from fogsim.study.pool import ProcessPool
-    from fogsim.testing.execution import check_to_file
+    from fogsim.testing.execution import check_outcome
     from fogsim.testing.shrinking import shrink, smallest_text
 
     for judgement in outcome.judgements:
         if len(outcome.results) > 1 and judgement.numbers[1]:
-            found = shrink(outcome, judgement, settings, ProcessPool(1, check_to_file), out / "results")
+            found = shrink(outcome, judgement, settings, ProcessPool(1, check_outcome), out / "results")
             text = smallest_text(outcome.test, found, settings)
             stdout.print(f"{_INDENT}{escape(f'{judgement.title}: {text}')}", soft_wrap=True)
 
 
 def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> None:
     """Report failures to GitHub by file and line, if it runs this."""
-    from fogsim.testing.annotations import annotations
+    from fogsim.testing.junit import annotations
 
     if os.environ.get("GITHUB_ACTIONS") == "true":
         for line in annotations(outcomes, settings):

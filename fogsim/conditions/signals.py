@@ -4,13 +4,87 @@ import math
 from collections.abc import Callable
 from typing import TypeVar
 
-from fogsim.conditions.moment import Moment
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.conditions.moment import EGO, Moment
 from fogsim.conditions.signal import Kind, Need, Place, Signal, length_signal, speed_signal
-from fogsim.conditions.surroundings import OF_SURROUNDINGS, is_inside
 from fogsim.conditions.vehicle_signals import LAMP_WORDS, OF_VEHICLES, lit_lamps
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.core.registry import Registry
-from fogsim.values import DriverWarning, Ending, Estimate, Leader, SignalAhead, SignalColour, Step
+from fogsim.values import DriverWarning, Ending, Estimate, FogBank, Leader, SignalAhead, SignalColour, Step
+
+_EGO, _FRAMES = frozenset({Need.EGO}), frozenset({Need.FRAMES})
+
+_REACH = 250.0
+"""Distance ahead and behind in which vehicles count for the traffic density [m]."""
+
+
+def _is_inside(bank: FogBank, position: NDArray[np.float64]) -> bool:
+    """Whether a position (3,) [m] is between the beginning and the end of a bank."""
+    east, north, _ = position
+    along = (east - bank.origin[0]) * bank.axis[0] + (north - bank.origin[1]) * bank.axis[1]
+    return bool(bank.start <= along <= bank.end)
+
+
+def _density(moment: Moment) -> float | None:
+    step = moment.ego_step
+    if step is None:
+        return None
+    traffic, ego = step.traffic, step.ego
+    reach = min(_REACH, step.reading_radius)
+    apart = traffic.position[:, :2] - traffic.position[ego, :2]
+    is_near = np.hypot(apart[:, 0], apart[:, 1]) <= reach
+    is_along = np.cos(traffic.heading - traffic.heading[ego]) > 0.0
+    return float(np.count_nonzero(is_near & is_along) - 1) / (2.0 * reach)
+
+
+def _is_in_any_bank(moment: Moment) -> bool | None:
+    row, fog = moment.row(EGO), moment.step.truth.fog
+    if row is None or fog is None:
+        return None
+    return any(_is_inside(bank, moment.traffic.position[row]) for bank in fog.banks)
+
+
+_OF_SURROUNDINGS = {
+    "light": Signal(
+        "horizontal illuminance of the sky: 10 000 lx by day, below 1 lx at night",
+        lambda m: m.step.truth.illuminance,
+        unit="lx",
+        least=0.0,
+    ),
+    "ego.curvature": Signal(
+        "curvature of the road, over 50 m about the ego: 0 where it is straight, 1 km^-1 for a radius of 1000 m",
+        lambda m: m.curvature(EGO),
+        unit="m^-1",
+        shown_unit="km^-1",
+        least=0.0,
+        needs=_EGO,
+    ),
+    "ego.traffic_density": Signal(
+        f"other vehicles in the ego's direction within {_REACH:g} m of it, on all lanes, per length of road",
+        _density,
+        unit="veh/m",
+        shown_unit="veh/km",
+        least=0.0,
+        needs=_EGO,
+    ),
+    "ego.has_leader": Signal(
+        "whether a vehicle is ahead of the ego",
+        lambda m: None if m.ego_step is None else m.ego_step.leader is not None,
+        Kind.FLAG,
+        needs=_EGO,
+    ),
+    "ego.sensor_fault": Signal(
+        "whether a fault of the ego's sensors is in force",
+        lambda m: None if m.ego_step is None else bool(m.step.truth.faults),
+        Kind.FLAG,
+        needs=_EGO,
+    ),
+    "fog.in_bank": Signal("whether the ego is in any of the fog banks", _is_in_any_bank, Kind.FLAG, needs=_EGO),
+}
+"""By name."""
+
 
 NO_LEADER = "none"
 """Value of ``ego.leader`` without a vehicle ahead."""
@@ -22,8 +96,6 @@ _ENDING_WORDS = tuple(ending.name.lower() for ending in Ending)
 """Endings of a run by their words."""
 
 _Read = TypeVar("_Read", float, str)
-
-_EGO, _FRAMES = frozenset({Need.EGO}), frozenset({Need.FRAMES})
 
 
 def _of_leader(read: Callable[[Leader, float], float]) -> Callable[[Moment], float | None]:
@@ -64,7 +136,7 @@ def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | Non
     row, fog = moment.row(vehicle), moment.step.truth.fog
     if row is None or fog is None or int(number) >= len(fog.banks):
         return None
-    return is_inside(fog.banks[int(number)], moment.traffic.position[row])
+    return _is_inside(fog.banks[int(number)], moment.traffic.position[row])
 
 
 def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callable[[Moment, str], float | bool | None]:
@@ -261,7 +333,7 @@ _OF_FOG = {
 }
 
 SIGNALS: Registry[Signal] = Registry(
-    "signal", {**_OF_RUN, **OF_VEHICLES, **_OF_EGO, **OF_SURROUNDINGS, **_OF_LIGHTS, **_OF_FOG}
+    "signal", {**_OF_RUN, **OF_VEHICLES, **_OF_EGO, **_OF_SURROUNDINGS, **_OF_LIGHTS, **_OF_FOG}
 )
 """Every signal by name. In a name, X and Y are vehicles (``ego`` for the ego), METHOD an estimator of the
 scenario, ID a traffic light, N the number of a fog bank, EVENT an entry of the timeline."""

@@ -98,7 +98,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
                 self._print(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
-class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
+class _CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
     It pauses garbage collection, which finds little among millions of objects, and skips what numba is spared
@@ -130,7 +130,7 @@ class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
 
 
 event.register("numba:compile", Announcement(logging.getLogger(_FOGSIM).warning))
-event.register("numba:compile", CompileSpeedup())
+event.register("numba:compile", _CompileSpeedup())
 
 
 class CompilerProcess:

@@ -1,6 +1,6 @@
 """Camera frames with their ground truth: from a step in Python, or as a data set on disk."""
 
-from fogsim.dataset.encoding import decoded_depth, decoded_transmission, encoded_depth, encoded_transmission, read_png
+from fogsim.dataset.directory import decoded_depth, decoded_transmission, encoded_depth, encoded_transmission, read_png
 from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, sign_picture, transmission
 from fogsim.dataset.write import WrittenDataset, write_dataset
 

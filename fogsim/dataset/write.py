@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from fogsim.core.interruption import Interruption
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
-from fogsim.dataset.directory import DatasetDirectory
-from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
+from fogsim.dataset.directory import (
+    DEPTH_UNIT,
+    TRANSMISSION_UNIT,
+    DatasetDirectory,
+    encoded_depth,
+    encoded_transmission,
+)
 from fogsim.dataset.ground_truth import (
     SemanticClass,
     depth,
@@ -131,7 +136,7 @@ def _object(step: Step, number: int) -> dict[str, Any]:
     }
 
 
-def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def _coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """COCO file of frames in order; each record has an "image" and its "annotations"."""
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
@@ -379,5 +384,5 @@ def _write_annotations(directory: DatasetDirectory, scenario: Scenario, frames: 
         "transmission_unit": TRANSMISSION_UNIT,
         "semantic_classes": {kind.name.lower(): int(kind) for kind in SemanticClass},
     }
-    directory.write_annotations(coco(information, records))
+    directory.write_annotations(_coco(information, records))
     return len(records)

@@ -4,11 +4,10 @@ from collections.abc import Callable
 
 from fogsim.core.registry import Registry
 from fogsim.lighting.beams import LampMount, own_head_lamps
-from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014
 from fogsim.lighting.legal import LegalRules
 from fogsim.lighting.optimiser import SightOptimiser
 from fogsim.lighting.protocol import LightingPolicy, VehicleLightingPolicy
-from fogsim.lighting.rules import FogLampRules, LowBeamOnly
+from fogsim.lighting.rules import AlwaysHigh, FogLampRules, Gallen2014, LowBeamOnly
 
 LIGHTING_POLICIES: Registry[Callable[..., LightingPolicy | VehicleLightingPolicy]] = Registry(
     "lighting policy",

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from fogsim.core.parameters import Range, checked_parameters
-from fogsim.lighting.high_beam import HIGH_BEAMS, Metres, Seconds, is_dark, settled, would_dazzle
-from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
-from fogsim.values import Belief, Lamp, LampChoice, Observation
+from fogsim.lighting.rules import CAREFUL, Gallen2014, Metres, Quantile, Seconds
+from fogsim.values import Belief, LampChoice, Observation
 
 _FOG_VISIBILITY = 1000.0
 """Visibility below which there is fog, where rules say no more than that [m] (WMO)."""
@@ -121,14 +120,8 @@ class LegalRules:
         belief, observation, time, previous
             What is believed and measured, the instant, and lamps lit now.
         """
-        visibility = belief.known_visibility(self.quantile)
-        if visibility is None:
-            return LampChoice(BY_DAY)
         law = LAWS[self.country]
-        rules = FogLampRules(law.rear_fog_below, law.front_fog_below, self.hysteresis, self.quantile)
-        fog_lamps = rules.lamps(belief, previous.lamps) & ~BY_DAY
-        margin = 1.0 if Lamp.HIGH_BEAM in previous.lamps else 1.0 + self.hysteresis
-        may_shine = visibility >= law.high_beam_from * margin and not would_dazzle(observation, law.near_lead)
-        if is_dark(observation) and may_shine:
-            return settled(HIGH_BEAMS | fog_lamps & Lamp.REAR_FOG, time, previous, self.dwell)
-        return settled(BY_DAY | fog_lamps, time, previous, self.dwell)
+        # The paper's rule, by the thresholds of the country.
+        fog_lamps = law.rear_fog_below, law.front_fog_below
+        rule = Gallen2014(law.high_beam_from, self.hysteresis, law.near_lead, self.dwell, *fog_lamps, self.quantile)
+        return rule.choose_lamps(belief, observation, time, previous)

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fogsim.core.parameters import Range, checked_parameters
-from fogsim.lighting.high_beam import HIGH_BEAMS, Seconds, is_dark, settled
 from fogsim.lighting.own_sight import headlamp_sight_distance
-from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
+from fogsim.lighting.rules import BY_DAY, CAREFUL, HIGH_BEAMS, FogLampRules, Quantile, Seconds, is_dark, settled
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 from fogsim.values.eye import disability_glare

@@ -7,10 +7,9 @@ from typing import Generic, TypeVar
 
 from fogsim.core.registry import Registry
 from fogsim.errors import SimulationError
-from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
-from fogsim.metrics.estimation.fog_warnings import FogWarnings
+from fogsim.metrics.estimation.belief_ahead import FogWarnings
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definitions_of
 from fogsim.metrics.motion import Comfort, Compliance, Motion
@@ -20,6 +19,7 @@ from fogsim.metrics.traffic_comfort import TrafficComfort, TrafficCompliance, Tr
 from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts, TrafficHeadways
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficCohort, TrafficMetric
+from fogsim.metrics.traffic_throughput import TrafficThroughput
 from fogsim.units import clock_time
 from fogsim.values import Ending, Step, TrafficStep
 from fogsim.values.result_checks import checked_values

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.core.files.generated_files import write_generated
 from fogsim.core.files.readers import find_map
+from fogsim.core.files.user_cache import write_generated
 from fogsim.errors import InputError
 from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.environment import CLASSES, HABITS, Vehicle, fog_block, read_vehicles

@@ -1,16 +1,14 @@
 """What happens in a run, one row each: what the script does, collisions, faults, warnings, traffic lights, the end."""
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from fogsim.core.files.row_log import RowLog, row_batches, row_schema
+from fogsim.core.files.row_log import row_batches, row_schema
 from fogsim.recorders.protocol import Derived
-from fogsim.recorders.run_directory import EVENT_LOG
-from fogsim.recorders.table import write_table
+from fogsim.recorders.table import LoggedTable, write_table
 from fogsim.values import DriverWarning, SignalColour, Step, TrafficStep
 
 EVENT_COLUMNS: Mapping[str, tuple[Any, str]] = {
@@ -44,34 +42,28 @@ class _Event(NamedTuple):
     place: tuple[float | None, ...] | None = None
 
 
-class EventRecorder:
+class EventRecorder(LoggedTable[tuple[object, ...]]):
     """Writes ``events.parquet``: a row for each event, in the order of time; equal steps give equal bytes.
 
-    Until it is closed, rows are in ``events.arrows`` next to it, from the step on in which they happened.
+    Rows are in the log from the step on in which they happened.
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._schema = pa.schema(
-            [(name, kind) for name, (kind, _) in EVENT_COLUMNS.items()],
-            metadata={"fogsim.columns": json.dumps({name: told for name, (_, told) in EVENT_COLUMNS.items()})},
-        )
-        self._log: RowLog | None = None
+        super().__init__(path, EVENT_COLUMNS, write_event_table)
         self._faults: frozenset[str] = frozenset()
         self._warning: DriverWarning | None = None
         self._shown: dict[tuple[str, str], SignalColour] = {}
-        self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
         """Add the events of a step."""
-        rows = [self._row(step, event) for event in self._events(step)]
+        self._held += [self._row(step, event) for event in self._events(step)]
         self._warning = step.command.warning
         self._faults = frozenset(fault.name for fault in step.truth.faults)
-        if self._log is None:
-            self._log = RowLog(self._path.with_name(EVENT_LOG), self._schema)
-        if rows:
-            columns = dict(zip(self._schema.names, zip(*rows, strict=True), strict=True))
-            self._log.append(pa.RecordBatch.from_pydict(columns, schema=self._schema))
+        self._flush()
+
+    def _batch(self) -> Any:
+        columns = dict(zip(self._schema.names, zip(*self._held, strict=True), strict=True))
+        return pa.RecordBatch.from_pydict(columns, schema=self._schema)
 
     def _events(self, step: TrafficStep) -> Iterator[_Event]:
         for begun in step.begun:
@@ -104,16 +96,6 @@ class EventRecorder:
         place = event.place or ((None, None, None) if row is None else step.traffic.position[row].tolist())
         told = event.name, event.what, ",".join(event.who)
         return (step.index, event.time, event.event, *told, *place, event.why)
-
-    def close(self, complete: bool) -> None:
-        """Make the parquet file of the rows, and say in it whether the run was complete."""
-        if not self._open:
-            return
-        log = self._log or RowLog(self._path.with_name(EVENT_LOG), self._schema)
-        log.release_reserve()
-        write_event_table(self._path, log.path, complete)
-        log.remove()
-        self._open = False
 
 
 def write_event_table(path: Path, log: Path, complete: bool) -> None:

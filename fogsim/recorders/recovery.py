@@ -5,7 +5,6 @@ import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
-from fogsim.core.files.row_log import read_rows
 from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
 from fogsim.recorders.events import write_event_table
@@ -20,7 +19,7 @@ from fogsim.recorders.run_directory import (
     refuse_living,
     whole_files,
 )
-from fogsim.recorders.table import write_table
+from fogsim.recorders.table import write_step_table
 from fogsim.recorders.trajectories import write_trajectory_table
 
 
@@ -61,14 +60,10 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
 
 def _make_readable(folder: Path) -> None:
     """Make tables from the rows in a folder."""
-    rows, trajectories, events = folder / ROW_LOG, folder / TRAJECTORY_LOG, folder / EVENT_LOG
-    # A log without a header is of a process that was killed at its start.
-    if rows.exists():
-        with contextlib.suppress(InputError):
-            write_table(folder / "steps.parquet", read_rows(rows), complete=False)
-        rows.unlink()
-    for log, write in ((trajectories, write_trajectory_table), (events, write_event_table)):
-        if log.exists():
+    writers = {ROW_LOG: write_step_table, TRAJECTORY_LOG: write_trajectory_table, EVENT_LOG: write_event_table}
+    for name, write in writers.items():
+        if (log := folder / name).exists():
+            # A log without a header is of a process that was killed at its start.
             with contextlib.suppress(InputError):
                 write(log.with_suffix(".parquet"), log, complete=False)
             log.unlink()

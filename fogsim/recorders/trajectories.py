@@ -1,6 +1,5 @@
 """Every vehicle and person at every camera period, in the columns of SUMO's own floating car data."""
 
-import json
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,10 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fogsim.core.files.atomic import whole_file, write_text
-from fogsim.core.files.row_log import RowLog, row_batches, row_schema
+from fogsim.core.files.row_log import row_batches, row_schema
 from fogsim.recorders.protocol import Derived
-from fogsim.recorders.run_directory import LOG_SUFFIX
-from fogsim.recorders.table import LOG_PERIOD
+from fogsim.recorders.table import LoggedTable
 from fogsim.recorders.templating import render
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Step, TrafficStep
@@ -151,29 +149,19 @@ _BELIEVED = ("believed_visibility", "believed_visibility_low", "believed_visibil
 _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
 
 
-class TrajectoryRecorder:
+class TrajectoryRecorder(LoggedTable[TrafficStep]):
     """Writes ``trajectories.parquet``: a row for each vehicle and each person on foot that is read, and each step.
 
     Rows go by time, and within a time as the traffic lists the vehicles, then persons; equal steps give equal bytes.
-    Until it is closed, rows are in a log next to it (``trajectories.arrows``), at most 0.5 s after they were recorded,
-    whatever ends the process. Memory does not grow with the run.
+    Memory does not grow with the run.
 
     Takes `clock` [s].
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        self._path = path
-        self._clock = clock
-        self._schema = pa.schema(
-            [(name, kind) for name, (kind, _) in TRAJECTORY_COLUMNS.items()],
-            metadata={"fogsim.columns": json.dumps({name: told for name, (_, told) in TRAJECTORY_COLUMNS.items()})},
-        )
-        self._log: RowLog | None = None
-        self._logged = -math.inf
+        super().__init__(path, TRAJECTORY_COLUMNS, write_trajectory_table, clock)
         self._last = -math.inf
-        self._held: list[TrafficStep] = []
         self._rows_held = 0
-        self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
         """Add the vehicles of a step; one in which no time has passed adds nothing."""
@@ -183,31 +171,41 @@ class TrajectoryRecorder:
             self._held.append(step)
             self._rows_held += len(traffic.ids) + len(traffic.persons.ids)
             self._last = traffic.time
-        now = self._clock()
-        if now - self._logged >= LOG_PERIOD or self._rows_held >= MOST_ROWS_HELD:
-            self._flush()
-            self._logged = now
+        if self._flush_if_due(at_once=self._rows_held >= MOST_ROWS_HELD):
+            self._rows_held = 0
 
-    def _flush(self) -> RowLog:
-        if self._log is None:
-            self._log = RowLog(self._path.with_suffix(LOG_SUFFIX), self._schema)
-        if self._held:
-            self._log.append(_batch(self._held, self._schema))
-            # A Ctrl-C before this line has them written twice; `write_trajectory_table` leaves out the second.
-            self._held, self._rows_held = [], 0
-        return self._log
+    def _batch(self) -> Any:
+        steps = self._held
+        states = [with_persons(step.traffic) for step in steps]
+        counts = [len(state.ids) for state in states]
+        position = np.concatenate([state.position for state in states])
 
-    def close(self, complete: bool) -> None:
-        """Make the parquet file of the rows, and say in it whether the run was complete."""
-        if not self._open:
-            return
-        if self._log is not None:
-            self._log.release_reserve()
-        log = self._flush()
-        log.release_reserve()
-        write_trajectory_table(self._path, log.path, complete)
-        log.remove()
-        self._open = False
+        def of_all(name: str) -> Any:
+            return np.concatenate([getattr(state, name) for state in states])
+
+        def texts(name: str) -> list[str]:
+            return [text for state in states for text in getattr(state, name)]
+
+        columns = {
+            "index": np.repeat([step.index for step in steps], counts),
+            "timestep_time": np.repeat([state.time for state in states], counts),
+            "vehicle_id": texts("ids"),
+            "vehicle_x": position[:, 0],
+            "vehicle_y": position[:, 1],
+            "vehicle_z": position[:, 2],
+            "vehicle_angle": np.mod(90.0 - np.degrees(of_all("heading")), 360.0),
+            "vehicle_type": texts("types"),
+            "vehicle_speed": of_all("speed"),
+            "vehicle_lane": texts("lane"),
+            "vehicle_slope": np.degrees(of_all("grade")),
+            "vehicle_acceleration": of_all("acceleration"),
+            "visibility": [visibility for step in steps for visibility in _visibilities(step)],
+            "advised_speed": [speed for step in steps for speed in _advised_speeds(step)],
+        }
+        believed = [quantiles for step in steps for quantiles in _believed_visibilities(step)]
+        columns |= {name: [quantiles[i] for quantiles in believed] for i, name in enumerate(_BELIEVED)}
+        arrays = [pa.array(columns[field.name], type=field.type, from_pandas=True) for field in self._schema]
+        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
     def __enter__(self) -> Self:
         return self
@@ -225,40 +223,6 @@ def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnySte
         for step in steps:
             recorder.record(step)
             yield step
-
-
-def _batch(steps: list[TrafficStep], schema: Any) -> Any:
-    """Rows of some instants (pyarrow.RecordBatch)."""
-    states = [with_persons(step.traffic) for step in steps]
-    counts = [len(state.ids) for state in states]
-    position = np.concatenate([state.position for state in states])
-
-    def of_all(name: str) -> Any:
-        return np.concatenate([getattr(state, name) for state in states])
-
-    def texts(name: str) -> list[str]:
-        return [text for state in states for text in getattr(state, name)]
-
-    columns = {
-        "index": np.repeat([step.index for step in steps], counts),
-        "timestep_time": np.repeat([state.time for state in states], counts),
-        "vehicle_id": texts("ids"),
-        "vehicle_x": position[:, 0],
-        "vehicle_y": position[:, 1],
-        "vehicle_z": position[:, 2],
-        "vehicle_angle": np.mod(90.0 - np.degrees(of_all("heading")), 360.0),
-        "vehicle_type": texts("types"),
-        "vehicle_speed": of_all("speed"),
-        "vehicle_lane": texts("lane"),
-        "vehicle_slope": np.degrees(of_all("grade")),
-        "vehicle_acceleration": of_all("acceleration"),
-        "visibility": [visibility for step in steps for visibility in _visibilities(step)],
-        "advised_speed": [speed for step in steps for speed in _advised_speeds(step)],
-    }
-    believed = [quantiles for step in steps for quantiles in _believed_visibilities(step)]
-    columns |= {name: [quantiles[i] for quantiles in believed] for i, name in enumerate(_BELIEVED)}
-    arrays = [pa.array(columns[field.name], type=field.type, from_pandas=True) for field in schema]
-    return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
 def _visibilities(step: TrafficStep) -> list[float | None]:

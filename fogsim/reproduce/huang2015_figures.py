@@ -3,14 +3,77 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
-from fogsim.reproduce.huang2015_published import TABLE_4_1, TABLE_4_2, TABLE_4_3, TABLE_5_1, TABLE_5_2, TABLE_5_3
-from fogsim.reproduce.paper_cells import PaperCell
-from fogsim.reproduce.result import Cell, Rows
+from fogsim.reproduce.result import Cell, PaperCell, Rows
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
+
+TABLE_4_1: Mapping[float, tuple[float, float]] = {
+    50.0: (46.0, 59.0),
+    100.0: (88.0, 103.0),
+    200.0: (140.0, 222.0),
+    350.0: (193.0, 279.0),
+    400.0: (255.0, 288.0),
+    500.0: (inf, inf),
+}
+"""True visibility: that of the inflection, and after the optimisation."""
+
+TABLE_4_2: Mapping[float, Mapping[float, float]] = {
+    5.0: {30.0: 84.9044, 35.0: 92.1565, 40.0: 77.1763, 45.0: 92.0751},
+    10.0: {35.0: 78.2449, 40.0: 71.1230, 45.0: 71.0602},
+    15.0: {40.0: 60.3865, 45.0: 65.4866},
+    20.0: {45.0: 55.6010},
+}
+"""Ratios of variances [%] by difference of range and far range."""
+
+TABLE_4_3: Mapping[float, tuple[float, float]] = {
+    50.0: (60.0, 59.0),
+    100.0: (95.0, 103.0),
+    200.0: (180.0, 222.0),
+    350.0: (340.0, 279.0),
+    400.0: (380.0, 288.0),
+    500.0: (480.0, inf),
+}
+"""True visibility: from the vehicle ("new approach"), and from the road ("old approach")."""
+
+TABLE_5_1: Mapping[float, Mapping[float, float]] = {
+    0.1: {100.0: 106.0, 200.0: 247.0, 300.0: 417.0, 400.0: inf, 500.0: inf},
+    0.2: {100.0: 99.0, 200.0: 205.0, 300.0: 402.0, 400.0: 895.0, 500.0: inf},
+    0.3: {100.0: 103.0, 200.0: 189.0, 300.0: 364.0, 400.0: 691.0, 500.0: 714.0},
+    0.4: {100.0: 95.0, 200.0: 205.0, 300.0: 342.0, 400.0: 459.0, 500.0: 512.0},
+    0.5: {100.0: 91.0, 200.0: 201.0, 300.0: 298.0, 400.0: 388.0, 500.0: 523.0},
+    0.6: {100.0: 94.0, 400.0: 392.0},
+}
+"""By track over true visibility, and true visibility."""
+
+TABLE_5_2: Mapping[float, Mapping[float, float]] = {
+    1.25: {50.0: 61.0, 100.0: 94.9, 200.0: 202.0},
+    2.5: {50.0: 59.0, 100.0: 93.0, 200.0: 186.0},
+    3.75: {50.0: 58.0, 100.0: 94.0, 200.0: 178.0},
+    5.0: {50.0: 61.0, 100.0: 96.0, 200.0: 200.0, 400.0: 409.0},
+    7.5: {50.0: 57.0, 100.0: 91.0, 200.0: 181.0},
+    10.0: {50.0: 59.0, 100.0: 95.0, 200.0: 180.0, 400.0: 376.0},
+    15.0: {50.0: 62.0, 100.0: 93.0, 200.0: 181.0},
+    20.0: {50.0: 55.0, 100.0: 94.0, 200.0: 188.0, 400.0: 409.0},
+    30.0: {100.0: 95.0},
+    40.0: {400.0: 402.0},
+}
+"""By interval of pictures [m], and true visibility."""
+
+TABLE_5_3: Mapping[float, Mapping[float, float]] = {
+    25.0: {100.0: 97.0, 200.0: 200.0, 300.0: 298.0, 400.0: 388.0, 500.0: 512.0},
+    30.0: {100.0: 95.0, 200.0: 198.0, 300.0: 296.0, 400.0: 380.0, 500.0: 484.0},
+    35.0: {100.0: 95.0, 200.0: 203.0, 300.0: 281.0, 400.0: 362.0, 500.0: 479.0},
+    40.0: {100.0: 91.0, 200.0: 203.0, 300.0: 290.0, 400.0: 373.0, 500.0: 429.0},
+    50.0: {100.0: 97.0, 200.0: 203.0, 300.0: 267.0, 400.0: 344.0, 500.0: 434.0},
+    60.0: {100.0: 102.0, 200.0: 228.0, 300.0: 316.0, 400.0: 349.0, 500.0: 437.0},
+    70.0: {100.0: 112.0, 200.0: 310.0, 300.0: 323.0, 400.0: 373.0, 500.0: 470.0},
+}
+"""By range of the first picture [m], and true visibility."""
+
 
 TABLES = ("4.1", "4.2", "4.3", "5.1", "5.2", "5.3")
 VARIANTS = ("published", "corrected")

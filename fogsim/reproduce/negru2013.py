@@ -12,8 +12,17 @@ from fogsim.calibration.staged_road import foggy_image, road_renderer, views
 from fogsim.estimators import make
 from fogsim.estimators.negru2013 import Negru2013Repair
 from fogsim.recorders.style import font
-from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
-from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.reproduce.result import (
+    Cell,
+    PaperCell,
+    Reproduction,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    found_visibility,
+    unwatched,
+)
 from fogsim.reproduce.road_sweeps import DRIVES, over_growths, steps_of, swept
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Camera, Estimate, Observation, fog_category

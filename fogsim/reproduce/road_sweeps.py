@@ -183,7 +183,7 @@ class Driven:
     observations: tuple[Observation, ...]
 
 
-def driven(
+def _driven(
     renderer: Renderer, setting: Setting, visibilities: Sequence[float], drives: int, steps: Steps
 ) -> list[Driven]:
     """Observations of drives along the road alone, in every fog; visibilities in [m]."""
@@ -240,7 +240,7 @@ def swept(
     left_open = left_open or {}
     records: list[dict[str, Cell]] = []
     for setting in SETTINGS:
-        seen = driven(renderer, setting, VISIBILITIES, drives, steps)
+        seen = _driven(renderer, setting, VISIBILITIES, drives, steps)
         forms = both | ({**_without_each(kind), **left_open} if setting is SETTINGS[0] else {})
         for name, form in forms.items():
             for visibility in VISIBILITIES:

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from fogsim.core.parameters import NUMBER, Range, checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
+from fogsim.scenario.build import traffic_setup
 from fogsim.scenario.loading import attached_scenario, clock_settings, override
-from fogsim.scenario.parts.traffic import traffic_setup
 from fogsim.scenario.runnable import Scenario
 from fogsim.simulation.plugin import AttachedSession
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic

@@ -18,8 +18,7 @@ from fogsim.scenario.document import Document, apply_overrides, read_scenario_do
 from fogsim.scenario.expect.checks import last_time
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
-from fogsim.scenario.roads.departures import entering_vehicles
-from fogsim.scenario.roads.files import DemandError, TrafficFiles, traffic_files, with_way
+from fogsim.scenario.roads.files import DemandError, TrafficFiles, entering_vehicles, traffic_files, with_way
 from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path

@@ -1,7 +1,7 @@
 """A scenario, which becomes the plain values that a run is made of."""
 
+from fogsim.scenario.build import run_config
 from fogsim.scenario.parts.methods import own_methods
-from fogsim.scenario.parts.run import run_config
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.wording.sentences import SENTENCES
 from fogsim.scenario.written_form import resolved

@@ -1,6 +1,6 @@
 """The schema of a scenario file. Lengths in m, times in s, speeds in km/h, angles in degrees: the units of its readers.
 
-Everything inside FogSim is SI and radians; `fogsim.scenario.parts` converts, once.
+Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
 """
 
 import warnings

@@ -18,10 +18,10 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.openscenario import is_openscenario
+from fogsim.scenario.build import named_files
 from fogsim.scenario.document import read_document
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
-from fogsim.scenario.parts.inputs import named_files
 from fogsim.scenario.runnable import Scenario
 from fogsim.scenario.section import Method
 from fogsim.traffic import SPEED_CHOICES

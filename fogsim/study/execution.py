@@ -2,13 +2,13 @@
 
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 from fogsim.core.files.atomic import write_json
 from fogsim.errors import FogSimError, UnplayedWarning
-from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics import MetricsOfRun, RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.simulation.ego.road_meters import RoadMeters
@@ -17,10 +17,13 @@ from fogsim.simulation.traffic_run import TrafficRun, run_traffic
 from fogsim.study.plan import StudyRun
 from fogsim.study.profiles import RunProfiles
 from fogsim.traffic import libsumo_traffic
-from fogsim.values import TrafficStep
+from fogsim.values import Ending, TrafficStep
 
 RunWatch = Callable[[StudyRun, str | None], None]
 """Called with each completed run, and its error."""
+
+Work = Callable[[Scenario, int, Path], dict[str, Any]]
+"""Runs a scenario with a seed, returns the content of the run's file, and leaves SUMO's outputs in a folder."""
 
 PROCESS_DIED = "the process that ran it died"
 """Message for a run whose process died twice."""
@@ -54,25 +57,34 @@ def result_file(folder: Path, run: StudyRun) -> Path:
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
     """Run a scenario and return its ``metrics`` (`RunSummary.flat`) and ``profiles`` (`RunProfiles.to_json`)."""
     profiles = RunProfiles()
+    metrics, _ = watched_run(scenario, seed, [profiles.update], sumo_outputs, [profiles])
+    return {"metrics": metrics, "profiles": profiles.to_json()}
+
+
+def watched_run(
+    scenario: Scenario,
+    seed: int,
+    watches: Sequence[Callable[[TrafficStep], object]],
+    sumo_outputs: Path | None = None,
+    profiles: Sequence[RunProfiles] = (),
+) -> tuple[Mapping[str, str | int | float | None], Ending | None]:
+    """Run a scenario, with or without an ego; its metrics (`RunSummary.flat`), and why it ended.
+
+    `watches` get each step; what was not played is left to them.
+    """
+    has_ego, ending = scenario.traffic.has_ego, None
+    metrics: MetricsOfRun[Any] = RunMetrics(watchers=profiles) if has_ego else TrafficRunMetrics(watchers=profiles)
+    steps: Iterable[TrafficStep] = (
+        run(scenario, seed, sumo_outputs=sumo_outputs) if has_ego else run_traffic(scenario, seed, sumo_outputs)
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
-        if scenario.traffic.has_ego:
-            metrics = RunMetrics(watchers=[profiles])
-            summary = _watched(run(scenario, seed, sumo_outputs=sumo_outputs), metrics, profiles)
-        else:
-            of_traffic = TrafficRunMetrics(watchers=[profiles])
-            summary = _watched(run_traffic(scenario, seed, sumo_outputs), of_traffic, profiles)
-    return {"metrics": summary.flat(), "profiles": profiles.to_json()}
-
-
-_AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
-
-
-def _watched(steps: Iterable[_AnyStep], metrics: MetricsOfRun[_AnyStep], profiles: RunProfiles) -> RunSummary:
-    for step in steps:
-        profiles.update(step)
-        metrics.update(step)
-    return metrics.summary()
+        for step in steps:
+            for watch in watches:
+                watch(step)
+            metrics.update(step)
+            ending = step.ending
+        return metrics.summary().flat(), ending
 
 
 def build_without_running(scenario: Scenario) -> None:
@@ -114,11 +126,11 @@ def failure(message: str) -> dict[str, Any]:
     return {"status": "failed", "message": message}
 
 
-def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
+def run_to_file(scenario: Scenario, seed: int, result: Path, work: Work = run_outcome) -> str | None:
     """Run and write the outcome to `result`; return the error of the run, if any.
 
     SUMO's outputs go to a folder of the same name next to it.
     """
-    outcome = run_outcome(scenario, seed, result.with_suffix(""))
+    outcome = work(scenario, seed, result.with_suffix(""))
     write_json(result, outcome)
     return outcome.get("message")

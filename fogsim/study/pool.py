@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -15,12 +15,8 @@ from pathlib import Path
 from fogsim.core.files.atomic import write_json
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.interruption import Interruption
-from fogsim.scenario import Scenario
-from fogsim.study.execution import PROCESS_DIED, RunWatch, failure, result_file, run_to_file
+from fogsim.study.execution import PROCESS_DIED, RunWatch, Work, failure, result_file, run_outcome, run_to_file
 from fogsim.study.plan import StudyRun
-
-Work = Callable[[Scenario, int, Path], str | None]
-"""Runs a scenario with a seed, writes the result into a file, and returns the error, if any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +28,7 @@ class ProcessPool:
     """
 
     processes: int
-    work: Work = run_to_file
+    work: Work = run_outcome
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
         """Run studies' runs, each outcome into its `result_file`; `watch` is called in this process after each."""
@@ -71,7 +67,7 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
     # A signal while a process starts would leave it behind, and it would print a traceback.
     with Interruption():
         try:
-            return pool.submit(work, run.scenario, run.seed, result)
+            return pool.submit(run_to_file, run.scenario, run.seed, result, work)
         except (EOFError, ConnectionError, BrokenProcessPool) as error:
             broken = BrokenProcessPool(str(error))
     raise broken

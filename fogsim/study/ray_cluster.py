@@ -11,7 +11,7 @@ import sys
 import tempfile
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from fogsim.core.files.atomic import write_bytes, write_json
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError, shown
 from fogsim.recorders.manifest import versions
 from fogsim.scenario import Scenario, build
-from fogsim.study.execution import PROCESS_DIED, RunWatch, failure, result_file, run_outcome
+from fogsim.study.execution import PROCESS_DIED, RunWatch, Work, failure, result_file, run_outcome
 from fogsim.study.plan import StudyRun, file_digests
 
 _MOST_PROCESSES, _MOST_NODES = 2, 10
@@ -30,9 +30,6 @@ _CONNECTION_TIME, _ANSWER_TIME = 5.0, 15.0
 """Time for a cluster's port to open, and for Ray to answer there [s]."""
 
 _SAME = "a study on Ray needs the same version of FogSim, and the scenario's files under the same path, on every node"
-
-Work = Callable[[Scenario, int, Path], dict[str, Any]]
-"""Runs a scenario with a seed, returns the content of the run's file, and leaves SUMO's outputs in a folder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from fogsim.metrics import DEFAULT_STANDARD, metric_topics
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.templating import render
 from fogsim.scenario import Scenario
-from fogsim.scenario.wording.non_defaults import Setting, non_default_settings
-from fogsim.scenario.wording.sentences import SENTENCES
+from fogsim.scenario.wording.sentences import SENTENCES, Setting, non_default_settings
 from fogsim.study.comparison import (
     RESAMPLES,
     Difference,

@@ -18,7 +18,7 @@ Row = Mapping[str, Value]
 """Factors, seed, status, message, and every metric of one run."""
 
 
-def columns(rows: Sequence[Row]) -> list[str]:
+def _columns(rows: Sequence[Row]) -> list[str]:
     """Names of all columns, in the order in which they first appear."""
     return list(dict.fromkeys(key for row in rows for key in row))
 
@@ -58,7 +58,7 @@ def check_factors(rows: Sequence[Row], levels: Sequence[Mapping[str, str]]) -> N
 
 def write_table(rows: Sequence[Row], folder: Path) -> None:
     """Write ``study.parquet`` and ``study.csv``, with a row per run and the same bytes for the same rows."""
-    names = columns(rows)
+    names = _columns(rows)
     table = pa.table({name: _column([row.get(name) for row in rows]) for name in names})
     content = io.BytesIO()
     pq.write_table(table, content)

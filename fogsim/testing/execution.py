@@ -2,24 +2,19 @@
 
 import os
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fogsim.conditions import ExpectationWatch
-from fogsim.core.files.atomic import write_json
-from fogsim.errors import InputError, UnplayedWarning
-from fogsim.metrics import RunMetrics, TrafficRunMetrics
+from fogsim.errors import InputError
 from fogsim.scenario import Scenario
 from fogsim.scenario.expect.schema import clauses_of
 from fogsim.scenario.loading import load_cases
-from fogsim.simulation.loop import run
-from fogsim.simulation.traffic_run import run_traffic
-from fogsim.study.execution import Engine, RunWatch, outcome_of, result_file
+from fogsim.study.execution import Engine, RunWatch, Work, outcome_of, result_file, run_to_file, watched_run
 from fogsim.study.plan import StudyRun
-from fogsim.study.pool import ProcessPool, Work
+from fogsim.study.pool import ProcessPool
 from fogsim.testing.collection import FogTest
 from fogsim.testing.odd.coverage_watch import CoverageWatch
 from fogsim.testing.odd.odd_file import OddFile
@@ -33,29 +28,8 @@ def check_case(
     """Run a case and return ``findings``, ``metrics``, ``ending`` and, with an ODD, ``coverage`` as JSON data."""
     watch = ExpectationWatch(clauses_of(scenario.expect))
     coverage = None if odd is None else CoverageWatch(odd)
-    ending = None
-    with warnings.catch_warnings():
-        # Expectations decide about events that were not played.
-        warnings.simplefilter("ignore", UnplayedWarning)
-        if scenario.traffic.has_ego:
-            of_ego = RunMetrics()
-            for step in run(scenario, seed, sumo_outputs=sumo_outputs):
-                of_ego.update(step)
-                watch.update(step)
-                if coverage is not None:
-                    coverage.update(step)
-                ending = step.ending
-            summary = of_ego.summary()
-        else:
-            of_traffic = TrafficRunMetrics()
-            for instant in run_traffic(scenario, seed, sumo_outputs):
-                of_traffic.update(instant)
-                watch.update(instant)
-                if coverage is not None:
-                    coverage.update(instant)
-                ending = instant.ending
-            summary = of_traffic.summary()
-    metrics = summary.flat()
+    watches = [watch.update, *(() if coverage is None else (coverage.update,))]
+    metrics, ending = watched_run(scenario, seed, watches, sumo_outputs)
     findings = watch.findings(metrics)
     found = {"findings": [finding_to_json(one) for one in findings], "metrics": metrics, "ending": ending}
     return found if coverage is None else {**found, "coverage": coverage.document(scenario.name, findings)}
@@ -68,38 +42,27 @@ def check_outcome(scenario: Scenario, seed: int, sumo_outputs: Path, odd: OddFil
     return {**outcome, "duration_s": round(time.monotonic() - begun, 3)}
 
 
-def check_to_file(scenario: Scenario, seed: int, result: Path, odd: OddFile | None = None) -> str | None:
-    """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
-    outcome = check_outcome(scenario, seed, result.with_suffix(""), odd)
-    write_json(result, outcome)
-    return outcome.get("message")
-
-
 @dataclass(frozen=True, slots=True)
 class CoverageCheck:
     """Work of an engine that also collects the coverage of an ODD."""
 
     odd: OddFile
 
-    def outcome(self, scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+    def __call__(self, scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
         """As `check_outcome`."""
         return check_outcome(scenario, seed, sumo_outputs, self.odd)
-
-    def to_file(self, scenario: Scenario, seed: int, result: Path) -> str | None:
-        """As `check_to_file`."""
-        return check_to_file(scenario, seed, result, self.odd)
 
 
 @dataclass(frozen=True, slots=True)
 class ThisProcess:
     """An engine that runs the cases in the calling process, which starts quickly and can be debugged."""
 
-    work: Work = check_to_file
+    work: Work = check_outcome
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
         """As `Engine.run`."""
         for case in runs:
-            watch(case, self.work(case.scenario, case.seed, result_file(folder, case)))
+            watch(case, run_to_file(case.scenario, case.seed, result_file(folder, case), self.work))
 
 
 def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOutcome:
@@ -120,7 +83,7 @@ def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOu
         As in `run_tests`.
     """
     number = min(processes or os.cpu_count() or 1, len(test.runs))
-    engine: Engine = ThisProcess() if number == 1 else ProcessPool(number, check_to_file)
+    engine: Engine = ThisProcess() if number == 1 else ProcessPool(number, check_outcome)
     (outcome,) = run_tests([test], out, engine)
     return outcome
 

@@ -1,4 +1,4 @@
-"""Test results as JUnit XML for CI servers: a suite for each file, a case for each clause.
+"""Test results for CI servers: annotations of GitHub, and JUnit XML with a suite for each file, a case for each clause.
 
 By the schema of Jenkins' xUnit plugin (junit-10.xsd), which GitLab and GitHub's actions read too. Inconclusive clauses
 are failures, since those servers treat skipped tests as passed.
@@ -6,7 +6,7 @@ are failures, since those servers treat skipped tests as passed.
 
 import platform
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -105,3 +105,30 @@ def xml_text(text: str) -> str:
 
 def _seconds(seconds: float) -> str:
     return f"{seconds:.3f}"
+
+
+def annotations(outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> Iterator[str]:
+    """A CI annotation for each clause that did not pass and each file with failed runs, with ``--set`` settings."""
+    for one in outcomes:
+        for judgement in one.judgements:
+            if judgement.outcome is not Outcome.PASSED:
+                told = f"{judgement_text(judgement)}\n{command_text(one.test, judgement.run, settings)}"
+                title = f"{judgement.title}: {judgement.outcome}"
+                yield _command(one.test.lines[judgement.name], title, told)
+        if one.broken:
+            told = f"{broken_text(one.broken)}\n{command_text(one.test, one.broken[0].run, settings)}"
+            yield _command(str(one.test.path), f"{one.test.name}: error", told)
+
+
+def _command(where: str, title: str, message: str) -> str:
+    file, _, line = where.rpartition(":")
+    placed = f"file={_property(file)},line={line}" if line.isdecimal() else f"file={_property(where)}"
+    return f"::error {placed},title={_property(title)}::{_data(message)}"
+
+
+def _data(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")

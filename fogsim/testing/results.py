@@ -31,7 +31,7 @@ def _checked_coverage(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-class CompleteCase(RunRecord):
+class _CompleteCase(RunRecord):
     """A case with a completed run."""
 
     status: Literal["complete"]
@@ -43,8 +43,8 @@ class CompleteCase(RunRecord):
 
 
 _FINDING = TypeAdapter(Finding)
-_CASE: TypeAdapter[CompleteCase | FailedRun] = TypeAdapter(
-    Annotated[CompleteCase | FailedRun, Field(discriminator="status")]
+_CASE: TypeAdapter[_CompleteCase | FailedRun] = TypeAdapter(
+    Annotated[_CompleteCase | FailedRun, Field(discriminator="status")]
 )
 
 
@@ -104,4 +104,4 @@ def completed_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -
 def read_coverage(folder: Path, run: StudyRun) -> dict[str, Any] | None:
     """Coverage of an ODD by a case; None if its run failed or collected none."""
     found = read_run(result_file(folder, run), _CASE)
-    return found.coverage if isinstance(found, CompleteCase) else None
+    return found.coverage if isinstance(found, _CompleteCase) else None

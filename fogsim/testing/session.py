@@ -97,7 +97,7 @@ def run_tests(
     out : Path
         Directory of the results.
     engine : Engine
-        Engine for the cases, with `check_to_file` as its work.
+        Engine for the cases, with `check_outcome` as its work.
     resume : bool
         Whether results of an interrupted earlier call count; those of other scenarios, seeds or versions, and of
         failed runs, do not.

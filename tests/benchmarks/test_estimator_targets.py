@@ -63,9 +63,9 @@ def test_no_image_is_too_few() -> None:
 @pytest.fixture
 def tables(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(PROGRAM.parent))
-    import target_tables
+    import estimator_targets
 
-    return target_tables
+    return estimator_targets
 
 
 def rows(errors: list[float | None], group: str = "V 30 m") -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import pytest
 from fogsim.calibration.driver_calibration import Passages, fit_drivers, read_passages
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
-from fogsim.scenario.parts.drivers import driver_setup
+from fogsim.scenario.parts.methods import driver_setup
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, Surroundings
 from fogsim.traffic.drivers.sight import DriverSight, leader_reach
 from fogsim.traffic.drivers.speed_choice import ObservedSpeed, chosen_speed

@@ -23,7 +23,7 @@ from fogsim.dataset import (
     sign_picture,
     transmission,
 )
-from fogsim.dataset.encoding import png
+from fogsim.dataset.directory import png
 from fogsim.dataset.write import object_records
 from fogsim.errors import InputError
 from fogsim.values import Camera, CameraPose, FogField, Sign, SignMap, Step, Truth, View

@@ -12,8 +12,7 @@ from early_motorway import EARLY
 
 from fogsim.errors import InputError, SimulationError
 from fogsim.estimators.night.own_light import VISIBILITIES, OwnLight, cells_of
-from fogsim.explore.answering import Explorer, Question, _estimate, question
-from fogsim.explore.calibrating import CALIBRATING
+from fogsim.explore.answering import CALIBRATING, Explorer, Question, _estimate, question
 from fogsim.scenario import catalogue, load_scenario
 from fogsim.values import Camera, Estimate
 

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from fogsim.core.files.generated_files import kept_text, write_generated
-from fogsim.core.files.user_cache import keep_newest, read_entry, replace_file, write_entry
+from fogsim.core.files.user_cache import keep_newest, kept_text, read_entry, replace_file, write_entry, write_generated
 from fogsim.traffic.road import map_cache
 from fogsim.traffic.road.network import read_net
 from tests.traffic.common import networks_parsed

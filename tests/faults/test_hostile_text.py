@@ -11,7 +11,7 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.signs.operating_range import OperatingRange
-from fogsim.offline.drive.sign_file import load_sign_file
+from fogsim.offline.drive.sign_watch import load_sign_file
 from fogsim.offline.drive.track_file import load_track
 from fogsim.scenario.parts.lamp_file import load_lamps
 

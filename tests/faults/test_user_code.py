@@ -12,7 +12,7 @@ from fogsim import Camera, Frame, Observation, SecondView, load_scenario
 from fogsim.advice import ADVISERS
 from fogsim.errors import InputError, MethodError
 from fogsim.simulation import chosen_methods
-from fogsim.study.execution import run_to_file
+from fogsim.study.execution import run_outcome
 from fogsim.testing.execution import ThisProcess
 from fogsim.values.image import for_kernels
 from tests.helpers.command import Command
@@ -161,7 +161,7 @@ def test_tests_and_studies_fail_and_say_why(
     folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch, command_line: str
 ) -> None:
     monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
-    monkeypatch.setattr("fogsim.study.ProcessPool", lambda _: ThisProcess(run_to_file))
+    monkeypatch.setattr("fogsim.study.ProcessPool", lambda _: ThisProcess(run_outcome))
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "'mine:ExitsInUpdate'"))
     done = command(*command_line.split(), "-j", "1", "--out", "out", cwd=folder)
     assert done.returncode == 1

@@ -9,10 +9,10 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.lighting import FogLampRules, VehicleLightingPolicy
-from fogsim.lighting.high_beam import Gallen2014, settled
 from fogsim.lighting.legal import LAWS, LegalRules
 from fogsim.lighting.optimiser import SightOptimiser, glare_dealt
 from fogsim.lighting.own_sight import FARTHEST, headlamp_sight_distance, own_veil
+from fogsim.lighting.rules import Gallen2014, settled
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, Lamp, LampChoice, LampWish, LeadMeasurement, LightMeasurement, Observation
 

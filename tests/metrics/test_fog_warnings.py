@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.metrics.estimation.fog_warnings import FogWarnings
+from fogsim.metrics.estimation.belief_ahead import FogWarnings
 from fogsim.metrics.metric import JsonValue
 from fogsim.units import extinction_from_visibility
 from fogsim.values import DriverWarning, FogBank, FogField, FogProfile, Step

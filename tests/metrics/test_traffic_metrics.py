@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.metric import Histogram
 from fogsim.metrics.surrogate import crash_potential
@@ -14,6 +13,7 @@ from fogsim.metrics.traffic_comfort import TrafficComfort, TrafficCompliance, Tr
 from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts, TrafficHeadways
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficCohort
+from fogsim.metrics.traffic_throughput import TrafficThroughput
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Cohort, Collision
 from tests.metrics.roads import lanes, watched

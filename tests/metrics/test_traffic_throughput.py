@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.traffic_span import TrafficGathering
+from fogsim.metrics.traffic_throughput import TrafficThroughput
 from fogsim.values import TrafficState, TrafficStep
 from tests.metrics.roads import lanes
 from tests.recorders.synthetic import make_step, make_traffic_step

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import Air
 from fogsim.errors import InputError
 from fogsim.offline.camera_file import load_camera
-from fogsim.offline.fog_image import airlight_of, fog_file, fog_image
+from fogsim.offline.fog_image import FogLayer, airlight_of, fog_file, fog_image
 from fogsim.offline.image_files import DepthMap, range_from_planar
-from fogsim.offline.layered_fog import FogLayer
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Response, View
 from fogsim.values.camera_response import respond

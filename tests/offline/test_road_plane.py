@@ -10,8 +10,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.offline.camera_file import Calibration
-from fogsim.offline.fog_image import fog_file
-from fogsim.offline.fog_video import fog_video
+from fogsim.offline.fog_image import fog_file, fog_video
 from fogsim.offline.rectification import RoadPlane, calibration_from_options
 from fogsim.offline.video_source import VideoFile, VideoWriter
 from fogsim.recorders.video import Encoder, encoder_command

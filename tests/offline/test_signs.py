@@ -13,7 +13,7 @@ from PIL import Image
 
 from fogsim.errors import InputError
 from fogsim.offline import ImageFiles, SignWatch, estimate_images, record_lines, summary_rows, watch_signs
-from fogsim.offline.drive.sign_file import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
+from fogsim.offline.drive.sign_watch import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
 from fogsim.offline.drive.track_file import load_track, metres_per_radian
 from fogsim.offline.overlay import Overlay
 from fogsim.offline.video_source import VideoFile

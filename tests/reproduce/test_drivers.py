@@ -8,8 +8,7 @@ import pytest
 from fogsim.core.kinematics import safe_speed
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.drivers import reproduce
-from fogsim.reproduce.drivers.findings import FINDINGS, SIX
-from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME, Measures, Passages, measured, passages
+from fogsim.reproduce.drivers.findings import FINDINGS, SIX, Bound, Look, Sign, Size, Verdict
 from fogsim.reproduce.drivers.plan import (
     CALIBRATION_SEEDS,
     CLEAR,
@@ -23,8 +22,17 @@ from fogsim.reproduce.drivers.plan import (
     Results,
     interval,
 )
-from fogsim.reproduce.drivers.published import Bound, Look, Sign, Size, Verdict
-from fogsim.reproduce.drivers.road import drive, follow, measured_pairs
+from fogsim.reproduce.drivers.road import (
+    BRAKING,
+    THINKING_TIME,
+    Measures,
+    Passages,
+    drive,
+    follow,
+    measured,
+    measured_pairs,
+    passages,
+)
 
 PART = Plan(
     seeds=(1,), demands=(SPARSE,), visibilities=(CLEAR, 100.0), seconds=60.0, leader_speeds=(SLOW,), followers=2

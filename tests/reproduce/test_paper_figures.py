@@ -11,7 +11,7 @@ from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES
 from fogsim.estimators.night.halos import WINDOW
 from fogsim.reproduce import belaroussi2015, huang2015, huang2015_figures, negru2013, zhu2015
 from fogsim.reproduce.night import gallen2014
-from fogsim.reproduce.paper_cells import PaperCell
+from fogsim.reproduce.result import PaperCell
 from fogsim.values import Estimate
 
 Quotes = dict[str, tuple[str, ...]]

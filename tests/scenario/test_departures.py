@@ -6,7 +6,7 @@ import pytest
 
 import fogsim
 from fogsim import script as fs
-from fogsim.scenario.roads.departures import entering_vehicles
+from fogsim.scenario.roads.files import entering_vehicles
 from fogsim.values import Step
 from fogsim.values.script import Enter
 from tests.data.early_motorway import EARLY

@@ -8,7 +8,7 @@ import pytest
 from fogsim.atmosphere import extinction
 from fogsim.errors import InputError
 from fogsim.scenario import build, load_scenario, resolved
-from fogsim.scenario.parts.drivers import driver_sight
+from fogsim.scenario.parts.methods import driver_sight
 from fogsim.simulation.ego.daylight import in_daylight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogChange, FogField, FogPatches

@@ -7,8 +7,7 @@ from typer.testing import CliRunner
 
 from fogsim.cli.app import app
 from fogsim.scenario import load_scenario
-from fogsim.scenario.wording.non_defaults import non_default_settings
-from fogsim.scenario.wording.sentences import SENTENCES, empty_start
+from fogsim.scenario.wording.sentences import SENTENCES, empty_start, non_default_settings
 from fogsim.study import load_study
 from fogsim.study.comparison import compare_to_baseline
 from fogsim.study.plan import Study

@@ -18,14 +18,13 @@ from fogsim.study.pool import ProcessPool, _end
 
 SCENARIO = load_scenario("motorway_fog_bank")
 WORK = """
-import json, os, signal
-def work(scenario, seed, result):
-    mark = result.with_suffix(".begun")
+import os, signal
+def work(scenario, seed, folder):
+    mark = folder.with_suffix(".begun")
     if seed == 3 or (seed == 1 and not mark.exists()):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    result.write_text(json.dumps({"status": "complete", "seed": seed}))
-    return "odd" if seed == 2 else None
+    return {"status": "complete", "seed": seed, **({"message": "odd"} if seed == 2 else {})}
 """
 """Seed 3 kills its process always, seed 1 the first time."""
 
@@ -48,7 +47,7 @@ def test_a_process_that_dies_costs_no_other_run(tmp_path: Path, monkeypatch: pyt
 def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "slow_work.py").write_text(
         WORK.replace("seed == 3 or (seed == 1 and not mark.exists())", "False").replace(
-            "    result", "    import time; time.sleep(0 if seed == 0 else 60)\n    result"
+            "    return", "    import time; time.sleep(0 if seed == 0 else 60)\n    return"
         ),
         encoding="utf-8",
     )
@@ -72,7 +71,7 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
 def test_a_signal_waits_until_a_process_has_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     submitted: list[int] = []
 
-    def submit(_: ProcessPoolExecutor, __: Any, ___: Any, seed: int, ____: Path) -> None:
+    def submit(_: ProcessPoolExecutor, __: Any, ___: Any, seed: int, ____: Path, _____: Any) -> None:
         signal.raise_signal(signal.SIGINT)
         submitted.append(seed)
 
@@ -85,14 +84,15 @@ def test_a_signal_waits_until_a_process_has_started(tmp_path: Path, monkeypatch:
 
 def test_a_thread_that_a_method_leaves_keeps_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "lingering_work.py").write_text(
-        "import threading, time\ndef work(scenario, seed, result):\n"
-        "    late = lambda: (time.sleep(60), result.touch())\n    threading.Thread(target=late).start()\n",
+        "import threading, time\ndef work(scenario, seed, folder):\n"
+        "    late = lambda: (time.sleep(60), folder.touch())\n    threading.Thread(target=late).start()\n"
+        "    return {}\n",
         encoding="utf-8",
     )
     monkeypatch.syspath_prepend(str(tmp_path))
     run = StudyRun(0, {}, 0, SCENARIO, "k0")
     ProcessPool(1, __import__("lingering_work").work).run([run], tmp_path, lambda *_: None)
-    assert not result_file(tmp_path, run).exists()
+    assert not result_file(tmp_path, run).with_suffix("").exists()
 
 
 def test_a_process_ends_even_if_its_output_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +115,7 @@ def test_the_death_of_the_server_of_processes_costs_no_run(tmp_path: Path, monke
         return submit(pool, *call)
 
     monkeypatch.setattr(ProcessPoolExecutor, "submit", submitted)
-    (tmp_path / "plain_work.py").write_text("def work(scenario, seed, result):\n    result.touch()\n", encoding="utf-8")
+    (tmp_path / "plain_work.py").write_text("def work(scenario, seed, folder):\n    return {}\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     runs = [StudyRun(seed, {}, seed, SCENARIO, f"k{seed}") for seed in range(2)]
     told: list[int] = []

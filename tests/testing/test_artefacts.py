@@ -1,6 +1,5 @@
 """What is kept of a failure: a video around it and a plot of what was looked at."""
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,7 +53,7 @@ def test_a_failure_has_a_plot_and_a_video(scenario: Scenario, tmp_path: Path, mo
     period = scenario.clocks.camera_period_s
     failures = [finding("failed", time=8.0), finding("failed", "told", "whenever", time=8.5)]
     work = KeepFailures({"a": tuple(finding_from_json(one) for one in failures)})
-    assert work(scenario, 5, tmp_path / "a.json") is None
+    assert work(scenario, 5, tmp_path / "a") == {"status": "complete"}
     assert 8.5 + AFTER <= steps[-1].time < 8.5 + AFTER + 1.5 * period
     video = cv2.VideoCapture(str(tmp_path / "a" / "video.mp4"))
     shown = sum(8.0 - BEFORE <= step.time <= 8.0 + AFTER for step in steps)
@@ -75,8 +74,8 @@ def test_what_goes_wrong_does_no_harm(scenario: Scenario, tmp_path: Path, monkey
 
     monkeypatch.setattr(artefacts, "run", broken)
     work = KeepFailures({"a": (finding_from_json(finding("failed")),)})
-    assert work(scenario, 0, tmp_path / "a.json") == "RuntimeError: no more (test_artefacts.py:74)"
-    assert json.loads((tmp_path / "a.json").read_text())["status"] == "failed"
+    message = "RuntimeError: no more (test_artefacts.py:73)"
+    assert work(scenario, 0, tmp_path / "a") == {"status": "failed", "message": message}
 
 
 def test_a_video_is_closed_if_its_run_fails(
@@ -88,5 +87,5 @@ def test_a_video_is_closed_if_its_run_fails(
 
     monkeypatch.setattr(artefacts, "run", breaks)
     work = KeepFailures({"a": (finding_from_json(finding("failed", time=0.0)),)})
-    assert str(work(scenario, 0, tmp_path / "a.json")).startswith("RuntimeError: no more")
+    assert work(scenario, 0, tmp_path / "a")["message"].startswith("RuntimeError: no more")
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["video.mp4"]

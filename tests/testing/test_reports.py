@@ -9,9 +9,8 @@ import pytest
 from made_up_cases import BROKEN, MadeUpEngine, complete, made_up_test
 
 from fogsim.testing import FileOutcome, FogTest, run_tests
-from fogsim.testing.annotations import annotations
 from fogsim.testing.artefacts import Artefacts
-from fogsim.testing.junit import write_junit
+from fogsim.testing.junit import annotations, write_junit
 from fogsim.testing.page import PageContent, write_page
 from tests.recorders.test_report import Page
 

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.metrics.cross_sections import TrafficThroughput
-from fogsim.metrics.cross_sections.traffic_throughput import SPACING
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
 from fogsim.metrics.traffic_conflicts import TrafficCollisions, TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficEmissions, TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
+from fogsim.metrics.traffic_throughput import SPACING, TrafficThroughput
 from fogsim.traffic import DriverSetup
 from fogsim.traffic.drivers.speed_choice import unaffected
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from fogsim.offline.layered_fog import FogLayer
+    from fogsim.offline.fog_image import FogLayer
     from fogsim.offline.rectification import RoadPlane
 
 
@@ -88,7 +88,7 @@ def fog_command(
 
 
 def _layer(albedo: float | None, height: float | None) -> "FogLayer | None":
-    from fogsim.offline.layered_fog import FogLayer
+    from fogsim.offline.fog_image import FogLayer
 
     if albedo is None:
         if height is not None:
@@ -160,8 +160,7 @@ def _fog_road(
     layer: "FogLayer | None",
     overwrite: bool,
 ) -> "NDArray[np.float64]":
-    from fogsim.offline.fog_image import fog_file
-    from fogsim.offline.fog_video import fog_video
+    from fogsim.offline.fog_image import fog_file, fog_video
     from fogsim.offline.input_paths import is_video
     from fogsim.offline.video_source import VideoFile, left_out
 

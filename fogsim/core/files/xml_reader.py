@@ -41,7 +41,7 @@ _PROBE = rb"<a b='\u0041-1'/>"
 """Bytes that an encoding must map to ASCII, since the declaration that names it was read as ASCII."""
 
 
-class ElementReader(Protocol):
+class _ElementReader(Protocol):
     """Receives the elements of a file in order."""
 
     @property
@@ -84,7 +84,7 @@ class XmlFile:
 
     def read(
         self,
-        reader: ElementReader,
+        reader: _ElementReader,
         most_bytes: int,
         most_elements: int | None = None,
         text: Callable[[str], object] | None = None,
@@ -118,7 +118,7 @@ class XmlFile:
 
     def read_all(
         self,
-        reader: ElementReader,
+        reader: _ElementReader,
         most_bytes: int = _MOST_BYTES,
         most_elements: int = MOST_ELEMENTS,
         text: Callable[[str], object] | None = None,
@@ -127,7 +127,7 @@ class XmlFile:
         if self.read(reader, most_bytes, most_elements, text) >= most_bytes:
             raise InputError(f"{self._path}: cannot be read: larger than {most_bytes} bytes")
 
-    def _connect(self, reader: ElementReader, most_elements: int | None, text: Callable[[str], object] | None) -> None:
+    def _connect(self, reader: _ElementReader, most_elements: int | None, text: Callable[[str], object] | None) -> None:
         depth = elements = 0
 
         def start(tag: str, attributes: dict[str, str]) -> None:
@@ -178,7 +178,7 @@ class XmlFile:
         return InputError(f"{self._path}:{self.line}: {reason}")
 
 
-def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
+def read_elements(path: Path, reader: _ElementReader, most_bytes: int) -> int:
     """Pass the elements of a file to a reader; see `XmlFile.read`."""
     return XmlFile(path).read(reader, most_bytes)
 

@@ -1,15 +1,17 @@
-"""How right the belief about places ahead was, and how early dense fog was known."""
+"""How right the belief about places ahead was, and how early dense fog was known and the driver warned."""
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.metrics.estimation.errors import FOG_LIMIT, quantile, relative_error
 from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.values import Step
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, visibility_from_extinction
+from fogsim.values import DriverWarning, FogBank, Step
 
 _PLACES = (100, 200)
 """Distances ahead at which a belief about places is held against the fog there [m]."""
@@ -103,3 +105,108 @@ def _dense_fog_ahead(step: Step) -> float | None:
     ahead = true.distance >= 0.0
     dense = np.flatnonzero(ahead & (true.log_extinction > np.log(OPTICAL_DEPTH_AT_VISIBILITY / _DENSE_FOG)))
     return None if not dense.size else step.route_position + float(true.distance[dense[0]])
+
+
+_LONGEST_LEAD = 1000.0
+"""Distance before a bank from which on a warning counts as one of it [m]."""
+
+REASON_WITHIN = 500.0
+"""Distance ahead within which there must be fog for a warning to be no false one [m]."""
+
+MUCH_DENSER = 2.0
+"""Extinction ahead over that at the camera from which on the fog ahead is denser [-]."""
+
+
+@dataclass(slots=True)
+class FogWarnings:
+    """Leads of warnings before banks, false warnings, and the time under each of the others."""
+
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("fog_warnings")
+    _time: float = 0.0
+    _times: dict[DriverWarning, float] = field(default_factory=lambda: dict.fromkeys(DriverWarning, 0.0))
+    _before: DriverWarning | None = None
+    _had_reason: bool = False
+    _false: int = 0
+    _warned: deque[float] = field(default_factory=deque)
+    _ahead: dict[int, bool] = field(default_factory=dict)
+    _leads: list[float] = field(default_factory=list)
+
+    def update(self, sample: Sample) -> None:
+        """Add one step."""
+        step, warning = sample.step, sample.step.command.warning
+        self._time += sample.elapsed
+        if warning is not None:
+            self._times[warning] += sample.elapsed
+        is_fog = warning is DriverWarning.FOG_AHEAD
+        # A warning is decided after the step before.
+        is_reason = _has_reason(step)
+        if is_fog and self._before is not warning and not (is_reason or self._had_reason):
+            self._false += 1
+        self._before, self._had_reason = warning, is_reason
+        self._enter_banks(step)
+        if is_fog and not any(_is_inside(step, bank) for bank in _banks(step)):
+            self._warned.append(step.route_position)
+
+    def _enter_banks(self, step: Step) -> None:
+        """Note the lead of each bank once half its density is reached."""
+        while self._warned and self._warned[0] < step.route_position - _LONGEST_LEAD:
+            self._warned.popleft()
+        for number, bank in enumerate(_banks(step)):
+            along = _along(step, bank)
+            if along < bank.start:
+                self._ahead[number] = True
+            elif self._ahead.pop(number, False) and _is_hazard(step, bank):
+                self._leads.append(step.route_position - self._warned[0] if self._warned else 0.0)
+                self._warned.clear()
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say leads, false warnings and shares of the time."""
+        return {
+            "fog_warning_lead_m": share(sum(self._leads), len(self._leads)),
+            "fog_banks_entered": len(self._leads),
+            "fog_banks_without_warning": sum(lead == 0.0 for lead in self._leads),
+            "false_fog_warnings": self._false,
+            "false_fog_warnings_per_h": share(3600.0 * self._false, self._time),
+            "fog_ahead_time_share": share(self._times[DriverWarning.FOG_AHEAD], self._time),
+            "cannot_see_time_share": share(self._times[DriverWarning.CANNOT_SEE], self._time),
+            "camera_degraded_time_share": share(self._times[DriverWarning.CAMERA_DEGRADED], self._time),
+        }
+
+
+def _has_reason(step: Step) -> bool:
+    """Whether the truth gives reason to warn of fog ahead.
+
+    That is: here or up to `REASON_WITHIN` ahead, one cannot stop within sight at the present speed, or the extinction
+    is at least `MUCH_DENSER` times that at the camera, in fog of less than 1000 m.
+    """
+    truth, speed = step.truth, float(step.traffic.speed[step.ego])
+    most = visibility_from_extinction(stopping_sight_distance(speed, REACTION_TIME, DECELERATION))
+    if max(truth.extinction, truth.extinction_ahead) > most:
+        return True
+    if truth.profile is None:
+        return False
+    near = (truth.profile.distance >= 0.0) & (truth.profile.distance <= REASON_WITHIN)
+    densest = float(np.exp(truth.profile.log_extinction[near]).max(initial=0.0))
+    is_denser = densest >= MUCH_DENSER * truth.extinction and visibility_from_extinction(densest) < FOG_LIMIT
+    return densest > most or is_denser
+
+
+def _banks(step: Step) -> tuple[FogBank, ...]:
+    return () if step.truth.fog is None else step.truth.fog.banks
+
+
+def _along(step: Step, bank: FogBank) -> float:
+    """How far along a bank's axis the ego is [m]."""
+    east, north, _ = step.traffic.position[step.ego]
+    return float((east - bank.origin[0]) * bank.axis[0] + (north - bank.origin[1]) * bank.axis[1])
+
+
+def _is_inside(step: Step, bank: FogBank) -> bool:
+    return bank.start <= _along(step, bank) <= bank.end
+
+
+def _is_hazard(step: Step, bank: FogBank) -> bool:
+    """Whether one cannot stop within sight inside a bank at the speed limit."""
+    outside = 0.0 if step.truth.fog is None else step.truth.fog.extinction
+    needed = stopping_sight_distance(step.speed_limit, REACTION_TIME, DECELERATION)
+    return bank.extra_extinction > 0.0 and visibility_from_extinction(outside + bank.extra_extinction) < needed

@@ -2,13 +2,10 @@
 
 import math
 
-from fogsim.reproduce.drivers.passages import Measures, measured
-from fogsim.reproduce.drivers.picture import picture
 from fogsim.reproduce.drivers.plan import REPORT_SEEDS, SIGNED, SIGNS, Case, Pair, Plan, Results
-from fogsim.reproduce.drivers.road import PairMeasures, drive, follow
-from fogsim.reproduce.drivers.tables import records, tables
-from fogsim.reproduce.paper_cells import chosen_tables
-from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
+from fogsim.reproduce.drivers.road import Measures, PairMeasures, drive, follow, measured
+from fogsim.reproduce.drivers.tables import picture, records, tables
+from fogsim.reproduce.result import Reproduction, Steps, Watch, chosen_tables, unwatched
 from fogsim.units import KMH_PER_MPS
 
 NOTES = (

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.drivers.passages import Measures
-from fogsim.reproduce.drivers.road import PairMeasures
+from fogsim.reproduce.drivers.road import Measures, PairMeasures
 
 CALIBRATION_SEEDS = tuple(range(101, 111))
 """Seeds with which constants of the drivers were calibrated. None of them is reported."""

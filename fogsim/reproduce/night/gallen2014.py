@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.visibility.night_visibility import FogKind
+from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.calibration.halo_calibration import measure_halo_threshold
 from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
 from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references
@@ -23,14 +25,80 @@ from fogsim.estimators.night.veil_correlation import (
     cell_size,
     visibility_by_parabola,
 )
-from fogsim.lighting.beams import low_beam
-from fogsim.reproduce.night.gallen2014_picture import picture
-from fogsim.reproduce.night.limits import limits
-from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
-from fogsim.reproduce.result import Reproduction, Rows, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.reproduce.night.limits import limits, veil_luminance
+from fogsim.reproduce.result import (
+    PaperCell,
+    Reproduction,
+    Rows,
+    Steps,
+    TitledTable,
+    Watch,
+    chosen_tables,
+    figure_image,
+    found_visibility,
+    unwatched,
+)
 from fogsim.values import Camera, Lamp, Observation, Response
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import Pixels
+
+Record = Mapping[str, Any]
+
+
+def _picture(drives: Sequence[Record], fogs: Sequence[Record], threshold: float) -> NDArray[np.uint8]:
+    """Draw the veil's luminance, scores by reference, estimated over true visibility, and the drives' halos, if run."""
+    figure = Figure(figsize=(13.0, 9.0), dpi=90, layout="constrained")
+    (two, eleven), (fourteen, halos) = figure.subplots(2, 2)
+    _draw_veil(two)
+    if fogs:
+        _draw_scores(eleven, fogs)
+        _draw_estimates(fourteen, fogs)
+    if drives:
+        _draw_halos(halos, drives, threshold)
+    for axes in (eleven, fourteen, halos):
+        axes.set_visible(axes.has_data())
+    return figure_image(figure)
+
+
+def _draw_veil(axes: Axes) -> None:
+    visibilities = np.geomspace(30.0, 1000.0, 40).tolist()
+    for kind, colour in zip(FogKind, ("C0", "C1"), strict=True):
+        published = [high_beam_veil(one, kind) for one in visibilities]
+        axes.plot(visibilities, published, f"{colour}--", label=f"{kind}, eq. 9")
+        axes.plot(visibilities, veil_luminance(high_beam(), visibilities, kind), colour, label=f"{kind}, FogSim")
+    axes.set(xscale="log", xlabel="V_met [m]", ylabel="veil of high beams [cd/m²]", title="Figure 2")
+    axes.legend(fontsize=8)
+
+
+def _draw_scores(axes: Axes, fogs: Sequence[Record]) -> None:
+    truth = _column(fogs, "visibility_m")
+    for key in (key for key in fogs[0] if key.startswith("score_")):
+        axes.plot(truth, _column(fogs, key), label=f"{key.removeprefix('score_')} m")
+    axes.set(xscale="log", xlabel="true V_met [m]", ylabel="ZNCC", title="Figure 11: scores of six reference frames")
+    axes.legend(fontsize=8, title="V_met of the reference", loc="center right")
+
+
+def _draw_estimates(axes: Axes, fogs: Sequence[Record]) -> None:
+    truth = _column(fogs, "visibility_m")
+    axes.plot(truth, truth, color="0.6", lw=1)
+    error = np.select([truth < 50.0, truth < 100.0, truth < 200.0], [10.0, 20.0, 40.0], 100.0)
+    axes.fill_between(truth, np.maximum(truth - error, 1.0), truth + error, color="0.9", label="published accuracy")
+    for name, mark in (("as_published", "x"), ("corrected", "s")):
+        axes.plot(truth, _column(fogs, f"{name}_m"), mark, ms=4, label=name.replace("_", " "))
+    axes.set(xscale="log", yscale="log", xlabel="true V_met [m]", ylabel="estimated V_met [m]", title="Figure 14")
+    axes.set_ylim(8.0, 3000.0)
+    axes.legend(fontsize=8)
+
+
+def _draw_halos(axes: Axes, drives: Sequence[Record], threshold: float) -> None:
+    names = [str(record["drive"]) for record in drives]
+    axes.bar(names, _column(drives, "median_br50"), color=["C0", "C0", "0.6", "0.6"])
+    axes.axhline(threshold, color="C3", label="calibrated threshold")
+    axes.axhline(9.0, color="C3", ls=":", label="the paper's threshold")
+    axes.set(ylabel="median of mean Br50 [levels/px]", title="Halos on four drives")
+    axes.legend(fontsize=8)
+
 
 CAMERA = Camera(1280, 800, 1154.0, (639.5, 399.5), 1.38, pitch=0.035, response=Response.SRGB)
 """The size of the paper's images; nothing else is known of its camera."""
@@ -73,8 +141,6 @@ _CLASSES: tuple[tuple[str, float, float, float, Literal["at_least", "equal", "at
     ("light fog (1), > 300 m", LIGHT, math.inf, 0.2, "at_most"),
 )  # limits of V_met [m] (table I), and score with references of dense fog (section IV-B)
 _BANDS = tuple(zip(("< 50 m", "50 to 100 m", "100 to 200 m", "> 200 m"), (0.0, 50.0, 100.0, 200.0), BANDS, strict=True))
-
-Record = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +189,7 @@ def reproduce(
         cells += limit_cells()
     steps.advance()
     records = (*drives, *fogs, *road)
-    drawn = picture(drives, fogs, least)
+    drawn = _picture(drives, fogs, least)
     return Reproduction("gallen2014", records, tables[0].rows, _NOTES, drawn, tuple(tables), cells=tuple(cells))
 
 

@@ -1,1 +1,1 @@
-"""Parts of the loop from a scenario: clocks, traffic, fog, sensors, methods; all of them in `fogsim.scenario.build`."""
+"""Parts of the loop from a scenario: sensors, methods, lamps; all of it in `fogsim.scenario.build`."""

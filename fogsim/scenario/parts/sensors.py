@@ -21,8 +21,14 @@ from fogsim.scenario.camera_schema import CameraSection, Exposure, StereoSection
 from fogsim.scenario.parts.methods import method
 from fogsim.scenario.schema import ScenarioFile
 from fogsim.scenario.sensors.faults import fault_of
-from fogsim.scenario.sensors.reports import CameraReports, RoadsideCamera, RoadsideReports, VehicleReports
-from fogsim.scenario.sensors.schema import ScatterometerSection, Sensors
+from fogsim.scenario.sensors.schema import (
+    CameraReports,
+    RoadsideCamera,
+    RoadsideReports,
+    ScatterometerSection,
+    Sensors,
+    VehicleReports,
+)
 from fogsim.sensors import Gps, LeadSensor
 from fogsim.simulation.run_config import (
     LightSensor,

@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from fogsim.core.files.generated_files import write_generated
+from fogsim.core.files.user_cache import write_generated
 from fogsim.errors import InputError, nearest_of, suggest
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import ScenarioFile
+from fogsim.scenario.timeline import Entries, operations
+from fogsim.scenario.timeline.vehicle_actions import DepartAction, VehicleActions
+from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net_edges
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
@@ -37,6 +40,9 @@ from fogsim.traffic.templates import (
     routes_text,
     usual_mix,
 )
+from fogsim.traffic.templates.placement import Ways, edge_at
+from fogsim.units import KMH_PER_MPS
+from fogsim.values.script import Enter
 
 _NET, _ROUTES, _BESIDE = "road.net.xml", "road.rou.xml", "road.add.xml"
 _SECONDS_PER_HOUR = 3600.0
@@ -85,7 +91,7 @@ def road_layout(scenario: ScenarioFile) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    sections = vehicles_of(scenario)
+    sections = _vehicles_of(scenario)
     placed = place_actors([_actor(name, sections) for name in sections])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
@@ -119,12 +125,12 @@ def _actors_on(net: Path, scenario: ScenarioFile) -> str:
     for name, way in edges.items():
         for edge in way:
             if edge not in ways.edges:
-                raise PlacementError(name, no_edge(edge, net))
+                raise PlacementError(name, _no_edge(edge, net))
     check_placement(placed, ways)
     return actors_text(ways, placed)
 
 
-def no_edge(edge: str, net: Path) -> str:
+def _no_edge(edge: str, net: Path) -> str:
     """Say that a network has no such edge, and which it has."""
     known = read_net_edges(net, ())
     if known is None:
@@ -173,7 +179,7 @@ def actors_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
 
 
-def vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
+def _vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     """Actors of a scenario that are vehicles, by their ids."""
     return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
 
@@ -248,3 +254,66 @@ def _demand(section: DemandSection, mix: tuple[tuple[str, float], ...]) -> Deman
         if key.endswith("_vph")
     }
     return Demand(tuple(flows.items()), mix if section.mix is None else tuple(section.mix.items()), section.turning)
+
+
+_NUMBERS = {"right": 0, "left": -1}
+
+
+def entering_vehicles(scenario: ScenarioFile) -> Entries:
+    """Vehicles that a timeline brings onto the road with a way of their own."""
+    doings = [pair for entry in scenario.timeline for pair in operations(entry)]
+    wanted = {
+        (vehicle, doing.depart): None
+        for vehicle, doing in doings
+        if isinstance(doing, VehicleActions) and doing.depart and doing.depart.like is None
+    }
+    if not wanted:
+        return {}
+    if scenario.road is not None:
+        layout, _ = road_layout(scenario)
+        return {key: _on_template(*key, layout) for key in wanted}
+    return {key: _on_net(*key, scenario) for key in wanted}
+
+
+def _on_template(vehicle: str, action: DepartAction, layout: Ways) -> Enter:
+    if action.edges:
+        raise PlacementError(vehicle, f"edges go with a network; on a road by template write on: {_names(layout)}")
+    return _entry(vehicle, action, layout, action.on or "same_way")
+
+
+def _on_net(vehicle: str, action: DepartAction, scenario: ScenarioFile) -> Enter:
+    if action.on is not None or not action.edges:
+        raise PlacementError(vehicle, "on goes with a road by template; on a network write edges, its way")
+    traffic, folder = scenario.traffic, scenario.directory
+    net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net
+    if net is None:
+        raise PlacementError(vehicle, "the network is not known")
+    first = action.edges[0]
+    ways = read_ways(net, {first: action.edges})
+    for edge in action.edges:
+        if edge not in ways.edges:
+            raise PlacementError(vehicle, _no_edge(edge, net))
+    length = ways.edges[first].length
+    if (action.position_m or 0.0) > length:
+        raise PlacementError(vehicle, f"position_m counts along {first!r}, which is {length:.0f} m long")
+    return _entry(vehicle, action, ways, first)
+
+
+def _entry(vehicle: str, action: DepartAction, ways: Ways, way: str) -> Enter:
+    speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
+    lane = _NUMBERS.get(str(action.lane), 0 if action.lane is None else action.lane)
+    actor = Actor(vehicle, action.type or "car", way, int(lane), 0.0, speed)
+    position = actor.length if action.position_m is None else action.position_m
+    placed = Placed(actor, position)
+    if way not in dict(ways.ways):
+        raise PlacementError(vehicle, f"the road has no way {way!r}; {suggest(way, dict(ways.ways))}")
+    check_placement([placed], ways)
+    names = ways.way(way)
+    name, place = edge_at(ways, way, position)
+    edge = ways.edge(name)
+    index = edge.index(actor.lane % edge.lanes)
+    return Enter(vehicle, actor.kind, tuple(names[names.index(name) :]), place, index, speed)
+
+
+def _names(ways: Ways) -> str:
+    return ", ".join(name for name, _ in ways.ways)

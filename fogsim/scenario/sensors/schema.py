@@ -1,12 +1,154 @@
-"""The block of a scenario file about the ego's sensors next to the camera, and about the faults of all of them."""
+"""The block of a scenario file about sensors next to the camera, faults of all, and fog reports from others."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from fogsim.scenario.section import Distance, Length, Number, Section, Time
+from fogsim.estimators import ESTIMATORS
+from fogsim.scenario.camera_schema import CalibrationErrors
+from fogsim.scenario.section import (
+    Distance,
+    Length,
+    Method,
+    Number,
+    Period,
+    Place,
+    Section,
+    Share,
+    Time,
+    Whole,
+    method_of,
+)
 from fogsim.scenario.sensors.faults import AnyFault
-from fogsim.scenario.sensors.reports import Reports
+
+_HALF_A_MILE = 804.672
+
+
+class ReportsFrom(Section):
+    """Senders of fog reports."""
+
+    delay_s: Time = 0.5
+    """Time from a measurement to its arrival."""
+
+    loss: Share = 0.0
+    """Share of reports that do not arrive."""
+
+    clock_deviation_s: Time = 0.0
+    """Standard deviation of the senders' clocks from the receiver's; in one run each is off by the same."""
+
+
+class MeasuredReports(ReportsFrom):
+    """Senders that measure the fog where they are and report it to others."""
+
+    deviation: Annotated[Number, Field(gt=0, le=2)] = 0.1
+    """Standard deviation of a measurement of k, relative to it; a forward-scatter sensor has some 10 %."""
+
+    wrong: Share = 0.0
+    """Share of measurements that are of any visibility between 20 m and 5 km: droplets on the lens, spray, insects."""
+
+
+class RoadsideCamera(Section):
+    """A camera on a mast next to the road, looking along it in the direction of travel.
+
+    Its lens, image sensor and exposure are those that `camera` describes for the ego.
+    """
+
+    estimator: Annotated[Method, method_of(ESTIMATORS)] = Method(method="joint_road")
+    """Estimator that reads its images; one for the day, since a mast has no head lamps."""
+
+    width: Whole = Field(default=320, ge=16, le=4096)
+    """Columns of the image."""
+
+    height: Whole = Field(default=240, ge=16, le=4096)
+    """Rows of the image."""
+
+    field_of_view_deg: Number = Field(default=58.0, ge=1, le=170)
+    """Horizontal field of view."""
+
+    mount_height_m: Annotated[Number, Field(ge=0.05, le=100)] = 6.0
+    """Height of the camera above the road."""
+
+    right_of_route_m: Annotated[Place, Field(ge=-100, le=100)] = 8.0
+    """Distance of the mast to the right of the ego's route; negative for the left."""
+
+    pitch_deg: Number = Field(default=2.0, ge=-45, le=45)
+    """Pitch; positive looks down."""
+
+    told: CalibrationErrors = CalibrationErrors()
+    """Errors of the calibration that the estimator assumes."""
+
+
+class RoadsideReports(MeasuredReports):
+    """Visibility sensors next to the ego's route, as on California's Highway 99."""
+
+    every_m: Length = _HALF_A_MILE
+    """Distance from one to the next; half a mile there."""
+
+    first_m: Distance = 0.0
+    """Where the first one stands on the ego's route."""
+
+    period_s: Period = 30.0
+    """Time between two reports of one sensor."""
+
+    delay_s: Time = 5.0
+    """Time from a measurement to its arrival; an operator who must confirm it takes minutes."""
+
+    camera: RoadsideCamera | None = None
+    """A camera whose images are read, in place of a measurement with noise (`deviation`, `wrong`); `{}` will do."""
+
+    @model_validator(mode="after")
+    def _measured_or_seen(self) -> Self:
+        # A resolved scenario has the defaults of both.
+        fields = type(self).model_fields
+        written = [key for key in ("deviation", "wrong") if getattr(self, key) != fields[key].default]
+        if self.camera is not None and written:
+            raise ValueError(
+                f"{' and '.join(written)} is of sensors that measure with noise, and camera replaces them: its errors "
+                f"are those of an estimator; leave out {' and '.join(written)} or camera"
+            )
+        return self
+
+
+class VehicleReports(MeasuredReports):
+    """Vehicles that measure the fog where they are, such as by a camera, and report it to those behind by radio."""
+
+    equipped: Share = 0.05
+    """Share of the vehicles that do."""
+
+    range_m: Length = 500.0
+    """Distance over which they are heard."""
+
+    period_s: Period = 1.0
+    """Time between two reports of one vehicle."""
+
+    loss: Share = 0.1
+    """Share of reports that do not arrive."""
+
+
+class CameraReports(ReportsFrom):
+    """Equipped vehicles (`traffic.equipped`), which report what their own cameras see to those behind by radio."""
+
+    range_m: Length = 500.0
+    """Distance over which they are heard."""
+
+    period_s: Period = 1.0
+    """Time between two reports of one vehicle."""
+
+    loss: Share = 0.1
+    """Share of reports that do not arrive."""
+
+
+class Reports(Section):
+    """Senders that report fog elsewhere to the ego; none by default. `fusion: field_filter` makes use of them."""
+
+    roadside: RoadsideReports | None = None
+    """Sensors next to the road."""
+
+    vehicles: VehicleReports | None = None
+    """Other vehicles on its road, whose measurement is the truth with noise."""
+
+    cameras: CameraReports | None = None
+    """Other vehicles on its road with a camera of their own; they send what their estimators say."""
 
 
 class Lead(Section):

@@ -2,6 +2,7 @@
 
 from fogsim.scenario.variation.cases import (
     KEYS,
+    MOST_RUNS,
     NONE_FAILS,
     Case,
     NoSuchCaseError,
@@ -11,10 +12,10 @@ from fogsim.scenario.variation.cases import (
     chosen_cases,
     differing_cases,
     first_of_several,
+    grid_mistake,
     read_variation,
     with_case,
 )
-from fogsim.scenario.variation.grid import MOST_RUNS, grid_mistake
 from fogsim.scenario.variation.levels import Draws, SeedLevels, Value, number_with_unit, value_text
 
 __all__ = [

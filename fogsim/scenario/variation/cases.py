@@ -16,7 +16,6 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
-from fogsim.scenario.variation.grid import grid_mistake
 from fogsim.scenario.variation.levels import (
     Draws,
     FileLevels,
@@ -31,6 +30,24 @@ from fogsim.scenario.variation.levels import (
     value_text,
 )
 from fogsim.units.quantities import split_quantity
+
+MOST_RUNS = 100_000
+"""Maximum number of runs of a study and of cases of a scenario file."""
+
+_MOST_NAMED = 5
+_MOST_DIGITS = 15
+
+
+def grid_mistake(sizes: Mapping[str, int]) -> str | None:
+    """Why a grid has too many runs, from its number of levels per factor; None if it has not."""
+    number = math.prod(sizes.values())
+    if number <= MOST_RUNS:
+        return None
+    named = [f"{size} {name}" for name, size in sizes.items() if size > 1]
+    factors = " × ".join([*named[:_MOST_NAMED], *(["…"] if len(named) > _MOST_NAMED else [])])
+    shown = f"{number:,}" if number < 10**_MOST_DIGITS else f"more than 10^{_MOST_DIGITS}"
+    return f"{factors} are {shown} runs; at most {MOST_RUNS:,} are allowed"
+
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
 """Uses of a name: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""

@@ -13,8 +13,8 @@ import tempfile
 from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree
 
-from fogsim.core.files.generated_files import kept_text
 from fogsim.core.files.readers import read_text
+from fogsim.core.files.user_cache import kept_text
 from fogsim.errors import InputError, MissingDependencyError, shown
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 

@@ -14,8 +14,7 @@ from fogsim.conditions import Finding, FindingVerdict
 from fogsim.scenario.variation.levels import parse_space
 from fogsim.testing.campaign import drawing_plan
 from fogsim.testing.campaign.boundary import Boundary, _loss, fit_boundary
-from fogsim.testing.campaign.drawing_plan import Draws, Findings, Purpose, Space, batches, number_of
-from fogsim.testing.campaign.failure_rate import FailureRate
+from fogsim.testing.campaign.drawing_plan import Draws, FailureRate, Findings, Purpose, Space, batches, number_of
 from fogsim.testing.campaign.outputs import _draw_boundary, rate_text
 from fogsim.testing.results import CaseResult
 

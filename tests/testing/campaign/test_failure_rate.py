@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from fogsim.testing.campaign.drawing_plan import Findings, PlainRate
-from fogsim.testing.campaign.failure_rate import FailureRate, failure_rate, first_proposal, next_proposal
+from fogsim.testing.campaign.drawing_plan import (
+    FailureRate,
+    Findings,
+    PlainRate,
+    failure_rate,
+    first_proposal,
+    next_proposal,
+)
 
 RATE, RUNS, LEVEL = 1e-4, 2000, 250
 DIRECTION = np.array([1.0, 0.6, -1.0, 0.4]) / np.linalg.norm([1.0, 0.6, -1.0, 0.4])

@@ -4,6 +4,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,11 @@ from drawn_scenario import SCENARIO as DRAWN
 
 from fogsim.cli.campaign import _report
 from fogsim.conditions import SIGNALS, Finding, FindingVerdict
-from fogsim.core.files.atomic import write_json
 from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.scenario import Scenario
 from fogsim.testing.campaign.running import Campaign, load_campaign, run_campaign
 from fogsim.testing.execution import CoverageCheck, ThisProcess
-from fogsim.testing.odd.coverage_files import write_coverage
-from fogsim.testing.odd.coverage_watch import CoverageWatch
+from fogsim.testing.odd.coverage_watch import CoverageWatch, write_coverage
 from fogsim.testing.odd.odd_file import read_odd
 from fogsim.testing.results import finding_to_json
 from fogsim.units import extinction_from_visibility
@@ -105,11 +104,11 @@ def test_a_campaign_and_the_same_one_resumed(tmp_path: Path) -> None:
     (tmp_path / "drawn.fog.yaml").write_text(SCENARIO)
     campaign = load_campaign(tmp_path / "drawn.fog.yaml", budget=16, odd="fog")
     check = CoverageCheck(campaign.odd)
-    summary, whole = covered(campaign, tmp_path / "a", ThisProcess(check.to_file))
+    summary, whole = covered(campaign, tmp_path / "a", ThisProcess(check))
     for _ in range(3):
         with pytest.raises(KeyboardInterrupt):
-            covered(campaign, tmp_path / "b", Interrupted(check.to_file))
-    assert covered(campaign, tmp_path / "b", Interrupted(check.to_file)) == (summary, whole)
+            covered(campaign, tmp_path / "b", Interrupted(check))
+    assert covered(campaign, tmp_path / "b", Interrupted(check)) == (summary, whole)
 
     # Each case lasts 1 s in even fog.
     merged = json.loads(whole["coverage.json"])
@@ -128,11 +127,11 @@ def test_a_campaign_and_the_same_one_resumed(tmp_path: Path) -> None:
     assert "environment.visibility;m" in table[0]
 
 
-def passes(_: Scenario, __: int, result: Path) -> None:
+def passes(_: Scenario, __: int, ___: Path) -> dict[str, Any]:
     """Work that decides each case without running it."""
     finding = Finding("safe", "always", FindingVerdict.PASSED, "", "", None, None, "", 1.0)
     outcome = {"findings": [finding_to_json(finding)], "metrics": {"minimum_gap_m": 2.0}, "ending": None}
-    write_json(result, {"status": "complete", **outcome, "duration_s": 0.1})
+    return {"status": "complete", **outcome, "duration_s": 0.1}
 
 
 def test_results_without_this_coverage_do_not_count(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import (
+    Collision,
     Command,
     Display,
     Ending,
@@ -192,6 +193,15 @@ def test_traffic_runs_ahead_of_the_pictures_and_no_farther_than_the_end() -> Non
     assert ahead[-1].ending is Ending.TIME
     assert fingerprint(ahead) == fingerprint([*single[:-1:5], single[-1]])
     assert ended_ahead == ended == ahead[-1].traffic.time
+
+
+def test_collisions_of_all_periods_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    with ClosedLoop(small("duration_s=1.2")) as loop:
+        loop.start(1)
+        hit, see = Collision(0.0, "one", "another", 5.0), loop._traffic.observe
+        found = iter([(), (hit,), ()])
+        monkeypatch.setattr(loop._traffic, "observe", lambda: replace(see(), collisions=next(found)))
+        assert loop.advance(Command(), 3).collisions == (hit,)
 
 
 def test_a_restarted_loop_lays_road_and_fog_along_the_egos_new_route(tmp_path: Path) -> None:

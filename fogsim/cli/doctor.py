@@ -42,7 +42,7 @@ def doctor_command(
     ] = False,
 ) -> None:
     """List what works on this machine, what is missing, and how to install it."""
-    findings = _examine()
+    findings = examine()
     width = max(len(finding.subject) for finding in findings)
     for finding in findings:
         mark = "[green]fine   [/]" if finding.works else "[red]missing[/]"
@@ -53,7 +53,7 @@ def doctor_command(
         compile_command()
 
 
-def _examine() -> list[_Finding]:
+def examine() -> list[_Finding]:
     """Check Python, packages, SUMO, the renderers and the video encoder."""
     findings = [_Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
     findings += [_package(name) for name in _PACKAGES]

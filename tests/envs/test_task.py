@@ -334,18 +334,22 @@ def test_a_collision_in_any_frame_of_a_decision_period_counts(fast: gymnasium.En
     hit = Collision(step.time, step.traffic.ids[step.ego], "lead", 5.0)
     frames = [_moved(step, 0.0, 0.1 * n, collisions=(hit,) if n == 2 else ()) for n in (1, 2, 3)]
 
+    def advance(_: Command, periods: int = 1) -> Step:
+        *_, last = some = [next(left) for _ in range(periods)]
+        return dataclasses.replace(last, collisions=sum((one.collisions for one in some), ()))
+
     def env(**others: Any) -> Any:
-        left = iter(frames)
-        simulation = SimpleNamespace(advance=lambda _: next(left))
+        simulation = SimpleNamespace(advance=advance)
         return SimpleNamespace(_simulation=simulation, _frames=3, _advice=fast.unwrapped._advice, **others)
 
-    driver = SimpleNamespace(follow=lambda asked, _: asked)
+    driver, left = SimpleNamespace(follow=lambda asked, _: asked), iter(frames)
     after = FogAdvisoryV1Env._drive(
         env(_own=Command(), _driver=driver, _completed=lambda one: one, _is_measured=False), step
     )
     assert (after.time, fault(after)) == (frames[-1].time, "ego")
     task = {"_weights": RewardWeights(), "_standard": DEFAULT_STANDARD, "_show": lambda _: None}
     spaces = {"spec": None, "action_space": action_space(continuous=False), "_continuous": False}
+    left = iter(frames)
     *_, info = AdvisingEnv.step(env(_step=step, **task, **spaces), NO_ADVICE)
     assert (info["collisions"], info["reward_terms"]["collision"]) == (1, -50.0)
 

@@ -91,7 +91,6 @@ def test_innovations_and_determinant_are_those_of_the_dense_cholesky_factor(miss
     # The shares of means over bins are integrated in steps here.
     assert found == pytest.approx(expected, abs=1e-3)
     assert logarithm == pytest.approx(2.0 * np.log(np.diag(factor)).sum(), abs=1e-2)
-    assert not out.innovations[1, list(missing)].any()
     assert not out.used[1, list(missing)].any()
 
 
@@ -115,7 +114,7 @@ def test_of_an_outlier_nothing_is_learnt_and_it_costs_what_is_said():
     assert [tuple(place) for place in np.argwhere(out.used != USED)] == [(0, 10)]
     residuals.noise[0, 10] = 0.0
     without = whiten(residuals, changes, ALBEDO, AIRLIGHT, False, absent)
-    assert out.innovations == pytest.approx(absent.innovations)
+    assert out.innovations[out.used == USED] == pytest.approx(absent.innovations[absent.used == USED])
     assert logarithm - without == pytest.approx(LEFT_OUT_COST + np.log(AIRLIGHT**2 / (2.0 * np.pi)))
     residuals.noise[0, 10] = 1.7
     out.used[0, 10] = HIDDEN

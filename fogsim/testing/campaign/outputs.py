@@ -145,7 +145,7 @@ def write_report(
         space=[(name, _distribution(axis)) for name, axis in campaign.space.axes.items()],
         maps=[
             (caption, data_url(svg_of(figure, caption).encode(), "image/svg+xml"))
-            for caption, figure in _maps(campaign, found)
+            for caption, figure in maps(campaign, found)
         ],
         failures=list(_failures(test, found, settings)),
         purposes=", ".join(
@@ -174,7 +174,7 @@ def _failures(test: FogTest, found: Findings, settings: Sequence[str]) -> Iterat
         yield verdict_of(one), _label(one), _why(one), command_text(test, one.run, settings)
 
 
-def _maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, Figure]]:
+def maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, Figure]]:
     """Caption and map of each pair of parameters, at most six, those that matter most first."""
     names = list(campaign.space.axes)
     if found.boundary is not None:

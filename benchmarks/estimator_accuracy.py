@@ -145,8 +145,8 @@ def timing(own: list[Row]) -> str:
         form: min((one["ms"] for one in ones if one["ms"] is not None), default=None)
         for (form,), ones in grouped(own, "method")
     }
-    told = "; ".join(f"{form} {ms}" for form, ms in fastest.items() if ms is not None)
-    return f"Fastest estimate at {TIMED[0]}×{TIMED[1]} on one core [ms]: {told or 'not measured'}."
+    times = "; ".join(f"{form} {ms}" for form, ms in fastest.items() if ms is not None)
+    return f"Fastest estimate at {TIMED[0]}×{TIMED[1]} on one core [ms]: {times or 'not measured'}."
 
 
 def tables(all_records: list[Row]) -> str:

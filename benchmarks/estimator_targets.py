@@ -75,15 +75,15 @@ def worst(rows: list[Row], as_share: bool) -> str | None:
     for row in rows:
         for name, value in row["within"].items() if row["valid"] else ():
             groups.setdefault(f"{name} {value}", []).append(row["error"])
-    # A group that is the whole cell tells nothing of where it is weak.
+    # A group that is the whole cell says nothing of where it is weak.
     whole = sum(row["valid"] for row in rows)
     known = {name: errors for name, errors in groups.items() if FEWEST <= len(errors) < whole}
     if not known:
         return None
     name = max(known, key=lambda one: np.mean(known[one]) if as_share else np.percentile(known[one], 95))
     errors = known[name]
-    told = f"{1 - np.mean(errors):.2f}" if as_share else f"{quantile(errors, 0.5, 2)} / {quantile(errors, 0.95, 2)}"
-    return f"{name}: {told} (n = {len(errors)})"
+    figures = f"{1 - np.mean(errors):.2f}" if as_share else f"{quantile(errors, 0.5, 2)} / {quantile(errors, 0.95, 2)}"
+    return f"{name}: {figures} (n = {len(errors)})"
 
 
 def blank(target: Target, cell: str, command: str) -> Row:
@@ -143,8 +143,8 @@ def written(one: Row) -> tuple[str, ...]:
         found = f"{one['median']} / {one['p95']}" if one["median"] is not None else "–"
     head = (one["target"], one["cell"], asked)
     if one["met"] is None:
-        told = f"`{one['command']}`" if one["command"].startswith("python") else one["command"]
-        return (*head, told, *[""] * 5)
+        where = f"`{one['command']}`" if one["command"].startswith("python") else one["command"]
+        return (*head, where, *[""] * 5)
     tail = (one["images"], one["valid_share"], one["coverage"], one["worst_cell"])
     return (*head, found, "yes" if one["met"] else "**no**", *("–" if value is None else str(value) for value in tail))
 

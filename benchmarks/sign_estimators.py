@@ -42,7 +42,7 @@ class Post(NamedTuple):
     """A sign as it stands (None if it is missing), and as the map has it."""
 
     true: Sign | None
-    told: Sign
+    known: Sign
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +63,10 @@ def posts(drive: Drive, rng: np.random.Generator) -> list[Post]:
         place = (FIRST + APART * i + rng.uniform(-10, 10), rng.uniform(-6.5, -4.5), rng.uniform(2.0, 2.6))
         standing = Sign(f"s{i}", kind, float(rng.choice([50, 80, 100])) / 3.6, place, 0.0, 0.9)
         x, y, z = place
-        told = replace(standing, position=(x + rng.normal(0, 0.5), y + rng.normal(0, 0.5), z + rng.normal(0, 0.1)))
+        known = replace(standing, position=(x + rng.normal(0, 0.5), y + rng.normal(0, 0.5), z + rng.normal(0, 0.1)))
         # Drawn always, so that drives with and without wrong signs are the same otherwise.
         is_wrong, how, by = rng.uniform() < drive.wrong_share, str(rng.choice(WRONG)), float(rng.choice([-1.0, 1.0]))
-        found.append(Post(wronged(standing, how, by) if is_wrong else standing, told))
+        found.append(Post(wronged(standing, how, by) if is_wrong else standing, known))
     return found
 
 
@@ -86,7 +86,7 @@ def drives(drive: Drive, visibilities: tuple[float, ...], seed: tuple[int, ...])
     """Observations of one drive, frame by frame, in every fog."""
     rng = np.random.default_rng(seed)
     along = posts(drive, rng)
-    standing, known = tuple(p.true for p in along if p.true is not None), tuple(p.told for p in along)
+    standing, known = tuple(p.true for p in along if p.true is not None), tuple(p.known for p in along)
     places = tuple(float(x) for x in np.arange(0.0, known[-1].position[0] - 5.0, drive.step))
     grey = float(rng.choice((120.0, 200.0, 255.0)))
     return observed(SignDrive(CAMERA, standing, places, NOISE, grey, REACH, known), visibilities, rng)
@@ -95,12 +95,12 @@ def drives(drive: Drive, visibilities: tuple[float, ...], seed: tuple[int, ...])
 METHODS = ("sign_contrast", "belaroussi2015", "belaroussi2015, published")
 VISIBILITIES = (60.0, 100.0, 150.0, 200.0, 300.0, 400.0)
 
-Told = dict[tuple[str, float], list[list[Estimate]]]
+Estimates = dict[tuple[str, float], list[list[Estimate]]]
 
 
-def driven(pool: int, count: int, wrong: float, visibilities: Sequence[float]) -> Told:
+def driven(pool: int, count: int, wrong: float, visibilities: Sequence[float]) -> Estimates:
     """Estimates by method and visibility, drive by drive."""
-    told: Told = defaultdict(list)
+    estimates: Estimates = defaultdict(list)
     measured = measure_operating_range(CAMERA, 0.9, seed=0)
     make = {
         "sign_contrast": lambda: SignContrast(CAMERA),
@@ -110,16 +110,16 @@ def driven(pool: int, count: int, wrong: float, visibilities: Sequence[float]) -
     for number in range(count):
         made: dict[tuple[str, float], Estimator] = {(n, v): make[n]() for n in METHODS for v in visibilities}
         for key in made:
-            told[key].append([])
+            estimates[key].append([])
         for seen in drives(Drive(wrong_share=wrong), tuple(visibilities), (pool, number)):
             for key, estimator in made.items():
-                told[key][-1].append(estimator.update(seen[key[1]]))
-    return told
+                estimates[key][-1].append(estimator.update(seen[key[1]]))
+    return estimates
 
 
-def records(told: Told, wrong: float) -> Iterator[Row]:
+def records(estimates: Estimates, wrong: float) -> Iterator[Row]:
     """One record a method and visibility."""
-    for (name, visibility), found in told.items():
+    for (name, visibility), found in estimates.items():
         k = extinction_from_visibility(visibility)
         valid = [[one for one in drive if one.valid] for drive in found]
         every = [one for drive in valid for one in drive]
@@ -149,14 +149,14 @@ def _percent(values: list[float], percentile: float) -> float | None:
 
 def docs_table(found: list[Row]) -> list[str]:
     """Lines of the table of docs/benchmarks/estimators.md: `sign_contrast` with right signs, and with wrong ones."""
-    told = {(one["visibility"], one["wrong_share"]): one for one in found if one["method"] == "sign_contrast"}
-    shares = list(dict.fromkeys(share for _, share in told))
+    by_cell = {(one["visibility"], one["wrong_share"]): one for one in found if one["method"] == "sign_contrast"}
+    shares = list(dict.fromkeys(share for _, share in by_cell))
     heads = ["V_met, m", "median/p95, %", "90 % intervals hold"]
     for share in shares[1:]:
         heads += [f"with {100 * share:.0f} % of signs wrong", "intervals hold"]
     rows = []
-    for visibility in dict.fromkeys(visibility for visibility, _ in told):
-        cells = [told[visibility, share] for share in shares]
+    for visibility in dict.fromkeys(visibility for visibility, _ in by_cell):
+        cells = [by_cell[visibility, share] for share in shares]
         parts = ((f"{one['median_pct']:.1f}/{one['p95_pct']:.1f}", f"{one['coverage']:.2f}") for one in cells)
         rows.append((f"{visibility:.0f}", *itertools.chain(*parts)))
     return lines_of(heads, rows)

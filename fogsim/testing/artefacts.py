@@ -165,24 +165,24 @@ def keep_artefacts(
 
     The same seed gives the same run. `watch` receives the number of finished cases and their total.
     """
-    told: dict[str, tuple[StudyRun, list[Finding]]] = {}
+    failed: dict[str, tuple[StudyRun, list[Finding]]] = {}
     for one in outcomes:
         for judgement in one.judgements:
             if judgement.outcome is not Outcome.PASSED:
                 name = _folder_name(one.test, judgement.run)
-                told.setdefault(name, (judgement.run, []))[1].append(judgement.telling)
+                failed.setdefault(name, (judgement.run, []))[1].append(judgement.telling)
     folder = out / FOLDER
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    work = KeepFailures({name: tuple(findings) for name, (_, findings) in told.items()})
-    runs, done = [replace(run, key=name) for name, (run, _) in told.items()], itertools.count()
+    work = KeepFailures({name: tuple(findings) for name, (_, findings) in failed.items()})
+    runs, done = [replace(run, key=name) for name, (run, _) in failed.items()], itertools.count()
     watch(next(done), len(runs))
     ProcessPool(processes, work).run(runs, folder, lambda *_: watch(next(done), len(runs)))
     return {
         (run.key, finding.name, finding.clause): Artefacts(
             _if_there(folder / name / f"{_title_of(finding)}.svg"), _if_there(folder / name / _VIDEO)
         )
-        for name, (run, findings) in told.items()
+        for name, (run, findings) in failed.items()
         for finding in findings
     }
 

@@ -90,16 +90,16 @@ def _outcome(numbers: tuple[int, int, int], verdict: Verdict) -> tuple[Outcome, 
     tried, of_all = passed + failed, sum(numbers)
     if tried == 0:
         return Outcome.INCONCLUSIVE, f"{inconclusive} of {of_all} cases inconclusive"
-    told = f"{passed} of {tried} cases passed" + (f", {inconclusive} inconclusive" if inconclusive else "")
+    text = f"{passed} of {tried} cases passed" + (f", {inconclusive} inconclusive" if inconclusive else "")
     low, high = float(not failed), float(not failed)
     if verdict.pass_rate < 1.0:
         low, high = rate_bounds(passed, tried, verdict.confidence)
-        told += (
+        text += (
             f": a rate of {100 * low:.1f} … {100 * high:.1f} % with {100 * verdict.confidence:.4g} % confidence each; "
             f"wanted {100 * verdict.pass_rate:.4g} %"
         )
     if high < verdict.pass_rate:
-        return Outcome.FAILED, told
+        return Outcome.FAILED, text
     if tried < verdict.conclusive * of_all:
-        return Outcome.INCONCLUSIVE, f"{told}; {100 * verdict.conclusive:.4g} % of them must show something"
-    return (Outcome.PASSED if low >= verdict.pass_rate else Outcome.INCONCLUSIVE), told
+        return Outcome.INCONCLUSIVE, f"{text}; {100 * verdict.conclusive:.4g} % of them must show something"
+    return (Outcome.PASSED if low >= verdict.pass_rate else Outcome.INCONCLUSIVE), text

@@ -112,12 +112,12 @@ def annotations(outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -
     for one in outcomes:
         for judgement in one.judgements:
             if judgement.outcome is not Outcome.PASSED:
-                told = f"{judgement_text(judgement)}\n{command_text(one.test, judgement.run, settings)}"
+                message = f"{judgement_text(judgement)}\n{command_text(one.test, judgement.run, settings)}"
                 title = f"{judgement.title}: {judgement.outcome}"
-                yield _command(one.test.lines[judgement.name], title, told)
+                yield _command(one.test.lines[judgement.name], title, message)
         if one.broken:
-            told = f"{broken_text(one.broken)}\n{command_text(one.test, one.broken[0].run, settings)}"
-            yield _command(str(one.test.path), f"{one.test.name}: error", told)
+            message = f"{broken_text(one.broken)}\n{command_text(one.test, one.broken[0].run, settings)}"
+            yield _command(str(one.test.path), f"{one.test.name}: error", message)
 
 
 def _command(where: str, title: str, message: str) -> str:

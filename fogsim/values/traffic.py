@@ -1,7 +1,6 @@
 """Where every vehicle and person is at one instant, and what the traffic lights show."""
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -261,9 +260,7 @@ def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np
 
     Takes `heard` [m/s].
     """
-    if not heard:
-        return np.empty(0)
-    return np.fromiter(map(heard.get, ids, itertools.repeat(math.inf)), np.float64, len(ids))
+    return np.fromiter(map(heard.get, ids, itertools.repeat(np.inf)) if heard else (), np.float64)
 
 
 @dataclass(frozen=True, slots=True)

@@ -343,9 +343,8 @@ def test_a_collision_in_any_frame_of_a_decision_period_counts(fast: gymnasium.En
         return SimpleNamespace(_simulation=simulation, _frames=3, _advice=fast.unwrapped._advice, **others)
 
     driver, left = SimpleNamespace(follow=lambda asked, _: asked), iter(frames)
-    after = FogAdvisoryV1Env._drive(
-        env(_own=Command(), _driver=driver, _completed=lambda one: one, _is_measured=False), step
-    )
+    own = env(_own=Command(), _driver=driver, _completed=lambda one: one, _is_measured=False)
+    after = FogAdvisoryV1Env._drive(own, step)
     assert (after.time, fault(after)) == (frames[-1].time, "ego")
     task = {"_weights": RewardWeights(), "_standard": DEFAULT_STANDARD, "_show": lambda _: None}
     spaces = {"spec": None, "action_space": action_space(continuous=False), "_continuous": False}

@@ -73,10 +73,10 @@ def _by_topic(metrics: Mapping[str, object], topics: Mapping[str, Sequence[str]]
     return found
 
 
-def _png(picture: ReportPicture) -> bytes:
+def _jpeg(picture: ReportPicture) -> bytes:
     buffer = io.BytesIO()
-    # As small as at the usual level, in a third of the time.
-    scale_image(picture.image, 480, 480).save(buffer, format="PNG", compress_level=4)
+    # Noise is what a PNG would spend its bytes on: six times as many, in ten times the time.
+    scale_image(picture.image, 480, 480).save(buffer, format="JPEG", quality=90)
     return buffer.getvalue()
 
 
@@ -193,7 +193,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             footer=_footnotes(information.seed),
             label=_label,
             value=shown_metric,
-            png=_png,
+            jpeg=_jpeg,
             caption=_caption,
         )
         write_text(information.directory.report, text)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.exponential import exponential
 from fogsim.core.jit import kernel
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
@@ -92,8 +93,7 @@ def update_belief(one: Any, belief: NDArray[np.float64], scratch: NDArray[np.flo
         precision = 1.0 / deviation
         for i in range(CELLS):
             far = (measured - _EXTINCTION[i]) * precision
-            if abs(far) < 6.0:
-                belief[i] *= 1.0 + share * math.exp(-0.5 * far * far)
+            belief[i] *= 1.0 + share * exponential(-0.5 * far * far)
     total = 0.0
     for i in range(CELLS):
         total += belief[i]

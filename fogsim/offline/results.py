@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fogsim.offline.drive.sign_watch import SignSummary
 from fogsim.offline.estimation import FrameEstimates
-from fogsim.offline.source import Source
+from fogsim.offline.source import Picture, Source
 from fogsim.values import Estimate, SignLook
 
 ENDLESS = 10_000.0
@@ -52,13 +52,14 @@ def record_lines(result: FrameEstimates) -> Iterator[str]:
     str
         A line without its end; ASCII, strict JSON.
     """
-    if result.picture.error:
-        yield json.dumps({"frame": result.picture.name, "error": result.picture.error})
+    picture = result.picture
+    if picture.error:
+        yield json.dumps({**_place(picture), "error": picture.error})
     for estimate in result.estimates:
-        yield json.dumps(_record(result.picture.name, estimate), allow_nan=False)
+        yield json.dumps(_record(picture, estimate), allow_nan=False)
     if result.signs:
         signs = [_sign_record(sign) for sign in result.signs]
-        yield json.dumps({"frame": result.picture.name, "signs": signs}, allow_nan=False)
+        yield json.dumps({**_place(picture), "signs": signs}, allow_nan=False)
 
 
 CSV_KEYS = (
@@ -80,13 +81,11 @@ def csv_lines(result: FrameEstimates) -> Iterator[str]:
     str
         A line without its end for each method; one with the reason alone for an image that could not be used.
     """
-    time, name = result.picture.time, result.picture.name
-    seconds = round(time, 3) if time >= _LONG else _number(time)
-    if result.picture.error:
-        yield csv_line({"frame": name, "time_s": seconds, "valid": False, "reason": result.picture.error})
+    picture = result.picture
+    if picture.error:
+        yield csv_line({**_place(picture), "valid": False, "reason": picture.error})
     for estimate in result.estimates:
-        reason = "" if estimate.valid else estimate.diagnostics.get("reason", "")
-        yield csv_line({**_record(name, estimate), "time_s": seconds, "reason": reason})
+        yield csv_line(_record(picture, estimate))
 
 
 def csv_line(values: Mapping[str, object] = dict(zip(CSV_KEYS, CSV_KEYS, strict=True))) -> str:
@@ -114,11 +113,16 @@ def _sign_record(sign: SignLook) -> dict[str, object]:
     }
 
 
-def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
+def _place(picture: Picture) -> dict[str, object]:
+    time = picture.time
+    return {"frame": picture.name, "time_s": round(time, 3) if time >= _LONG else _number(time)}
+
+
+def _record(picture: Picture, estimate: Estimate) -> dict[str, object]:
     low, high = estimate.visibility_interval
     valid = estimate.valid
     return {
-        "frame": name,
+        **_place(picture),
         "method": estimate.method,
         "valid": valid,
         "visibility_m": _number(estimate.visibility) if valid else None,
@@ -127,6 +131,7 @@ def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
         "extinction_per_m": _number(estimate.extinction) if valid else None,
         "category": estimate.category.value if valid else None,
         "horizon_row": _number(estimate.diagnostics.get("horizon_row")) if valid else None,
+        "reason": None if valid else estimate.diagnostics.get("reason"),
         **_along_the_road(estimate),
     }
 

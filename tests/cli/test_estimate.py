@@ -27,6 +27,8 @@ KEYS = {"frame", "method", "valid", "visibility_m", "visibility_low_m", "visibil
     "extinction_per_m",
     "category",
     "horizon_row",
+    "reason",
+    "time_s",
 }
 
 

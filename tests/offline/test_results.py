@@ -11,6 +11,7 @@ from fogsim.values import Estimate
 
 KEYS = [
     "frame",
+    "time_s",
     "method",
     "valid",
     "visibility_m",
@@ -19,6 +20,7 @@ KEYS = [
     "extinction_per_m",
     "category",
     "horizon_row",
+    "reason",
 ]
 IMAGE = np.zeros((4, 4), np.uint8)
 
@@ -47,9 +49,10 @@ def test_a_valid_estimate_has_every_key_in_its_unit() -> None:
     assert record["horizon_row"] == 219.5
 
 
-def test_an_invalid_estimate_says_nothing() -> None:
+def test_an_invalid_estimate_says_why() -> None:
     (record,) = records(Estimate.invalid("negru2013", "too dark", horizon_row=3.0))
-    assert record == {**dict.fromkeys(KEYS), "frame": 7, "method": "negru2013", "valid": False}
+    known = {"frame": 7, "time_s": 0.0, "method": "negru2013", "valid": False, "reason": "too dark"}
+    assert record == {**dict.fromkeys(KEYS), **known}
 
 
 def test_no_fog_has_no_largest_visibility() -> None:
@@ -62,7 +65,7 @@ def test_no_fog_has_no_largest_visibility() -> None:
 
 
 def test_an_image_that_cannot_be_used_has_an_error_alone() -> None:
-    assert records(name="b.png", error="b.png: broken") == [{"frame": "b.png", "error": "b.png: broken"}]
+    assert records(name="b.png", error="b.png: broken") == [{"frame": "b.png", "time_s": 0.0, "error": "b.png: broken"}]
 
 
 def test_frames_of_a_long_drive_have_times_of_their_own() -> None:

@@ -18,7 +18,9 @@ def list_command() -> None:
     from fogsim.fusion import FUSIONS
     from fogsim.lighting import LIGHTING_POLICIES
     from fogsim.render import RENDERERS
-    from fogsim.scenario import catalogue, load_scenario
+    from fogsim.scenario import catalogue
+    from fogsim.scenario.document import read_scenario_document
+    from fogsim.scenario.loading import scenario_file
     from fogsim.study import shipped_studies
     from fogsim.traffic import SPEED_CHOICES
 
@@ -27,8 +29,8 @@ def list_command() -> None:
     table.add_column("test", no_wrap=True)
     table.add_column("description")
     for name in catalogue():
-        scenario = load_scenario(name)
-        table.add_row(escape(name), "test" if scenario.expect else "", escape(scenario.description))
+        written = read_scenario_document(scenario_file(name)).data
+        table.add_row(escape(name), "test" if "expect" in written else "", escape(written["description"]))
     stdout.print(table)
     stdout.print()
     stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")

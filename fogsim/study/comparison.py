@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from fogsim.study.main_metrics import metric_words, short_number, signed
 from fogsim.study.plan import Study
@@ -208,7 +208,7 @@ def adjust_p_values(differences: Sequence[Difference]) -> list[Difference]:
     Of the differences with an adjusted value of at most 0.05, one in twenty is expected to be false.
     """
     found = [one.p_value for one in differences if one.p_value is not None]
-    adjusted = iter(stats.false_discovery_control(found).tolist() if found else [])
+    adjusted = iter(scipy.stats.false_discovery_control(found).tolist() if found else [])
     return [one if one.p_value is None else replace(one, adjusted_p_value=next(adjusted)) for one in differences]
 
 
@@ -216,7 +216,7 @@ def mean_interval(values: NDArray[np.float64], confidence: float) -> tuple[float
     """Bootstrap interval (BCa) of the mean of values, one per seed; (None, None) if resampling is degenerate."""
     if len(values) < 2 or np.ptp(values) == 0.0:
         return None, None
-    ends = stats.bootstrap(
+    ends = scipy.stats.bootstrap(
         (values,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, rng=np.random.default_rng(0)
     ).confidence_interval
     return (float(ends.low), float(ends.high)) if math.isfinite(ends.low) and math.isfinite(ends.high) else (None, None)
@@ -226,7 +226,7 @@ def _p_value(differences: NDArray[np.float64]) -> float | None:
     """Two-sided paired permutation test: without a difference, both signs are equally likely."""
     if len(differences) < 2 or not differences.any():
         return None
-    test = stats.permutation_test(
+    test = scipy.stats.permutation_test(
         (differences, np.zeros_like(differences)),
         lambda x, y, axis: np.mean(x - y, axis=axis),
         permutation_type="samples",
@@ -240,7 +240,7 @@ def _p_value(differences: NDArray[np.float64]) -> float | None:
 def _seeds_wanted(differences: NDArray[np.float64], half_width: float, confidence: float) -> int | None:
     if len(differences) < 2 or half_width == 0.0:
         return None
-    quantile = float(stats.norm.ppf(0.5 + 0.5 * confidence))
+    quantile = float(scipy.stats.norm.ppf(0.5 + 0.5 * confidence))
     return max(2, math.ceil((quantile * float(differences.std(ddof=1)) / half_width) ** 2))
 
 

@@ -28,6 +28,7 @@ class Beginning:
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
     aims: dict[str, float] = field(default_factory=dict)  # Speeds that vehicles come to in the beginning [m/s]
+    late: set[str] = field(default_factory=set)  # Who comes in a story
     _distances: list[tuple[str, Node]] = field(default_factory=list)
     _changing: set[str] = field(default_factory=set)  # Who changes lane, or may: its first one decides no way
 
@@ -71,13 +72,16 @@ class Beginning:
         for name, action in (*self._distances, *at_once):
             with action.refusing():
                 self.spots[name] = self._at_distance(action, name)
-        absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
-        for name in absent:
+        gone = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
+        for name in gone:
             self.spots.pop(name, None)
-        if init and init.above:
-            absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
+            self.positions.off_lanes.pop(name, None)
+        for one in _entity_actions(init.above, "AddEntityAction") if init and init.above else ():
+            if (name := one.get("entityRef")) in {*self.spots, *self.positions.off_lanes} - {*added}:
+                one.refuse(f"{name} is there from Init on, and who leaves does not come back; delete it in Init")
+            self.late |= {name} - {*added}
         for name, vehicle in self.vehicles.items():
-            if name not in absent or name == self.vehicles.ego:
+            if name not in gone | self.late or name == self.vehicles.ego:
                 self._begin(vehicle)
 
     def _begin(self, vehicle: Vehicle) -> None:

@@ -15,6 +15,7 @@ from fogsim.values.script import (
     ChangeLight,
     ChangeSpeed,
     Follow,
+    FollowPath,
     SetSignal,
     TrafficAction,
 )
@@ -81,7 +82,7 @@ class Timeline:
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
         """What has begun, or is over, of what was due."""
         failed = {
-            begun.name: Reason.NOT_AHEAD if isinstance(action, Follow) else Reason.NO_LANE
+            begun.name: self._why_refused(action)
             for begun, actions in due.parts
             for action in actions
             if action in refused
@@ -92,6 +93,14 @@ class Timeline:
                 entry.refusal = failed.get(entry.name)
         self._ends = [end for end in self._ends if end.name not in failed]
         return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
+
+    def _why_refused(self, action: TrafficAction) -> Reason:
+        match action:
+            case Follow():
+                return Reason.NOT_AHEAD
+            case FollowPath():
+                return Reason.LEFT if action.vehicle in self._seen else Reason.NEVER_SEEN
+        return Reason.NO_LANE
 
     def unplayed(self, step: TrafficStep) -> Unplayed:
         """What has not begun when a run is over."""

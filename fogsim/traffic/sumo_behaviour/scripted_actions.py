@@ -194,7 +194,7 @@ class ScriptedActions:
             elif isinstance(action, Enter):
                 refused += [] if enter(self._api, action, present) else [action]
             elif isinstance(action, FollowPath):
-                self._paths.begin(action, time, present)
+                refused += [] if self._paths.begin(action, time, present) else [action]
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._is_possible(action, motion):

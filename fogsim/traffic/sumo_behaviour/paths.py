@@ -125,7 +125,7 @@ class Paths:
         return None if path is None else path.driven
 
     def begin(self, action: FollowPath, time: float, present: Collection[str]) -> bool:
-        """Begin a path; who is not on the road yet appears at its first point. False for one that SUMO does not know."""
+        """Begin a path, unless SUMO knows no such vehicle; who is not on the road yet appears at its first point."""
         vehicle, get = action.vehicle, self._api.vehicle
         if not self._is_known(vehicle, present):
             return False

@@ -133,6 +133,7 @@ def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
 
 _VARIABLES = {
     "getSpeed": 0x40,
+    "getTypeID": 0x4F,
     "getPosition3D": 0x39,
     "getAngle": 0x43,
     "getSignals": 0x5B,

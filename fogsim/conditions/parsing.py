@@ -34,6 +34,7 @@ _ARGUMENT = re.compile(r"[^\s,()\"'][^,()\"']*")
 _OPERATOR = re.compile(r"<=|>=|==|!=|<|>|is\s+not\b|is\b")
 _SPELLED = {"is": "==", "is not": "!="}
 _HOW = re.compile(r"(falls\s+below|rises\s+above|becomes|changes|includes?)\b")
+_NOT, _FOR = re.compile(r"not\b"), re.compile(r"(for|delayed)\b")
 _AGAIN = re.compile(r"(and|or|not|for|delayed)\b")
 
 OPERATORS = ("<", "<=", ">", ">=", "==", "!=")
@@ -151,8 +152,11 @@ class _Text:
         return _joined(AllOf, parts)
 
     def _held(self) -> Condition:
-        if self._take(re.compile(r"not\b")):
-            return Not(self._held())
+        if self._take(_NOT):
+            part = self._held() if _NOT.match(self._rest()) else self._single()
+            if time := self._take(_FOR):
+                raise ValueError(f"{shown(self._text)}: write '(not …) {time} …' or 'not (… {time} …)'")
+            return Not(part)
         part = self._single()
         if self._take(re.compile(r"for\b")):
             return Held(part, self._quantity("s"))

@@ -83,6 +83,8 @@ def test_what_is_refused() -> None:
         ("ego.speed > ", "got the end"),
         ("time > 3 s and", "expected a signal"),
         ("(time > 3 s", r"expected '\)'"),
+        ("not ego.collision for 3 s", r"write '\(not …\) for …' or 'not \(… for …\)'"),
+        ("not (time > 3 s) delayed 1 s", r"write '\(not …\) delayed …'"),
         ("time > 3 s time > 4 s", "expected 'and', 'or', 'for', 'delayed' or the end"),
         ("fog.bank(first)", "named by its number"),
         ("gap(a b", "expected ',' or"),

@@ -88,7 +88,7 @@ def test_mistakes_are_told_at_their_place(tmp_path: Path) -> None:
 def test_edges_of_a_network_are_looked_up() -> None:
     way = "timeline=[{when: time > 1 s, do: {slow: {take_route: [bank, exitt]}}}]"
     with pytest.raises(
-        fogsim.InputError, match=r"do\.slow\.take_route: the net has no edge 'exitt'; did you mean 'exit'"
+        fogsim.InputError, match=r"slow\.take_route: the net has no edge 'exitt'; did you mean 'exit'"
     ):
         fogsim.load_scenario("motorway_fog_bank", [way])
     for depart, told in (

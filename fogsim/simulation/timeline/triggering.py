@@ -14,6 +14,8 @@ from fogsim.values.script import (
     ChangeLane,
     ChangeLight,
     ChangeSpeed,
+    Depart,
+    Enter,
     Follow,
     FollowPath,
     SetSignal,
@@ -98,6 +100,8 @@ class Timeline:
         match action:
             case Follow():
                 return Reason.NOT_AHEAD
+            case Depart() | Enter():
+                return Reason.NO_PLACE
             case FollowPath():
                 return Reason.LEFT if action.vehicle in self._seen else Reason.NEVER_SEEN
         return Reason.NO_LANE
@@ -159,6 +163,9 @@ class _Entry:
         if not self._has_held or not self.is_due(step.time):
             return Reason.NEVER_HELD
         absent = [vehicle for vehicle in self.vehicles(step) if with_persons(step.traffic).row(vehicle) is None]
+        if not absent:
+            # It needs a place along the ego's route, or the run has ended at its time.
+            return Reason.NOT_REACHED
         return Reason.NEVER_SEEN if any(vehicle not in seen for vehicle in absent) else Reason.LEFT
 
 

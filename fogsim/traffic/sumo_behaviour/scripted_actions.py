@@ -192,7 +192,7 @@ class ScriptedActions:
             elif isinstance(action, Depart):
                 refused += [] if depart(self._api, action, present) else [action]
             elif isinstance(action, Enter):
-                refused += [] if enter(self._api, action, present) else [action]
+                refused += [] if enter(self._api, action) else [action]
             elif isinstance(action, FollowPath):
                 refused += [] if self._paths.begin(action, time, present) else [action]
             elif isinstance(action, Walk):

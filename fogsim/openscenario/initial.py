@@ -201,7 +201,7 @@ class Beginning:
         done = effect.do.get(name, {})
         speed, leader = done.pop("speed", None), self._of_name(done.get("follow", {}).get("vehicle", ""))
         if speed is not None and speed.keys() & {"over_s", "rate_mps2", "profile"}:
-            self._come_to(name, speed, effect.lasts)
+            self._come_to(name, speed, effect.lasts, action)
         elif speed is not None:
             self.orders[name] = speed
             if speed.get("continuous"):
@@ -211,7 +211,7 @@ class Beginning:
         if done:
             self.effect.add(name, **done)
 
-    def _come_to(self, name: str, speed: dict[str, Any], lasts: float) -> None:
+    def _come_to(self, name: str, speed: dict[str, Any], lasts: float, action: Node) -> None:
         """Let a vehicle come to a speed from standstill, or an earlier order; unless it stops, the ego drives on."""
         first = speed.get("profile", [(1.0, 0.0)])[0]
         if first[0] == 0.0:
@@ -220,6 +220,10 @@ class Beginning:
         if final is not None:
             self.aims[name] = final / KMH_PER_MPS
         if final and name == self.vehicles.ego:
+            if self.speed(name) > self.aims[name]:
+                action.refuse(
+                    "its driver aims for the speed that it comes to, and begins no faster; write it in a story"
+                )
             if "rate_mps2" in speed:
                 lasts = abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
             speed = {**speed, "for_s": max(lasts, 0.1)}

@@ -226,7 +226,8 @@ def _vehicles_text(begin: Beginning, driven: str) -> str:
         limits = {front.lane.limit} if front else {math.inf}
         if name == driven:
             limits = {one.limit for one in begin.lanes.lanes if one.edge in ways[name]}
-        own = _type(vehicle, begin.aims.get(name, speed), limits, *habit)
+        aim = begin.aims.get(name, speed)
+        own = _type(vehicle, max(aim, speed) if aim > _STANDS else aim, limits, *habit)
         own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [

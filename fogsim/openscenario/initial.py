@@ -222,7 +222,7 @@ class Beginning:
         if final and name == self.vehicles.ego:
             if self.speed(name) > self.aims[name]:
                 action.refuse(
-                    "its driver aims for the speed that it comes to, and begins no faster; write it in a story"
+                    "its driver aims for the speed that it comes to, and begins no faster; take a story"
                 )
             if "rate_mps2" in speed:
                 lasts = abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]

@@ -221,9 +221,7 @@ class Beginning:
             self.aims[name] = final / KMH_PER_MPS
         if final and name == self.vehicles.ego:
             if self.speed(name) > self.aims[name]:
-                action.refuse(
-                    "its driver aims for the speed that it comes to, and begins no faster; take a story"
-                )
+                action.refuse("its driver aims for the speed that it comes to, and begins no faster; take a story")
             if "rate_mps2" in speed:
                 lasts = abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
             speed = {**speed, "for_s": max(lasts, 0.1)}

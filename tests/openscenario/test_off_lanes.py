@@ -210,6 +210,14 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
     assert motion_at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
 
 
+def test_the_fog_may_change_where_one_is_far_from_all_lanes(tmp_path: Path) -> None:
+    thicker = '<Environment name="e"><Weather><Fog visualRange="60"/></Weather></Environment>'
+    fog = event("fog", f"<GlobalAction><EnvironmentAction>{thicker}</EnvironmentAction></GlobalAction>", after(1))
+    begin = {"Ego": EGO, "Far": world(150, 60, 'h="0"')}
+    file = write(tmp_path, {"Ego": CAR, "Far": CAR}, begin, {"Ego": fog}, stop=after(3))
+    assert run(file, "drivers.see_through_fog=false")[-1].truth.visibility == pytest.approx(60.0)
+
+
 def _added(name: str, s: float) -> str:
     return _entity(name, f"<AddEntityAction>{lane(s)}</AddEntityAction>")
 

@@ -1,6 +1,5 @@
 """Where advice enters SUMO: the ego's as the speed that it drives, other drivers' as the top speed that they desire."""
 
-import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 
@@ -23,6 +22,7 @@ from fogsim.traffic.drivers.speed_choice import (
 )
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo.nearby_vehicles import positions_of
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.headways import HeadwayControl, KeepingUp
@@ -345,8 +345,7 @@ class SumoDesiredSpeeds:
         """Extinction coefficients where vehicles are (n,) [1/m]."""
         if self._extinction is not None:
             return np.full(len(ids), self._extinction)
-        flat = itertools.chain.from_iterable(map(self._position, ids))
-        return self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
+        return self._fog.extinction(positions_of(ids, self._position))
 
     def _has_answered(self, vehicle: str, display: Display) -> bool:
         """Whether the delay is over in which a driver does not follow yet what is heard somewhere."""

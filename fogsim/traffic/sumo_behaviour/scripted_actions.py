@@ -7,7 +7,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api, has_lane
+from fogsim.traffic.sumo.link import Api, has_lane, is_off_lanes
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.paths import LaneOffsets, Paths
@@ -233,8 +233,10 @@ class ScriptedActions:
         """Whether there is the lane to change to, or the one to follow is ahead."""
         if isinstance(action, Follow):
             return action.leader in motion.present and motion.gap(action.vehicle, action.leader) is not None
-        if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
+        if not isinstance(action, ChangeLane) or action.vehicle in self._oncoming:
             return True
+        if action.oncoming:
+            return not is_off_lanes(self._api, action.vehicle)
         if action.vehicle in self._paths.vehicles and not action.lanes:
             return True
         return has_lane(self._api, action.vehicle, action.lanes)

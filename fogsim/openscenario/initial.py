@@ -110,7 +110,9 @@ class Beginning:
         far = _STRAIGHT if self.moves(vehicle.name) or vehicle.body else 0.0
         ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
         lane = None if vehicle.body else self.lanes.nearest(x, y)
-        path = {"points": self.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
+        back = self.lanes.backwards(lane) if lane else []
+        # At the beginning of its road none of it is left.
+        path = {"points": back if len(back) > 1 else ends, "ahead_m": vehicle.front, "stays": True}
         done = self.effect.do.setdefault(vehicle.name, {})
         done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 

@@ -210,6 +210,12 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
     assert motion_at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
 
 
+def test_one_turned_round_may_begin_where_its_road_ends(tmp_path: Path) -> None:
+    place = world(0, -1.75, 'h="3.1416"')
+    steps = run(write(tmp_path, {"Ego": CAR, "Onc": CAR}, {"Ego": EGO, "Onc": place}, stop=after(1)))
+    assert motion_at(steps, 1.0, "Onc") == pytest.approx((-3.7, -1.75, 0.0), abs=0.05)
+
+
 def test_the_fog_may_change_where_one_is_far_from_all_lanes(tmp_path: Path) -> None:
     thicker = '<Environment name="e"><Weather><Fog visualRange="60"/></Weather></Environment>'
     fog = event("fog", f"<GlobalAction><EnvironmentAction>{thicker}</EnvironmentAction></GlobalAction>", after(1))

@@ -289,6 +289,8 @@ class SubscribedReader(VehicleReader):
         # Rows of a subscription of the user's own may be among them, with other variables.
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
         position = positions_of(listed, lambda vehicle: rows[vehicle][_POSITION_3D])
+        # Far from all lanes a vehicle has no height.
+        position[position == UNKNOWN] = 0.0
         near = self._is_near(listed, position)
         ids = self._read = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
         return _DynamicState(

@@ -20,6 +20,7 @@ def test_one_test_of_a_signal() -> None:
         ("warning is fog_ahead", Comparison(Reference("warning"), "==", Word("fog_ahead"))),
         ("warning is  not none", Comparison(Reference("warning"), "!=", Word("none"))),
         ('"0".lane == right', Comparison(Reference("X.lane", ("0",)), "==", Word("right"))),
+        ('ego.speed > "0".speed', Comparison(EGO_SPEED, ">", Reference("X.speed", ("0",)))),
         ("distance(0, '1 2') > 5 m", Comparison(Reference("distance(X, Y)", ("0", "1 2")), ">", Quantity(5, "5", "m"))),
         (
             "fog.visibility_at_camera  falls   below 100 m",

@@ -22,6 +22,7 @@ from fogsim.values.script import (
     SetSignal,
     Shape,
     Stop,
+    TakeRoute,
     TrafficAction,
 )
 from tests.traffic.common import DATA, NET, driven, running, setup_of
@@ -159,6 +160,18 @@ def test_a_vehicle_comes_onto_the_road_near_another(motorway: Traffic, gap: floa
     front = before + gap + math.copysign(length, gap)
     assert get.getLanePosition("new") == pytest.approx(front, abs=0.5)
     assert get.getRoute("new") == get.getRoute("lead")
+
+
+def test_no_one_else_gets_the_type_that_a_vehicle_has_for_itself(motorway: Traffic) -> None:
+    """SUMO deletes it with the first vehicle that has it, be it one that is made to search a way."""
+    library = load_libsumo()
+    library.vehicle.setMaxSpeed("lead", 35.0)
+    assert library.vehicle.getTypeID("lead") == "car@lead"
+    assert motorway.begin([Depart("new", like="lead", gap=-30.0), TakeRoute("lead", ("exit",))]) == ()
+    driven(motorway, 3)
+    assert library.vehicle.getTypeID("new") == "car"
+    assert "car@lead" in library.vehicletype.getIDList()
+    assert library.vehicle.getRoute("lead")[-1] == "exit"
 
 
 def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:

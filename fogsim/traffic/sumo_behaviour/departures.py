@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Collection, Sequence
 
-from fogsim.traffic.sumo.link import Api, edge_length, is_off_lanes
+from fogsim.traffic.sumo.link import Api, edge_length, is_off_lanes, shared_type
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 from fogsim.traffic.templates.placement import VEHICLE_KINDS
@@ -21,7 +21,7 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     get, like = api.vehicle, action.like
     if action.vehicle in get.getLoadedIDList() or like not in present or is_off_lanes(api, like):
         return False
-    kind = _type(api, action.vehicle, action.kind) if action.kind else get.getTypeID(like)
+    kind = _type(api, action.vehicle, action.kind) if action.kind else shared_type(api, like)
     length = float(get.getLength(like)) if action.gap < 0.0 else -float(api.vehicletype.getLength(kind))
     here = RoutePlaces(api).find(like)
     place = here.station + here.past_end + action.gap - length

@@ -7,7 +7,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api, has_lane, is_off_lanes
+from fogsim.traffic.sumo.link import Api, has_lane, is_off_lanes, shared_type
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.paths import LaneOffsets, Paths
@@ -224,7 +224,7 @@ class ScriptedActions:
         if here in edges:
             vehicle.setRoute(action.vehicle, edges[edges.index(here) :])
             return True
-        found = self._api.simulation.findRoute(here, edges[0], vehicle.getTypeID(action.vehicle)).edges
+        found = self._api.simulation.findRoute(here, edges[0], shared_type(self._api, action.vehicle)).edges
         if found:
             vehicle.setRoute(action.vehicle, [*found, *edges[1:]])
         return bool(found)

@@ -17,9 +17,10 @@ from fogsim.values.script import (
     Depart,
     Enter,
     Follow,
-    FollowPath,
     SetSignal,
+    TakeRoute,
     TrafficAction,
+    Walk,
 )
 from fogsim.values.traffic import with_persons
 
@@ -102,9 +103,10 @@ class Timeline:
                 return Reason.NOT_AHEAD
             case Depart() | Enter():
                 return Reason.NO_PLACE
-            case FollowPath():
-                return Reason.LEFT if action.vehicle in self._seen else Reason.NEVER_SEEN
-        return Reason.NO_LANE
+            case ChangeLane() | TakeRoute() | SetSignal():
+                return Reason.NO_LANE
+        who = action.person if isinstance(action, Walk) else action.vehicle
+        return Reason.LEFT if who in self._seen else Reason.NEVER_SEEN
 
     def unplayed(self, step: TrafficStep) -> Unplayed:
         """What has not begun when a run is over."""

@@ -185,6 +185,8 @@ class ScriptedActions:
         Returns those that could not begin: the vehicle has left, has no such lane, or is not behind the one that it is
         to follow. Takes `time` [s].
         """
+        # Who leaves by one of these is gone for the next.
+        present = {*present}
         refused, motion = list[TrafficAction](), self._motion(time, present)
         for action in actions:
             if isinstance(action, SetSignal):
@@ -204,6 +206,7 @@ class ScriptedActions:
             elif isinstance(action, Leave):
                 self._paths.leave(action.vehicle)
                 self._api.vehicle.remove(action.vehicle)
+                present.discard(action.vehicle)
             else:
                 self._playing.begin(action, motion)
         return tuple(refused)

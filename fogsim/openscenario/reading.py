@@ -152,7 +152,8 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
             if isinstance(done, dict) and done.get("speed", {}).get("shape") == "step":
                 begin.orders.setdefault(vehicle, done["speed"])
     for name, vehicle in positions.vehicles.items():
-        begin.effect.add(name, **vehicle.lamps)
+        if vehicle.body:
+            begin.effect.add(name, **vehicle.lamps)
     entries += story.triggers.marks
     first, light = _initial(begin, {block["name"] for _, block in entries}), begin.environment.illuminance
     timeline = [*first, *(block for _, block in entries)]
@@ -181,7 +182,7 @@ def _initial(begin: Beginning, taken: set[str]) -> list[dict[str, Any]]:
         moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
         if not moves and (name != begin.positions.vehicles.ego or speed <= _STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
-    there = {name: done for name, done in begin.effect.do.items() if done and name in begin.positions.spots}
+    there = {name: done for name, done in begin.effect.do.items() if name in begin.positions.spots}
     comes = {name: {"path": begin.effect.do[name].pop("path")} for name in off_lanes}
     later = {name: done for name in off_lanes if (done := begin.effect.do[name])}
     parts = {"Init": there, "Init_off_the_lanes": comes, "Init_once_there": later}

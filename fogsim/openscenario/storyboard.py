@@ -180,10 +180,11 @@ class Storyboard:
             if effect.once_there:
                 happened = Trigger(f"happened({name})")
                 written.append(timeline_entry(node, f"{name}_once_there", happened, effect.once_there, until))
-            for actor, reached in effect.reached.items():
+            for order, (actor, reached) in enumerate(effect.reached.items()):
                 held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
                 when = Trigger(" and ".join([f"happened({name})", reached, *self._still_ordered(entry, name, actor)]))
-                written.append(timeline_entry(node, f"{name}_reached", when, held, until))
+                called = f"{name}_reached" + (f"_{order + 1}" if order else "")
+                written.append(timeline_entry(node, called, when, held, until))
             written += self._end_others(entry, name, trigger, until)
         return written
 

@@ -10,8 +10,8 @@ from fogsim.scenario.loading import load_scenario
 from fogsim.values import Step
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, PERSON, QUIET, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, over, polyline, run, speed,
-    state, world, write,
+    CAR, PERSON, QUIET, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, over, polyline, run,
+    speed, state, world, write,
 )  # fmt: skip
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")

@@ -108,11 +108,13 @@ def test_what_has_not_begun_is_told_with_the_reason() -> None:
             "{name: without, when: time >= 0 s, do: {ego: {hazard_lights: on}}}",
             "{name: left, when: time >= 0.2 s, do: {lead: {hazard_lights: on}}}",
             "{name: no_lane, when: time >= 0 s, do: {lead: {change_lane: {lanes: 3}}}}",
+            "{name: no_place, when: time >= 0 s, do: {new: {depart: {like: lead, gap: 5 m}}}}",
             "{name: played, when: time >= 0 s, do: {lead: {hazard_lights: on}}}",
         )
     )
     due = timeline.due(step(0.0, lead=100.0))
-    assert [begun.name for begun in timeline.begun(due, due.parts[0][1])] == ["played"]
+    refused = due.parts[0][1] + due.parts[1][1]
+    assert [begun.name for begun in timeline.begun(due, refused)] == ["played"]
     last = step(0.2, other=0.0)
     timeline.due(last)
     unplayed = timeline.unplayed(last)
@@ -121,8 +123,16 @@ def test_what_has_not_begun_is_told_with_the_reason() -> None:
         ("without", Reason.NEVER_SEEN),
         ("left", Reason.LEFT),
         ("no_lane", Reason.NO_LANE),
+        ("no_place", Reason.NO_PLACE),
     ]
-    assert unplayed.vehicles == ("ego",)
+    assert unplayed.vehicles == ("ego", "new")
+
+
+def test_who_is_there_has_not_left_though_the_run_is_over() -> None:
+    timeline = timeline_of(scenario("{when: time >= 0 s, delay: 0.2 s, do: {lead: {hazard_lights: on}}}"))
+    timeline.due(step(0.0, lead=100.0))
+    (one,) = timeline.unplayed(step(0.2, lead=104.0)).events
+    assert one.reason is Reason.NOT_REACHED
 
 
 def test_what_has_begun_at_another_time_is_not_reported() -> None:

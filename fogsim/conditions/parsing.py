@@ -30,10 +30,12 @@ _UNIT_PART = r"(?!(?:and|or|not|for|delayed)\b)[^\W\d_]+(?:\^?-?\d+)?"
 _UNIT = re.compile(rf"\s*(%|°|{_UNIT_PART}(?:\s*[/*·]\s*{_UNIT_PART})*)")
 _NAME = re.compile(r"[^\W\d][\w:#@.\-]*")
 _QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
+_OF_QUOTED = re.compile(rf"(?:{_QUOTED.pattern})\.")
 _ARGUMENT = re.compile(r"[^\s,()\"'][^,()\"']*")
 _OPERATOR = re.compile(r"<=|>=|==|!=|<|>|is\s+not\b|is\b")
 _SPELLED = {"is": "==", "is not": "!="}
 _HOW = re.compile(r"(falls\s+below|rises\s+above|becomes|changes|includes?)\b")
+_NOT, _FOR = re.compile(r"not\b"), re.compile(r"(for|delayed)\b")
 _AGAIN = re.compile(r"(and|or|not|for|delayed)\b")
 
 OPERATORS = ("<", "<=", ">", ">=", "==", "!=")
@@ -151,8 +153,11 @@ class _Text:
         return _joined(AllOf, parts)
 
     def _held(self) -> Condition:
-        if self._take(re.compile(r"not\b")):
-            return Not(self._held())
+        if self._take(_NOT):
+            part = self._held() if _NOT.match(self._rest()) else self._single()
+            if time := self._take(_FOR):
+                raise ValueError(f"{shown(self._text)}: write '(not …) {time} …' or 'not (… {time} …)'")
+            return Not(part)
         part = self._single()
         if self._take(re.compile(r"for\b")):
             return Held(part, self._quantity("s"))
@@ -259,9 +264,8 @@ class _Text:
         signal = SIGNALS[left.signal]
         if signal.kind in (Kind.NUMBER, Kind.LANE) and _NUMBER.match(self._rest()):
             return self._checked(left, signal, self._quantity(signal.unit))
-        quoted = self._take(_QUOTED)
         if signal.kind is Kind.NUMBER:
-            if quoted or not _NAME.match(self._rest()):
+            if not (_NAME.match(self._rest()) or _OF_QUOTED.match(self._rest())):
                 raise self._wrong(f"a quantity such as {example_of(signal.stated_in)!r} after {relation}")
             right = self._reference()
             other = SIGNALS[right.signal]
@@ -271,7 +275,7 @@ class _Text:
                     f"[{other.unit or '-' if other.kind is Kind.NUMBER else other.kind.value}]"
                 )
             return right
-        word = quoted or self._take(re.compile(r"[\w:#@.\-]+"))
+        word = self._take(_QUOTED) or self._take(re.compile(r"[\w:#@.\-]+"))
         if not word or _AGAIN.fullmatch(word):
             raise self._wrong(f"a word after {relation}")
         allowed = ("true", "false") if signal.kind is Kind.FLAG else signal.words

@@ -95,7 +95,7 @@ class Actions(LateralActions):
         vehicle = self.vehicles[name]
         path = {"points": [[x, y, degrees]], "ahead_m": vehicle.front, "speed_kmh": 0.0, "stays": bool(vehicle.body)}
         effect.add(name, path=path)
-        effect.once_there[name] = {"speed": {"to_kmh": 0.0, "shape": "step"}}
+        effect.once_there[name] = {"speed": {"to_kmh": 0.0, "shape": "step"}, **vehicle.lamps}
 
     def environment_action(self, action: Node, effect: Effect) -> None:
         """`fog` and `light`."""

@@ -59,6 +59,11 @@ class Vehicle:
         return self.named if _WORD.fullmatch(self.named) else f'"{self.named}"'
 
     @property
+    def lamps(self) -> dict[str, dict[str, str]]:
+        """Block of a timeline that keeps its lamps dark if it has none."""
+        return {"lamps": {"all": "off"}} if self.body else {}
+
+    @property
     def rear(self) -> float:
         """From the rear bumper to the reference point [m]."""
         return self.length - self.front
@@ -220,6 +225,8 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> flo
         if abs(elevation) > math.pi and given is None:
             sun.refuse(f"elevation: expected an angle in radians, from -pi to pi, got {elevation:g}")
     clear = None if elevation is None else clear_sky_illuminance(elevation)
+    if clear is None and given is None and weather and clouds:
+        weather.remark("clouds without a TimeOfDay, or a Sun's elevation: the light stays as it is")
     if sun is None or given is None:
         return None if clear is None else through_clouds(clear, clouds)
     lux = sun.number(given)

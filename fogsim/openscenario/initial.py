@@ -28,6 +28,7 @@ class Beginning:
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
     aims: dict[str, float] = field(default_factory=dict)  # Speeds that vehicles come to in the beginning [m/s]
+    late: set[str] = field(default_factory=set)  # Who comes in a story
     _distances: list[tuple[str, Node]] = field(default_factory=list)
     _changing: set[str] = field(default_factory=set)  # Who changes lane, or may: its first one decides no way
 
@@ -71,13 +72,16 @@ class Beginning:
         for name, action in (*self._distances, *at_once):
             with action.refusing():
                 self.spots[name] = self._at_distance(action, name)
-        absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
-        for name in absent:
+        gone = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
+        for name in gone:
             self.spots.pop(name, None)
-        if init and init.above:
-            absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
+            self.positions.off_lanes.pop(name, None)
+        for one in _entity_actions(init.above, "AddEntityAction") if init and init.above else ():
+            if (name := one.get("entityRef")) in {*self.spots, *self.positions.off_lanes} - {*added}:
+                one.refuse(f"{name} is there from Init on, and who leaves does not come back; delete it in Init")
+            self.late |= {name} - {*added}
         for name, vehicle in self.vehicles.items():
-            if name not in absent or name == self.vehicles.ego:
+            if name not in gone | self.late or name == self.vehicles.ego:
                 self._begin(vehicle)
 
     def _begin(self, vehicle: Vehicle) -> None:
@@ -106,7 +110,9 @@ class Beginning:
         far = _STRAIGHT if self.moves(vehicle.name) or vehicle.body else 0.0
         ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
         lane = None if vehicle.body else self.lanes.nearest(x, y)
-        path = {"points": self.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
+        back = self.lanes.backwards(lane) if lane else []
+        # At the beginning of its road none of it is left.
+        path = {"points": back if len(back) > 1 else ends, "ahead_m": vehicle.front, "stays": True}
         done = self.effect.do.setdefault(vehicle.name, {})
         done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 
@@ -197,7 +203,7 @@ class Beginning:
         done = effect.do.get(name, {})
         speed, leader = done.pop("speed", None), self._of_name(done.get("follow", {}).get("vehicle", ""))
         if speed is not None and speed.keys() & {"over_s", "rate_mps2", "profile"}:
-            self._come_to(name, speed, effect.lasts)
+            self._come_to(name, speed, effect.lasts, action)
         elif speed is not None:
             self.orders[name] = speed
             if speed.get("continuous"):
@@ -207,7 +213,7 @@ class Beginning:
         if done:
             self.effect.add(name, **done)
 
-    def _come_to(self, name: str, speed: dict[str, Any], lasts: float) -> None:
+    def _come_to(self, name: str, speed: dict[str, Any], lasts: float, action: Node) -> None:
         """Let a vehicle come to a speed from standstill, or an earlier order; unless it stops, the ego drives on."""
         first = speed.get("profile", [(1.0, 0.0)])[0]
         if first[0] == 0.0:
@@ -216,6 +222,8 @@ class Beginning:
         if final is not None:
             self.aims[name] = final / KMH_PER_MPS
         if final and name == self.vehicles.ego:
+            if self.speed(name) > self.aims[name]:
+                action.refuse("its driver aims for the speed that it comes to, and begins no faster; take a story")
             if "rate_mps2" in speed:
                 lasts = abs(self.aims[name] - self.speed(name)) / speed["rate_mps2"]
             speed = {**speed, "for_s": max(lasts, 0.1)}

@@ -19,8 +19,8 @@ from fogsim.openscenario.initial import Beginning
 from fogsim.openscenario.lateral import MOTION
 from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
-from fogsim.openscenario.storyboard import Storyboard
-from fogsim.openscenario.triggers import Trigger, Triggers, timeline_entry
+from fogsim.openscenario.storyboard import Storyboard, free_name
+from fogsim.openscenario.triggers import NEAR_THE_END, Trigger, Triggers, timeline_entry
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.appearance import BODY_PARAMETER
 from fogsim.traffic.road.netconvert import map_net
@@ -32,7 +32,6 @@ from fogsim.units import KMH_PER_MPS
 _USUAL_DURATION = 120.0  # Longest simulated time of a file without a stop trigger [s]
 _LONGEST = 3600.0  # The same of one whose stop trigger is more than a time [s]
 _FOREVER = 1e6  # Later times are meant never to come [s].
-_NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
 _CONTROLLERS = ("ObjectController", "AssignControllerAction", "ActivateControllerAction")
 _FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
@@ -130,8 +129,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     root, positions = story.root, begin.positions
     ego, lanes, routed = positions.vehicles.ego, positions.lanes, {*begin.effect.routes, *positions.rerouted}
     route = positions.ways[ego]
-    end = math.inf if lanes.followers.get(route[-1]) else lanes.starts(route)[-1] - _NEAR_THE_END
-    story.triggers = Triggers(positions, story.state, story.value, end)
+    story.triggers = Triggers(positions, story.state, story.value)
     entries = story.timeline()
     stop = story.triggers.trigger(storyboard.one("StopTrigger"))
     way = [one for edge in route for one in lanes.lanes if one.edge == edge and one.index == 0]
@@ -155,9 +153,9 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
                 begin.orders.setdefault(vehicle, done["speed"])
     for name, vehicle in positions.vehicles.items():
         if vehicle.body:
-            begin.effect.add(name, lamps={"all": "off"})
-    first, light = _initial(begin), begin.environment.illuminance
+            begin.effect.add(name, **vehicle.lamps)
     entries += story.triggers.marks
+    first, light = _initial(begin, {block["name"] for _, block in entries}), begin.environment.illuminance
     timeline = [*first, *(block for _, block in entries)]
     data = {
         "description": description,
@@ -165,7 +163,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
         "traffic": {
             "ego": ego,
             "keep_lane": [name for name in positions.vehicles if name not in routed],
-            "stop_before_end_m": _NEAR_THE_END,
+            "stop_before_end_m": NEAR_THE_END,
         },
         "fog": fog,
         **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
@@ -176,7 +174,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     return ScenarioData(data, {("timeline", i): node.line for i, (node, _) in enumerate(entries, start=len(first))})
 
 
-def _initial(begin: Beginning) -> list[dict[str, Any]]:
+def _initial(begin: Beginning, taken: set[str]) -> list[dict[str, Any]]:
     """Entries of the timeline for the initial state: speeds of all but the ego, lamps, and who comes off the lanes."""
     off_lanes = begin.positions.off_lanes
     for name in begin.positions.spots:
@@ -184,11 +182,11 @@ def _initial(begin: Beginning) -> list[dict[str, Any]]:
         moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
         if not moves and (name != begin.positions.vehicles.ego or speed <= _STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
-    there = {name: done for name, done in begin.effect.do.items() if name not in off_lanes}
+    there = {name: done for name, done in begin.effect.do.items() if name in begin.positions.spots}
     comes = {name: {"path": begin.effect.do[name].pop("path")} for name in off_lanes}
     later = {name: done for name in off_lanes if (done := begin.effect.do[name])}
     parts = {"Init": there, "Init_off_the_lanes": comes, "Init_once_there": later}
-    return [{"name": name, "when": "time >= 0 s", "do": done} for name, done in parts.items() if done]
+    return [{"name": free_name(name, taken), "when": "time >= 0 s", "do": do} for name, do in parts.items() if do]
 
 
 def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) -> dict[str, Any]:
@@ -198,8 +196,9 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
         return {"duration_s": min(max(stop.at, 0.1), _FOREVER)}
     if not stop.delay:
         return {"duration_s": _LONGEST, "end_when": stop.condition}
-    timeline.append(timeline_entry(node, "stop", stop, {})[1])
-    return {"duration_s": _LONGEST, "end_when": "happened(stop)"}
+    name = free_name("stop", {one["name"] for one in timeline})
+    timeline.append(timeline_entry(node, name, stop, {})[1])
+    return {"duration_s": _LONGEST, "end_when": f"happened({name})"}
 
 
 def _vehicles_text(begin: Beginning, driven: str) -> str:
@@ -228,7 +227,8 @@ def _vehicles_text(begin: Beginning, driven: str) -> str:
         limits = {front.lane.limit} if front else {math.inf}
         if name == driven:
             limits = {one.limit for one in begin.lanes.lanes if one.edge in ways[name]}
-        own = _type(vehicle, begin.aims.get(name, speed), limits, *habit)
+        aim = begin.aims.get(name, speed)
+        own = _type(vehicle, max(aim, speed) if aim > _STANDS else aim, limits, *habit)
         own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [

@@ -141,7 +141,7 @@ class Storyboard:
         entry.node.word("priority", ("override", "overwrite", *_GENTLE))
         for _ in range(min(times * _executions(entry.node), _MOST_TIMES)):
             taken = {name for one in self.entries.values() for name in one.names}
-            entry.names.append(_free_name(entry.node.get("name"), {*taken, *entry.names}))
+            entry.names.append(free_name(entry.node.get("name"), {*taken, *entry.names}))
         self.entries[id(entry.node)] = entry
         actions = entry.node.all("Action")
         for action in actions:
@@ -154,7 +154,7 @@ class Storyboard:
         """Entries of the timeline, each with its element."""
         taken = {name for one in self.entries.values() for name in one.names}
         stopped = [act for act in self._acts if any(one.children for one in act.all("StopTrigger"))]
-        self._stops = {id(act): _free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
+        self._stops = {id(act): free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
         for act in self._acts:
@@ -180,10 +180,11 @@ class Storyboard:
             if effect.once_there:
                 happened = Trigger(f"happened({name})")
                 written.append(timeline_entry(node, f"{name}_once_there", happened, effect.once_there, until))
-            for actor, reached in effect.reached.items():
+            for order, (actor, reached) in enumerate(effect.reached.items()):
                 held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
                 when = Trigger(" and ".join([f"happened({name})", reached, *self._still_ordered(entry, name, actor)]))
-                written.append(timeline_entry(node, f"{name}_reached", when, held, until))
+                called = f"{name}_reached" + (f"_{order + 1}" if order else "")
+                written.append(timeline_entry(node, called, when, held, until))
             written += self._end_others(entry, name, trigger, until)
         return written
 
@@ -263,7 +264,7 @@ class Storyboard:
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
         taken = {mark["name"] for _, mark in self.triggers.marks}
-        name = _free_name(wanted, taken.union(*(one.names for one in self.entries.values())))
+        name = free_name(wanted, taken.union(*(one.names for one in self.entries.values())))
         self.triggers.marks.append(timeline_entry(node, name, trigger, {}))
         return f"happened({name})"
 
@@ -407,7 +408,7 @@ def _is_called(node: Node, kind: str, name: str) -> bool:
     return node.tag == kind and node.attributes.get("name") == parts[-1] and all(f"[{p}]" in node.path for p in parts)
 
 
-def _free_name(wanted: str, taken: set[str]) -> str:
+def free_name(wanted: str, taken: set[str]) -> str:
     """A name for an entry of the timeline: letters, digits and _, and unique."""
     name = re.sub(r"\W", "_", wanted, flags=re.ASCII)[:80] or "event"
     name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"

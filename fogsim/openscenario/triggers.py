@@ -1,6 +1,5 @@
 """Triggers as conditions of FogSim's language."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -9,12 +8,14 @@ from fogsim.openscenario.environment import Vehicle
 from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node, NodeError, handlers
+from fogsim.traffic.road.opendrive_lanes import Spot
 
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
 NEAR = 0.05  # Difference up to which speeds are equal [m/s]
+NEAR_THE_END = 10.0  # Distance to the end of its route at which a vehicle has arrived [m]
 STEP = "0.001 s"  # Less than a camera period: what is delayed by it was so one step before
 _BESIDE = 1.5  # Least distance at which a vehicle in the same lane has been at a place [m]
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
@@ -44,7 +45,6 @@ class Triggers:
     positions: Positions
     states: Callable[[Node], Trigger]
     values: Callable[[Node], Trigger]
-    end: float = math.inf  # Of the ego's road [m]
     marks: list[TimelineEntry] = field(default_factory=list)  # Without action
 
     def trigger(self, node: Node | None) -> Trigger | None:
@@ -173,9 +173,16 @@ class Triggers:
 
     def end_of_road_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.position` at the end of the ego's road, or of its route."""
-        if not math.isfinite(self.end):
-            node.refuse("the ego's road has no end")
-        return (f"{one.called}.position >= {self.end:.3f} m",)
+        lanes, route = self.positions.lanes, self.positions.ways[self.positions.vehicles.ego]
+        last = self.positions.ways.get(one.name, route)[-1]
+        if lanes.followers.get(last):
+            node.refuse(f"the road of {one.name} has no end")
+        if last == route[-1]:
+            return (f"{one.called}.position >= {lanes.starts(route)[-1] - NEAR_THE_END:.3f} m",)
+        across = [lane for lane in lanes.lanes if lane.edge == last]
+        lane = across[len(across) // 2]
+        x, y, _ = Spot(lane, lane.length).world
+        return f"nearest_to({one.called}, 0 m, {x:.3f} m, {y:.3f} m)", "<=", f"{NEAR_THE_END:g} m"
 
     def relative_distance_condition(self, node: Node, one: Vehicle) -> _Test:
         """`gap(X, Y)` either way; straight `clearance(X, Y)`; without `freespace` `distance_along` or `distance`."""

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from fogsim.conditions import EGO, Limits, lights_of
@@ -12,8 +12,9 @@ from fogsim.scenario.expect.checks import last_time, named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import TrafficFiles
 from fogsim.scenario.schema import Clocks, ScenarioFile
-from fogsim.scenario.timeline import departing_vehicles, pointless_triggers
+from fogsim.scenario.timeline import departing_vehicles, operations, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
+from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
     ANY_EGO,
@@ -101,7 +102,8 @@ def demand_mistakes(document: Document, scenario: ScenarioFile, made: TrafficFil
         mistakes |= _wide_changes(scenario, demand, edges)
         mistakes |= _unknown_signals(scenario, edges)
         way = _way(scenario, demand)
-        mistakes |= _unknown_edges(scenario, edges) or _places_aside(scenario, way, edges)
+        mistakes |= _unknown_edges(_edges_on_the_way(scenario), edges)
+        mistakes |= _unknown_way(scenario, edges) or _places_aside(scenario, way, edges)
         mistakes |= _pointless(document, scenario, _limits(end, way, edges))
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in mistakes.items()]
 
@@ -138,15 +140,27 @@ def _way(scenario: ScenarioFile, demand: Demand) -> tuple[str, ...]:
     return scenario.traffic.along if way is None else tuple(way.edges)
 
 
-def _unknown_edges(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, str]:
-    """Edges of ``traffic.along`` that the network does not have, or that do not follow the one before."""
-    along = scenario.traffic.along
-    unknown: dict[KeyPath, str] = {
-        ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
-        for i, edge in enumerate(along)
+def _unknown_edges(named: Iterable[tuple[KeyPath, str]], edges: NetEdges) -> dict[KeyPath, str]:
+    """Edges that the network does not have."""
+    return {
+        at: f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
+        for at, edge in named
         if edge not in edges.lanes
     }
-    return unknown or {
+
+
+def _edges_on_the_way(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
+    """Edges that vehicles are to take by the timeline."""
+    for number, entry in enumerate(scenario.timeline):
+        for subject, doing in operations(entry):
+            for edge in (isinstance(doing, VehicleActions) and doing.take_route) or ():
+                yield ("timeline", number, "do", subject, "take_route"), edge
+
+
+def _unknown_way(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, str]:
+    """Edges of ``traffic.along`` that the network does not have, or that do not follow the one before."""
+    along = scenario.traffic.along
+    return _unknown_edges(((("traffic", "along", i), edge) for i, edge in enumerate(along)), edges) or {
         ("traffic", "along", i): f"the net has no lane that leads from edge {shown(one)} to edge {shown(other)}"
         for i, (one, other) in enumerate(itertools.pairwise(along), 1)
         if (one, other) in edges.gaps

@@ -32,6 +32,7 @@ class Reason(StrEnum):
     NEVER_HELD = "its condition never held"
     NO_LANE = "there was no such lane"
     NOT_AHEAD = "the vehicle to follow was not ahead"
+    NO_PLACE = "there was no place for the vehicle, or such a vehicle already"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,8 @@ class Unplayed:
     @property
     def is_final(self) -> bool:
         """True if a longer run would not have played all of it either."""
-        return any(event.reason in (Reason.LEFT, Reason.NO_LANE, Reason.NOT_AHEAD) for event in self.events)
+        final = Reason.LEFT, Reason.NO_LANE, Reason.NOT_AHEAD, Reason.NO_PLACE
+        return any(event.reason in final for event in self.events)
 
 
 NOTHING_UNPLAYED = Unplayed()

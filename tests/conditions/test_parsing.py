@@ -20,6 +20,7 @@ def test_one_test_of_a_signal() -> None:
         ("warning is fog_ahead", Comparison(Reference("warning"), "==", Word("fog_ahead"))),
         ("warning is  not none", Comparison(Reference("warning"), "!=", Word("none"))),
         ('"0".lane == right', Comparison(Reference("X.lane", ("0",)), "==", Word("right"))),
+        ('ego.speed > "0".speed', Comparison(EGO_SPEED, ">", Reference("X.speed", ("0",)))),
         ("distance(0, '1 2') > 5 m", Comparison(Reference("distance(X, Y)", ("0", "1 2")), ">", Quantity(5, "5", "m"))),
         (
             "fog.visibility_at_camera  falls   below 100 m",
@@ -83,6 +84,8 @@ def test_what_is_refused() -> None:
         ("ego.speed > ", "got the end"),
         ("time > 3 s and", "expected a signal"),
         ("(time > 3 s", r"expected '\)'"),
+        ("not ego.collision for 3 s", r"write '\(not …\) for …' or 'not \(… for …\)'"),
+        ("not (time > 3 s) delayed 1 s", r"write '\(not …\) delayed …'"),
         ("time > 3 s time > 4 s", "expected 'and', 'or', 'for', 'delayed' or the end"),
         ("fog.bank(first)", "named by its number"),
         ("gap(a b", "expected ',' or"),

@@ -49,6 +49,16 @@ def test_the_ego_keeps_the_speed_to_which_it_comes_in_init(tmp_path: Path, begin
     assert motion_at(steps, 3.9, "Ego")[2] == pytest.approx(fast, abs=0.05)
 
 
+@pytest.mark.parametrize("slows", [profile((0, 20), (4, 8)), f"{speed(20)}\n{speed(8, linear(4))}"])
+def test_a_vehicle_may_slow_down_from_the_start(tmp_path: Path, slows: str) -> None:
+    begin = {"Ego": EGO, "Lead": f"{lane(300)}\n{slows}"}
+    steps = run(write(tmp_path, dict.fromkeys(begin, CAR), begin, stop=after(5.0)))
+    found = [motion_at(steps, time, "Lead")[2] for time in (0.0, 2.0, 4.9)]
+    assert found == pytest.approx([20.0, 14.0, 8.0], abs=0.3)
+    with pytest.raises(InputError, match=r"Private\[Ego\].*: its driver aims for the speed that it comes to"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{slows}"}))
+
+
 NEAR = (
     '<RelativeDistanceCondition entityRef="Other" relativeDistanceType="longitudinal" value="0.1" freespace="false" '
     'rule="lessThan"/>'

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError, LeftOutWarning
+from fogsim.errors import InputError, LeftOutWarning, UnplayedWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, CASES, DATA, PERSON, TIMED, TWO_LANES, after, begun, changed, changes_lane, event, follows, lane, motion_at,
-    over, polyline, profile, row_of, run, speed, world, write,
+    CAR, CASES, DATA, PERSON, TIMED, TWO_LANES, after, begun, changed, changes_lane, event, follows, lane, linear,
+    motion_at, over, polyline, profile, row_of, run, speed, world, write,
 )  # fmt: skip
 
 EGO = f"{lane(30)}\n{speed(5)}"
@@ -208,6 +208,53 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
     assert there["Never"] == []
     assert motion_at(steps, 3.9, "Late") == pytest.approx((303.7, -1.75, 0.0), abs=0.05)
     assert motion_at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
+
+
+def test_one_turned_round_may_begin_where_its_road_ends(tmp_path: Path) -> None:
+    place = world(0, -1.75, 'h="3.1416"')
+    steps = run(write(tmp_path, {"Ego": CAR, "Onc": CAR}, {"Ego": EGO, "Onc": place}, stop=after(1)))
+    assert motion_at(steps, 1.0, "Onc") == pytest.approx((-3.7, -1.75, 0.0), abs=0.05)
+
+
+def test_the_fog_may_change_where_one_is_far_from_all_lanes(tmp_path: Path) -> None:
+    thicker = '<Environment name="e"><Weather><Fog visualRange="60"/></Weather></Environment>'
+    fog = event("fog", f"<GlobalAction><EnvironmentAction>{thicker}</EnvironmentAction></GlobalAction>", after(1))
+    begin = {"Ego": EGO, "Far": world(150, 60, 'h="0"')}
+    file = write(tmp_path, {"Ego": CAR, "Far": CAR}, begin, {"Ego": fog}, stop=after(3))
+    assert run(file, "drivers.see_through_fog=false")[-1].truth.visibility == pytest.approx(60.0)
+
+
+def _added(name: str, s: float) -> str:
+    return _entity(name, f"<AddEntityAction>{lane(s)}</AddEntityAction>")
+
+
+def test_the_initial_state_does_not_wait_for_who_comes_later(tmp_path: Path) -> None:
+    begin = {"Ego": EGO, "Lead": f"{lane(90)}\n{speed(10, linear(8))}"}
+    comes = event("come", _added("Late", 300), after(6.0))
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR, "Late": PERSON}, begin, {"Ego": comes}, stop=after(7)))
+    assert begun(steps)["Init"] == 0.0
+    assert motion_at(steps, 4.0, "Lead")[2] == pytest.approx(5.0, abs=0.2)
+    assert int(steps[-1].traffic.lamps[row_of(steps[-1], "Late")]) == 0
+
+
+def test_who_leaves_does_not_come_back(tmp_path: Path) -> None:
+    goes = event("go", _entity("Late", "<DeleteEntityAction/>"), after(2.0))
+    again = event("again", _added("Late", 400), after(3.0)).replace("override", "parallel")
+    comes = event("come", _added("Late", 300), after(1.0)) + goes + again
+    file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, {"Ego": comes}, stop=after(4))
+    with pytest.warns(UnplayedWarning, match=r"again \(Late: path\): the vehicle left the road before"):
+        run(file)
+    file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO, "Late": lane(90)}, {"Ego": comes})
+    with pytest.raises(InputError, match="Late is there from Init on, and who leaves does not come back"):
+        read_openscenario(file)
+
+
+@pytest.mark.parametrize("place", [lane(90), world(90, 20)])
+def test_who_is_deleted_in_init_is_never_there(tmp_path: Path, place: str) -> None:
+    file = write(tmp_path, {"Ego": CAR, "Late": PERSON}, {"Ego": EGO, "Late": place}, stop=after(1))
+    gone = _entity("Late", "<DeleteEntityAction/>")
+    file.write_text(file.read_text(encoding="utf-8").replace("<Actions>", f"<Actions>{gone}", 1), encoding="utf-8")
+    assert all(step.traffic.ids == ("Ego",) for step in run(file))
 
 
 def _meeting(folder: Path, final: str, further: str) -> Path:

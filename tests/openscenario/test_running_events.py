@@ -6,11 +6,12 @@ import pytest
 
 from fogsim.errors import InputError, UnplayedWarning
 from fogsim.openscenario import read_openscenario
+from fogsim.scenario.loading import load_scenario
 from fogsim.values import Step
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, PERSON, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, over, polyline, run, speed,
-    state, world, write,
+    CAR, PERSON, QUIET, TIMED, after, begun, event, follows, group, lane, linear, motion_at, on, over, polyline, run,
+    speed, state, world, write,
 )  # fmt: skip
 
 pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
@@ -53,6 +54,19 @@ def test_a_distance_is_reached_once_and_not_kept(tmp_path: Path, wanted: str, ga
     assert between(steps, then) == pytest.approx(gap, abs=0.5)
     assert motion_at(steps, then + 5.0, "Next")[2] == pytest.approx(10.0, abs=0.15)
     assert between(steps, then + 5.0) > gap + 10.0
+
+
+def test_two_may_come_to_a_distance_by_one_event(tmp_path: Path) -> None:
+    begin = {name: f"{lane(s)}\n{speed(10)}" for name, s in (("Ego", 140), ("Next", 110), ("Last", 60))}
+    near = {"Next": event("near", distance('distance="20" freespace="true"'), after(1.0))}
+    file, last = (
+        write(tmp_path, dict.fromkeys(begin, CAR), begin, near, stop=after(2.0)),
+        '<EntityRef entityRef="Last"/>',
+    )
+    text = file.read_text(encoding="utf-8").replace("</Actors>", f"{last}</Actors>")
+    file.write_text(text, encoding="utf-8")
+    names = [entry.name for entry in load_scenario(file, QUIET).timeline]
+    assert names == ["Init", "near", "near_reached", "near_reached_2"]
 
 
 def test_another_order_before_a_distance_is_reached_counts(tmp_path: Path) -> None:

@@ -323,6 +323,23 @@ def test_the_end_of_the_road_ends_therun(tmp_path: Path) -> None:
     assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)
 
 
+def test_another_vehicle_comes_to_the_end_of_its_own_road(tmp_path: Path) -> None:
+    ends = event("end", speed(5), group(on('<EndOfRoadCondition duration="0"/>', "Other")))
+    begin = {"Ego": f"{lane(30)}\n{speed(15)}", "Other": f"{lane(50, 1)}\n{speed(10)}"}
+    steps = run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Ego": ends}, stop=after(6)))
+    # It drives against the road, whose beginning is its end.
+    assert begun(steps)["end"] == pytest.approx((50.0 - 3.7 - 10.0) / 10.0, abs=0.2)
+
+
+def test_events_may_be_called_as_entries_of_fogsim_are(tmp_path: Path) -> None:
+    events = event("Init", speed(8), after(1.0)) + event("stop", speed(6), over("Init"))
+    stop = group(on('<SpeedCondition value="6.5" rule="lessThan"/>', "Lead", delay=0.5))
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
+    steps = run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}, stop=stop))
+    assert [*begun(steps)] == ["Init_2", "Init", "stop", "stop_2"]
+    assert steps[-1].time < 4.0
+
+
 @pytest.mark.parametrize(("written", "is_kept"), [("1", True), ("True", True), ("0", False), ("yes", None)])
 def test_truth_values_are_those_of_xml(tmp_path: Path, written: str, is_kept: bool | None) -> None:
     action = speed(speed_of("Ego", more=f'continuous="{written}"'))

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.openscenario.parameters import evaluated
 from fogsim.scenario.loading import load_scenario
-from tests.openscenario.writing import DATA, changed, entry, lane, world
+from tests.openscenario.writing import CAR, DATA, changed, entry, lane, world, write
 
 STANDS = '<Condition name="stands" delay="0" conditionEdge="none">'
 STAND_STILL = '<StandStillCondition duration="0.5"/>'
@@ -176,6 +176,15 @@ def test_night_may_fall_while_a_run_lasts(tmp_path: Path) -> None:
     file = changed(tmp_path, DATA / "cut_in_in_fog.xosc", (fog, f"<TimeOfDay {time}/>{fog}"))
     light = entry(read_openscenario(file).data, "thicker_fog")["do"]["light"]
     assert 1e-5 < light["illuminance_lx"] < 1e-2
+
+
+def test_clouds_alone_are_named_as_left_out(tmp_path: Path) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)})
+    sun = '<Weather><Sun illuminance="20000" azimuth="0" elevation="0.9"/>'
+    clouds = file.read_text(encoding="utf-8").replace(sun, '<Weather fractionalCloudCover="sixOktas">')
+    file.write_text(clouds, encoding="utf-8")
+    with pytest.warns(LeftOutWarning, match="clouds without a TimeOfDay, or a Sun's elevation"):
+        assert "light" not in read_openscenario(file).data
 
 
 def test_entries_of_catalogs_and_their_parameters_are_there(tmp_path: Path) -> None:

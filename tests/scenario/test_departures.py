@@ -6,10 +6,13 @@ import pytest
 
 import fogsim
 from fogsim import script as fs
+from fogsim.errors import UnplayedWarning
+from fogsim.scenario import scenario_from_config
 from fogsim.scenario.roads.files import entering_vehicles
 from fogsim.values import Step
 from fogsim.values.script import Enter
 from tests.data.early_motorway import EARLY
+from tests.helpers.attached import GRID
 
 ROAD = """
 name: late_comers
@@ -85,7 +88,17 @@ def test_mistakes_are_told_at_their_place(tmp_path: Path) -> None:
         assert told in str(error.value)
 
 
+def test_who_comes_by_a_route_file_does_not_come_by_the_timeline() -> None:
+    late = "timeline=[{name: twice, when: time >= 0 s, do: {veh30: {depart: {like: ego, gap: 5 m}}}}]"
+    settings = ["renderer=none", "estimators=[]", "fog.visibility_m=100", "duration_s=1", late]
+    with pytest.warns(UnplayedWarning, match=r"twice .*: there was no place for the vehicle, or such a"):
+        list(fogsim.run(scenario_from_config(GRID / "grid.sumocfg", "veh18", settings)))
+
+
 def test_edges_of_a_network_are_looked_up() -> None:
+    way = "timeline=[{when: time > 1 s, do: {slow: {take_route: [bank, exitt]}}}]"
+    with pytest.raises(fogsim.InputError, match=r"slow\.take_route: the net has no edge 'exitt'; did you mean 'exit'"):
+        fogsim.load_scenario("motorway_fog_bank", [way])
     for depart, told in (
         ("edges: [aproach]", "the net has no edge 'aproach'; did you mean 'approach'"),
         ("edges: [approach], position: 9 km", "position_m counts along 'approach'"),

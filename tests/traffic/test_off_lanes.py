@@ -16,7 +16,7 @@ from fogsim.metrics.run_metrics import RunMetrics
 from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.recording import record_run
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.values import Command, SpeedAdvice, Step
+from fogsim.values import Command, SpeedAdvice, Step, Stretch, StretchAdvice
 from fogsim.values.script import ChangeLane, Depart
 from tests.helpers.attached import libsumo_in_town, traci_in_town
 from tests.traffic.common import DATA, configured, driven, even, running
@@ -160,6 +160,26 @@ def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(connec
     assert step.traffic.off_lanes.tolist() == [False, True]
     assert step.traffic.position[1, :2].tolist() == [90.0, VERGE]
     assert step.leader is None
+
+
+@pytest.mark.parametrize("away", [20.0, 300.0])
+@pytest.mark.parametrize("simulation", ["in_process", "connection"])
+def test_others_may_come_beside_the_road_in_dense_fog(
+    simulation: str, away: float, request: pytest.FixtureRequest
+) -> None:
+    """An outer simulator adds one, which is never on a lane; SUMO is asked for nothing that breaks it down."""
+    api = request.getfixturevalue(simulation)
+    advised = StretchAdvice(8.0, Stretch(0.0, 500.0))
+    with fogsim.attach(api, ego="ego", visibility=30.0, settings=BLIND[:2]) as session:
+        api.vehicle.add("late", "r", typeID="car", depart="triggered")
+        for number in range(40):
+            api.vehicle.moveToXY("late", "", -1, 90.0 + number, -away, 90.0, 2)
+            api.simulationStep()
+            if (step := session.observe()) is not None:
+                session.advise(step, Command(stretches=(advised,)))
+    assert step is not None
+    assert step.traffic.ids == ("ego", "late", "lorry")
+    assert step.traffic.position[1].tolist() == [129.0, -away, 0.0]
 
 
 def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:

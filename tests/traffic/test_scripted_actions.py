@@ -18,10 +18,12 @@ from fogsim.values.script import (
     ChangeSpeed,
     Depart,
     Follow,
+    Leave,
     SetLamps,
     SetSignal,
     Shape,
     Stop,
+    TakeRoute,
     TrafficAction,
 )
 from tests.traffic.common import DATA, NET, driven, running, setup_of
@@ -159,6 +161,24 @@ def test_a_vehicle_comes_onto_the_road_near_another(motorway: Traffic, gap: floa
     front = before + gap + math.copysign(length, gap)
     assert get.getLanePosition("new") == pytest.approx(front, abs=0.5)
     assert get.getRoute("new") == get.getRoute("lead")
+
+
+def test_who_leaves_does_nothing_else_in_the_same_step(motorway: Traffic) -> None:
+    later = SetLamps("lead", lit=Lamp.STOP), Follow("ego", "lead", 1.0), Depart("new", like="lead", gap=-30.0)
+    assert motorway.begin([Leave("lead"), *later]) == later
+    assert driven(motorway, 2)[-1].state.ids == ("ego",)
+
+
+def test_no_one_else_gets_the_type_that_a_vehicle_has_for_itself(motorway: Traffic) -> None:
+    """SUMO deletes it with the first vehicle that has it, be it one that is made to search a way."""
+    library = load_libsumo()
+    library.vehicle.setMaxSpeed("lead", 35.0)
+    assert library.vehicle.getTypeID("lead") == "car@lead"
+    assert motorway.begin([Depart("new", like="lead", gap=-30.0), TakeRoute("lead", ("exit",))]) == ()
+    driven(motorway, 3)
+    assert library.vehicle.getTypeID("new") == "car"
+    assert "car@lead" in library.vehicletype.getIDList()
+    assert library.vehicle.getRoute("lead")[-1] == "exit"
 
 
 def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:

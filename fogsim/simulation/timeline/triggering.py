@@ -14,9 +14,13 @@ from fogsim.values.script import (
     ChangeLane,
     ChangeLight,
     ChangeSpeed,
+    Depart,
+    Enter,
     Follow,
     SetSignal,
+    TakeRoute,
     TrafficAction,
+    Walk,
 )
 from fogsim.values.traffic import with_persons
 
@@ -81,7 +85,7 @@ class Timeline:
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
         """What has begun, or is over, of what was due."""
         failed = {
-            begun.name: Reason.NOT_AHEAD if isinstance(action, Follow) else Reason.NO_LANE
+            begun.name: self._why_refused(action)
             for begun, actions in due.parts
             for action in actions
             if action in refused
@@ -92,6 +96,17 @@ class Timeline:
                 entry.refusal = failed.get(entry.name)
         self._ends = [end for end in self._ends if end.name not in failed]
         return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
+
+    def _why_refused(self, action: TrafficAction) -> Reason:
+        match action:
+            case Follow():
+                return Reason.NOT_AHEAD
+            case Depart() | Enter():
+                return Reason.NO_PLACE
+            case ChangeLane() | TakeRoute() | SetSignal():
+                return Reason.NO_LANE
+        who = action.person if isinstance(action, Walk) else action.vehicle
+        return Reason.LEFT if who in self._seen else Reason.NEVER_SEEN
 
     def unplayed(self, step: TrafficStep) -> Unplayed:
         """What has not begun when a run is over."""
@@ -150,6 +165,9 @@ class _Entry:
         if not self._has_held or not self.is_due(step.time):
             return Reason.NEVER_HELD
         absent = [vehicle for vehicle in self.vehicles(step) if with_persons(step.traffic).row(vehicle) is None]
+        if not absent:
+            # It needs a place along the ego's route, or the run has ended at its time.
+            return Reason.NOT_REACHED
         return Reason.NEVER_SEEN if any(vehicle not in seen for vehicle in absent) else Reason.LEFT
 
 

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree
 
-from fogsim.core.files.readers import read_text
+from fogsim.core.files.readers import number_in_text, read_text
 from fogsim.core.files.user_cache import kept_text
 from fogsim.errors import InputError, MissingDependencyError, shown
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
@@ -77,7 +77,7 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
     with tempfile.TemporaryDirectory() as folder:
         types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
         roads = Path(folder) / "road.xodr"
-        ElementTree(_readable(source)).write(roads, encoding="utf-8")
+        ElementTree(_readable(source, path)).write(roads, encoding="utf-8")
         lines = [f'<type id="{name}" priority="1" speed="{_USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
         types.write_text(f"<types>{''.join(lines)}</types>", encoding="utf-8")
         command = [program, "--opendrive-files", str(roads), "-o", str(net), "-t", str(types)]
@@ -95,30 +95,33 @@ def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
 
 
-def _readable(source: Element) -> Element:
-    """The file without attributes that say nothing, at which netconvert would stop, and with limits on all lanes."""
+def _readable(source: Element, path: Path) -> Element:
+    """The file without attributes and limits that say nothing, which stop netconvert, and with limits on all lanes."""
     for element in source.iter():
         for key in [key for key, text in element.attrib.items() if not text.strip()]:
             del element.attrib[key]
         for key, text in _SIGNAL.items() if element.tag == "signal" else ():
             element.attrib.setdefault(key, text)
         for speed in element.findall("speed") if element.tag == "lane" else ():
-            if not speed.get("max", "").strip():
+            if not _limit(speed):
                 element.remove(speed)
     for road in source.iter("road"):
-        _limit_lanes(road)
+        _limit_lanes(road, f"{path}: road {shown(road.get('id', '?'))}")
     return source
 
 
-def _limit_lanes(road: Element) -> None:
+def _limit_lanes(road: Element, where: str) -> None:
     """Give a road's speed limits to its lanes without limits of their own; netconvert reads no others."""
-    limits = [(float(one.get("s", "0")), _limit(one.find("speed"))) for one in road.iterfind("type")]
+
+    def begin(one: Element) -> float:
+        return number_in_text(f"{where}: <{one.tag}>", "s", one.get("s", "0"))
+
+    limits = [(begin(one), _limit(one.find("speed"))) for one in road.iterfind("type")]
     limits = [next(same) for _, same in itertools.groupby(limits, key=lambda one: one[1])]
     sections = list(road.iterfind("lanes/laneSection"))
-    begins = [float(one.get("s", "0")) for one in sections]
-    for section, (begin, end) in zip(sections, itertools.pairwise((*begins, math.inf)), strict=True):
-        before = [limit for s, limit in limits if s <= begin + _NEAR]
-        inside = ((s - begin, limit) for s, limit in limits if begin + _NEAR < s < end - _NEAR)
+    for section, (first, end) in zip(sections, itertools.pairwise((*map(begin, sections), math.inf)), strict=True):
+        before = [limit for s, limit in limits if s <= first + _NEAR]
+        inside = ((s - first, limit) for s, limit in limits if first + _NEAR < s < end - _NEAR)
         here = [(0.0, before[-1] if before else {}), *inside]
         for lane in section.iterfind("*/lane") if any(limit for _, limit in here) else ():
             if lane.find("speed") is None:

@@ -91,6 +91,15 @@ def is_off_lanes(api: Api, vehicle: str) -> bool:
     return not api.vehicle.getLaneID(vehicle)
 
 
+def shared_type(api: Api, vehicle: str) -> str:
+    """Type of a vehicle as others may have it.
+
+    With the first change of what its type says a vehicle gets a type of its own, with its id after the name. SUMO
+    deletes that with the first vehicle that has it, though it be made for a search alone, and breaks down then.
+    """
+    return str(api.vehicle.getTypeID(vehicle)).removesuffix(f"@{vehicle}")
+
+
 def edge_length(api: Api, edge: str) -> float:
     """Length of an edge [m]."""
     return float(api.lane.getLength(f"{edge}_0"))
@@ -133,6 +142,7 @@ def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
 
 _VARIABLES = {
     "getSpeed": 0x40,
+    "getTypeID": 0x4F,
     "getPosition3D": 0x39,
     "getAngle": 0x43,
     "getSignals": 0x5B,

@@ -34,7 +34,7 @@ class AllVehicles:
         if new or self._removals != roster.removals:
             self._removals = roster.removals
             self._ids = tuple(sorted(roster.present))
-        return self._ids, _positions(self._position, self._ids)
+        return self._ids, positions_of(self._ids, self._position)
 
 
 class NearbyVehicles:
@@ -132,10 +132,11 @@ class NearbyVehicles:
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
 
     def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        return _positions(self._position, vehicles)
+        return positions_of(vehicles, self._position)
 
 
-def _positions(position: Callable[[str], Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:
+def positions_of(vehicles: Sequence[str], position: Callable[[str], Sequence[float]]) -> NDArray[np.float64]:
+    """Positions of vehicles (n, 3) [m]."""
     flat = itertools.chain.from_iterable(map(position, vehicles))
     try:
         return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)

@@ -19,7 +19,7 @@ from fogsim.traffic.appearance import (
 )
 from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter
-from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
+from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles, positions_of
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.values import Collision, Lamp, TrafficState
 from fogsim.values.traffic import advised_speeds
@@ -277,6 +277,9 @@ class SubscribedReader(VehicleReader):
     """
 
     _read: tuple[str, ...] = ()
+    _entered = 0
+    _off_lanes: frozenset[str] = frozenset()
+    """Those who came onto the road off the lanes."""
 
     def _dynamic_state(self) -> _DynamicState:
         if self._ego is None:
@@ -285,7 +288,9 @@ class SubscribedReader(VehicleReader):
         rows = self._surroundings()
         # Rows of a subscription of the user's own may be among them, with other variables.
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
-        position = np.array([rows[v][_POSITION_3D] for v in listed])
+        position = positions_of(listed, lambda vehicle: rows[vehicle][_POSITION_3D])
+        # Far from all lanes a vehicle has no height.
+        position[position == UNKNOWN] = 0.0
         near = self._is_near(listed, position)
         ids = self._read = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
         return _DynamicState(
@@ -311,6 +316,9 @@ class SubscribedReader(VehicleReader):
         found.clear()
         found.update(users)
         # SUMO sends nothing of vehicles that another simulator has put off the lanes.
-        for missing in self._roster.present.intersection((self._ego, *self._read)).difference(rows):
+        new, self._entered = self._roster.entered_since(self._entered)
+        present = self._roster.present
+        self._off_lanes |= {v for v in present.intersection(new).difference(rows) if not vehicle.getLaneID(v)}
+        for missing in present.intersection((self._ego, *self._read, *self._off_lanes)).difference(rows):
             rows[missing] = {number: getattr(vehicle, name)(missing) for number, name in _MOVING.items()}
         return rows

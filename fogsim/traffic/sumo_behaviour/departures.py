@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Collection, Sequence
 
-from fogsim.traffic.sumo.link import Api, edge_length, is_off_lanes
+from fogsim.traffic.sumo.link import Api, edge_length, is_off_lanes, shared_type
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 from fogsim.traffic.templates.placement import VEHICLE_KINDS
@@ -19,9 +19,9 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     Returns false if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
     """
     get, like = api.vehicle, action.like
-    if action.vehicle in present or like not in present or is_off_lanes(api, like):
+    if action.vehicle in get.getLoadedIDList() or like not in present or is_off_lanes(api, like):
         return False
-    kind = _type(api, action.vehicle, action.kind) if action.kind else get.getTypeID(like)
+    kind = _type(api, action.vehicle, action.kind) if action.kind else shared_type(api, like)
     length = float(get.getLength(like)) if action.gap < 0.0 else -float(api.vehicletype.getLength(kind))
     here = RoutePlaces(api).find(like)
     place = here.station + here.past_end + action.gap - length
@@ -58,12 +58,12 @@ def _footways(api: Api, edge: str) -> int:
     return sum(tuple(api.lane.getAllowed(f"{edge}_{lane}")) == ("pedestrian",) for lane in lanes)
 
 
-def enter(api: Api, action: Enter, present: Collection[str]) -> bool:
+def enter(api: Api, action: Enter) -> bool:
     """Bring a vehicle onto the road on a way of its own; SUMO delays it as long as it would hit another.
 
     Returns false if there is such a vehicle already, or no way leads along its edges.
     """
-    if action.vehicle in present:
+    if action.vehicle in api.vehicle.getLoadedIDList():
         return False
     kind = _type(api, action.vehicle, action.kind, action.speed)
     way = _whole_way(api, action.edges, kind)

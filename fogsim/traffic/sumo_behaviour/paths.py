@@ -124,9 +124,11 @@ class Paths:
         path = self._paths.get(vehicle)
         return None if path is None else path.driven
 
-    def begin(self, action: FollowPath, time: float, present: Collection[str]) -> None:
-        """Begin a path; who is not on the road yet appears at its first point."""
+    def begin(self, action: FollowPath, time: float, present: Collection[str]) -> bool:
+        """Begin a path, unless SUMO knows no such vehicle; who is not on the road yet appears at its first point."""
         vehicle, get = action.vehicle, self._api.vehicle
+        if not self._is_known(vehicle, present):
+            return False
         speed = action.speed
         if vehicle in present and speed is None:
             earlier = self._paths.get(vehicle)
@@ -136,6 +138,11 @@ class Paths:
             get.setSpeedMode(vehicle, _UNCHECKED)
         moved = action if action.origin == "map" else self._from_here(action)
         self._paths[vehicle] = _Path(moved, time, speed or 0.0)
+        return True
+
+    def _is_known(self, vehicle: str, present: Collection[str]) -> bool:
+        """Whether one is on the road, or waits to come onto it."""
+        return vehicle in present or vehicle in self._api.vehicle.getLoadedIDList()
 
     def _from_here(self, action: FollowPath) -> FollowPath:
         """The path with its points on the map."""
@@ -151,6 +158,9 @@ class Paths:
         """Move all for the step after a time [s]; `speeds` are those that they are to have [m/s]."""
         get = self._api.vehicle
         for vehicle, path in list(self._paths.items()):
+            if not self._is_known(vehicle, present):
+                self.leave(vehicle)
+                continue
             wanted = speeds.get(vehicle, math.inf)
             # Who has come to stand there waits for a speed.
             waits = vehicle not in present or (path.speed == 0.0 and math.isinf(wanted))

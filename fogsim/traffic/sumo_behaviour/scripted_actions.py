@@ -7,7 +7,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api, has_lane
+from fogsim.traffic.sumo.link import Api, has_lane, is_off_lanes, shared_type
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.paths import LaneOffsets, Paths
@@ -185,6 +185,8 @@ class ScriptedActions:
         Returns those that could not begin: the vehicle has left, has no such lane, or is not behind the one that it is
         to follow. Takes `time` [s].
         """
+        # Who leaves by one of these is gone for the next.
+        present = {*present}
         refused, motion = list[TrafficAction](), self._motion(time, present)
         for action in actions:
             if isinstance(action, SetSignal):
@@ -192,9 +194,9 @@ class ScriptedActions:
             elif isinstance(action, Depart):
                 refused += [] if depart(self._api, action, present) else [action]
             elif isinstance(action, Enter):
-                refused += [] if enter(self._api, action, present) else [action]
+                refused += [] if enter(self._api, action) else [action]
             elif isinstance(action, FollowPath):
-                self._paths.begin(action, time, present)
+                refused += [] if self._paths.begin(action, time, present) else [action]
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._is_possible(action, motion):
@@ -204,6 +206,7 @@ class ScriptedActions:
             elif isinstance(action, Leave):
                 self._paths.leave(action.vehicle)
                 self._api.vehicle.remove(action.vehicle)
+                present.discard(action.vehicle)
             else:
                 self._playing.begin(action, motion)
         return tuple(refused)
@@ -224,7 +227,7 @@ class ScriptedActions:
         if here in edges:
             vehicle.setRoute(action.vehicle, edges[edges.index(here) :])
             return True
-        found = self._api.simulation.findRoute(here, edges[0], vehicle.getTypeID(action.vehicle)).edges
+        found = self._api.simulation.findRoute(here, edges[0], shared_type(self._api, action.vehicle)).edges
         if found:
             vehicle.setRoute(action.vehicle, [*found, *edges[1:]])
         return bool(found)
@@ -233,8 +236,10 @@ class ScriptedActions:
         """Whether there is the lane to change to, or the one to follow is ahead."""
         if isinstance(action, Follow):
             return action.leader in motion.present and motion.gap(action.vehicle, action.leader) is not None
-        if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
+        if not isinstance(action, ChangeLane) or action.vehicle in self._oncoming:
             return True
+        if action.oncoming:
+            return not is_off_lanes(self._api, action.vehicle)
         if action.vehicle in self._paths.vehicles and not action.lanes:
             return True
         return has_lane(self._api, action.vehicle, action.lanes)

@@ -1,6 +1,5 @@
 """Where advice enters SUMO: the ego's as the speed that it drives, other drivers' as the top speed that they desire."""
 
-import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 
@@ -22,7 +21,8 @@ from fogsim.traffic.drivers.speed_choice import (
     speed_share,
 )
 from fogsim.traffic.setup import TrafficSetup
-from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter, vehicle_getters
+from fogsim.traffic.sumo.nearby_vehicles import positions_of
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.headways import HeadwayControl, KeepingUp
@@ -223,6 +223,8 @@ class SumoDesiredSpeeds:
         self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
         self._trains: set[str] = set()
+        (self._type,) = vehicle_getters(api, remote, ("getTypeID",))
+        self._types: dict[str, str] = {}
 
     @property
     def heard(self) -> Mapping[str, float]:
@@ -247,6 +249,8 @@ class SumoDesiredSpeeds:
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = heard_since(advised, self._advised_since, time)
             others = self._drivers()
+            if retyped := self._retyped(others):
+                self._choose_on_entry(retyped, command)
             rows = self._table.rows(others)
             if settled:
                 keepers = self._keeping_up.keepers(self._table.values[rows])
@@ -256,6 +260,14 @@ class SumoDesiredSpeeds:
             self._headways.update(others, rows)
         self._top_speeds.update(time, present)
         self._shares.update(time, present)
+
+    def _retyped(self, vehicles: Sequence[str]) -> list[str]:
+        """Who has had another type since the last time: by a device (``toc``) or a user, which undoes what was set."""
+        before, now = self._types, dict(zip(vehicles, map(self._type, vehicles), strict=True))
+        self._types = now
+        # With the first change of what its type says a vehicle gets a type of its own, with its id after the name.
+        changed = [v for v, name in now.items() if before.get(v, name) != name]
+        return [v for v in changed if before[v].removesuffix(f"@{v}") != now[v].removesuffix(f"@{v}")]
 
     def _drivers(self) -> list[str]:
         """Everyone on the road but the ego and trains, which go by their signals."""
@@ -333,8 +345,7 @@ class SumoDesiredSpeeds:
         """Extinction coefficients where vehicles are (n,) [1/m]."""
         if self._extinction is not None:
             return np.full(len(ids), self._extinction)
-        flat = itertools.chain.from_iterable(map(self._position, ids))
-        return self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
+        return self._fog.extinction(positions_of(ids, self._position))
 
     def _has_answered(self, vehicle: str, display: Display) -> bool:
         """Whether the delay is over in which a driver does not follow yet what is heard somewhere."""

@@ -56,7 +56,7 @@ class JunctionFoes:
 
     def _meets_unregulated(self, driver: str, reach: float) -> bool:
         vehicles = self._vehicles
-        road = str(vehicles.getRoadID(driver))
+        road = str(vehicles.getLaneID(driver)).rpartition("_")[0]
         if road.startswith(":") and road[1:].rpartition("_")[0] in self._unregulated:
             return True
         way = -self._places.find(driver).station

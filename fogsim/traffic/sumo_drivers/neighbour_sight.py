@@ -1,6 +1,5 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
-import itertools
 import math
 import operator
 from collections.abc import Callable, Iterable, Sequence
@@ -64,16 +63,18 @@ class Neighbours:
     """Asks SUMO for neighbours and for changes that are blocked."""
 
     def __init__(self, view: DriversView) -> None:
-        names = ("getSignals", "getNeighbors")
-        self._signals, self._left_leaders = vehicle_getters(
-            view.api, view.remote, names, {"getNeighbors": ("b", _LEFT_LEADERS)}
+        self._signals, self._lane = view.getters("getSignals", "getLaneID")
+        (self._left_leaders,) = vehicle_getters(
+            view.api, view.remote, ("getNeighbors",), {"getNeighbors": ("b", _LEFT_LEADERS)}
         )
         self._neighbours = vehicle_getter(view.api, "getNeighbors")
         self._state = vehicle_getter(view.api, "getLaneChangeState")
 
-    def left_leaders(self, vehicles: Iterable[str]) -> list[tuple[str, float]]:
+    def left_leaders(self, vehicles: Sequence[str]) -> list[tuple[str, float]]:
         """Next vehicle ahead of each in the lane to the left, and the gap to it [m]; ``inf`` if there is none."""
-        found = map(self._left_leaders, vehicles, itertools.repeat(_LEFT_LEADERS))
+        ask, both = self._left_leaders, zip(vehicles, map(self._lane, vehicles), strict=True)
+        # SUMO breaks down when it is asked for those of a vehicle that has never been on a lane.
+        found = [ask(vehicle, _LEFT_LEADERS) if lane else () for vehicle, lane in both]
         return [(_nearest(those) if those[1:] else those[0]) if those else _NO_ONE for those in found]
 
     def wanted_changes(

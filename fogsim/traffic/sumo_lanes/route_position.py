@@ -66,7 +66,8 @@ class RoutePlaces:
                 return Place(edge, index, min(left, length), 0.0)
             return Place(edge, index, length, left)
         if not is_inside:
-            return Place(get.getRoadID(vehicle), index, station, 0.0)
+            # SUMO breaks down when it is asked for the edge of a vehicle that has never been on a lane.
+            return Place(lane.rpartition("_")[0] or edge, index, station, 0.0)
         return Place(edge, index, length, self._passed(edge, lane) + station)
 
     def _passed(self, edge: str, current: str) -> float:

@@ -41,7 +41,6 @@ class SumoVehiclePlaces:
         self._station = vehicle_getter(api, "getLanePosition")
         self._lane = vehicle_getter(api, "getLaneID")
         self._opposite, self._directions = OppositeEdges(api), LaneDirections(api)
-        self._edge = vehicle_getter(api, "getRoadID")
         self.speed = vehicle_getter(api, "getSpeed")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
         self._route: tuple[str, tuple[str, ...]] = ("", ())
@@ -77,7 +76,7 @@ class SumoVehiclePlaces:
     def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Sequence[_Spot]]:
         there: dict[str, list[_Spot]] = {}
         for vehicle in vehicles:
-            there.setdefault(self._edge(vehicle), []).append((vehicle, self._station(vehicle)))
+            there.setdefault(self._lane(vehicle).rpartition("_")[0], []).append((vehicle, self._station(vehicle)))
         return lambda edge: there.get(edge, ())
 
     def _is_against(self, vehicle: str) -> bool:

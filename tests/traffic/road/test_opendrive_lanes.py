@@ -151,6 +151,22 @@ def test_lanes_without_limits_have_those_of_their_road(
     assert found == pytest.approx(limits, abs=0.01)
 
 
+@pytest.mark.parametrize("most", ["no limit", "-1", "0"])
+def test_limits_of_lanes_that_say_nothing_are_those_of_the_road(tmp_path: Path, most: str) -> None:
+    text, file = (ROAD.parent / "cases" / "road.xodr").read_text(encoding="utf-8"), tmp_path / "limits.xodr"
+    road = '<type s="0" type="town"><speed max="10"/></type><planView>'
+    lane = f'<speed sOffset="0" max="{most}"/><width'
+    file.write_text(text.replace("<planView>", road).replace("<width", lane), encoding="utf-8")
+    assert {one.limit for one in read_opendrive_lanes(opendrive_net(file), file).lanes} == {10.0}
+
+
+def test_places_of_limits_are_numbers(tmp_path: Path) -> None:
+    text, file = (ROAD.parent / "cases" / "road.xodr").read_text(encoding="utf-8"), tmp_path / "limits.xodr"
+    file.write_text(text.replace("<planView>", '<type s="here" type="town"/><planView>'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"limits\.xodr: road '7': <type>: s must be a number"):
+        opendrive_net(file)
+
+
 def test_a_limit_of_a_lane_counts_more_than_that_of_its_road(tmp_path: Path) -> None:
     text, file = ROAD.read_text(encoding="utf-8"), tmp_path / "limits.xodr"
     road = '<type s="0" type="town"><speed max="10"/></type><planView>'

@@ -108,6 +108,13 @@ def test_who_was_on_the_road_when_the_fog_came_does_not_jump(drive: Any) -> None
         assert (-np.diff(slowed) / STEP).max() <= 2.1
 
 
+def test_who_gets_another_type_goes_on_in_the_fog(drive: Any) -> None:
+    traffic, _ = drive(DriverSetup(within_sight, spread=0.0), 20.0)
+    load_libsumo().vehicle.setType("first", "DEFAULT_VEHTYPE")
+    assert max(speeds(traffic, 10.0)["first"]) == pytest.approx(within_sight(60.0), abs=2.7)
+    assert speeds(traffic, 5.0)["first"][-1] == pytest.approx(within_sight(60.0), abs=0.1)
+
+
 def test_only_moving_top_speeds_cost_a_call(drive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     traffic, _ = drive(UNAFFECTED, 2.0)
     vehicles = load_libsumo().vehicle

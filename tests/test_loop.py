@@ -12,7 +12,7 @@ import pytest
 from early_motorway import EARLY, ROUTES
 
 import fogsim
-from fogsim.errors import SimulationError
+from fogsim.errors import InputError, SimulationError
 from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
@@ -233,6 +233,8 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
         with pytest.raises(SimulationError, match="not been started"):
             loop.advance(Command())
         loop.start(1)
+        with pytest.raises(InputError, match="periods: expected at least 1, got 0"):
+            loop.advance(Command(), 0)
         assert loop.advance(Command()).ending is Ending.TIME
         with pytest.raises(SimulationError, match="is over"):
             loop.advance(Command())

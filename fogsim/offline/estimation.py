@@ -19,6 +19,7 @@ from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 from fogsim.values.result_checks import checked_estimate
+from fogsim.vision.restoration.picture import refuse_short_range
 
 _ALL = "all"
 """Represents every method of the registry."""
@@ -233,11 +234,6 @@ def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:
-        most = int(image.max(initial=0))
-        if 2**8 <= most < 2**_WHOLE_RANGE_BITS:
-            raise InputError(
-                f"the image has 16 bits and no value above {most}: write `bits: {10 if most < 2**10 else 12}` in the "
-                "camera file if it is the camera's, or spread the values over 0 … 65535"
-            )
+        refuse_short_range(int(image.max(initial=0)))
         return (image >> (16 - _WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=_WHOLE_RANGE_BITS)
     return image, camera

@@ -1,6 +1,7 @@
 """Episodes that are drawn: repeated, and of splits."""
 
 import copy
+import pickle
 from typing import Any
 
 import gymnasium
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError, LeftOutWarning
-from fogsim.scenario import Scenario, load_scenario
+from fogsim.scenario import Scenario, catalogue, load_scenario
 from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
@@ -66,6 +67,15 @@ def test_distributions_survive_the_json_of_a_specification() -> None:
     read = type(spec).from_json(spec.to_json())
     source = gymnasium.make(read).unwrapped._source
     assert (source._given_fog, source._scenes) == (given["fog_distribution"], given["scenario_distribution"])
+
+
+def test_paths_survive_the_json_of_an_environment() -> None:
+    file = catalogue()["motorway_fog_bank"]
+    for given in ({"scenario": file}, {"scenario_distribution": [file], "image_size": None}):
+        env = gymnasium.make("fogsim/FogAdvisoryFast-v2", **given)
+        again = gymnasium.make(type(env.spec).from_json(env.spec.to_json()))
+        assert again.unwrapped._source._scenarios == (str(file),)
+        assert pickle.loads(pickle.dumps(env)).spec == env.spec
 
 
 def test_what_may_be_drawn_may_be_arrays() -> None:

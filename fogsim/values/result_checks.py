@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import fields, replace
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -36,8 +37,14 @@ _SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of a belief's probabilities."""
 
 
+_ESTIMATED = ("extinction", "standard_deviation", "common_deviation", "scale_deviation")
+
+
 def checked_estimate(method: str, value: object) -> Estimate:
-    """An estimator's result; InputError unless it is an `Estimate` of that method with valid numbers."""
+    """An estimator's result; InputError unless it is an `Estimate` of that method with valid numbers.
+
+    NumPy's numbers become Python's: short ones, which networks give, overflow in the fusion, and JSON has none.
+    """
     who = f"estimator {method!r}: update()"
     estimate = _of_type(who, value, Estimate)
     if estimate.method != method:
@@ -53,9 +60,30 @@ def checked_estimate(method: str, value: object) -> Estimate:
             _check_number(who, name, getattr(estimate, name), " [-]")
     if not (_is_number(estimate.reach) and estimate.reach >= 0.0):
         raise InputError(f"{who}: reach must be at least 0 [m], or inf; got {shown(estimate.reach)}")
-    for name, kind in (("bounds", ExtinctionBounds), ("optical_depths", OpticalDepths), ("denser", DenserFog)):
-        _check_part(who, name, getattr(estimate, name), kind)
+    _check_part(who, "bounds", estimate.bounds, ExtinctionBounds)
+    _check_part(who, "denser", estimate.denser, DenserFog)
+    if (curve := estimate.optical_depths) is not None:
+        _check_kind(who, "optical_depths", curve, OpticalDepths, "of type fogsim.values.OpticalDepths, or None")
+        _check_curve(f"{who}: optical_depths", curve)
+    numbers = {name: getattr(estimate, name) for name in _ESTIMATED} if estimate.valid else {}
+    plain = {name: float(number) for name, number in numbers.items() if type(number) is not float}
+    if plain or type(estimate.valid) is not bool:
+        return replace(estimate, valid=bool(estimate.valid), **plain)
     return estimate
+
+
+def _check_curve(who: str, curve: OpticalDepths) -> None:
+    columns = (curve.distance, curve.depth, curve.standard_deviation)
+    try:
+        fits = len({len(column) for column in columns}) == 1 and math.isfinite(sum(map(sum, columns)))
+        ascends = [*curve.distance] == sorted({*curve.distance}) != []
+    except (TypeError, ValueError):
+        fits = ascends = False
+    if not (fits and ascends and curve.distance[0] > 0.0):
+        raise InputError(
+            f"{who} must have as many depths and deviations as distances, which ascend from more than 0 [m], all finite"
+            f"; got {shown(curve)}"
+        )
 
 
 def checked_belief(method: str, value: object) -> Belief:
@@ -80,10 +108,9 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
         )
-    if belief.denser is not None:
-        _check_part(who, "denser", belief.denser, DenserFog)
+    _check_part(who, "denser", belief.denser, DenserFog)
     if belief.profile is not None:
-        _check_part(who, "profile", belief.profile, FogProfile)
+        _check_kind(who, "profile", belief.profile, FogProfile, "of type fogsim.values.FogProfile, or None")
     if not (_is_number(belief.age) and belief.age >= 0.0):
         raise InputError(f"{who}: age must be at least 0 [s], or inf; got {shown(belief.age)}")
     return belief
@@ -113,7 +140,14 @@ def checked_speed(choice: str, speed: float) -> float:
     """A speed choice's result; InputError unless it is a speed of at least 0 [m/s], or `inf` for no limit."""
     if not (_is_number(speed) and speed >= 0.0):
         raise InputError(f"speed choice {choice!r} must return at least 0 [m/s], or inf; got {shown(speed)}")
-    return speed
+    return float(speed)
+
+
+def checked_share(choice: str, share: float) -> float:
+    """A speed choice's share; InputError unless it is a finite number of at least 0 [-]."""
+    if not (_is_number(share) and 0.0 <= share < math.inf):
+        raise InputError(f"speed choice {choice!r}: share() must return at least 0 [-]; got {shown(share)}")
+    return float(share)
 
 
 def checked_lamps(method: str, value: object) -> Lamp:
@@ -209,10 +243,14 @@ def _check_kind(who: str, field: str, value: object, kind: type, expected: str) 
         raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
 
 
-def _check_part(who: str, field: str, value: object, kind: type) -> None:
-    if value is not None and not isinstance(value, kind):
-        expected = f"of type {kind.__module__}.{kind.__name__}, or None"
-        raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
+def _check_part(who: str, field: str, value: object, kind: type[ExtinctionBounds | DenserFog]) -> None:
+    if value is None:
+        return
+    _check_kind(who, field, value, kind, f"of type {kind.__module__}.{kind.__name__}, or None")
+    for part in fields(kind):
+        number = getattr(value, part.name)
+        if not (_is_number(number) and number >= 0.0):
+            raise InputError(f"{who}: {field}.{part.name} must be a number of at least 0; got {shown(number)}")
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:

@@ -20,7 +20,7 @@ from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.values import Display
-from fogsim.values.result_checks import checked_speed
+from fogsim.values.result_checks import checked_share, checked_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +227,8 @@ class ObservedSpeed:
 
 
 unaffected, within_sight, too_fast, observed = Unaffected(), WithinSight(), TooFast(), ObservedSpeed()
+OWN_CHOICES = (Unaffected, WithinSight, TooFast, ObservedSpeed)
+"""FogSim's own, whose results need no check."""
 
 
 def _clipped(share: float) -> float:
@@ -243,6 +245,10 @@ class CheckedChoice:
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
         return checked_speed(self.name, self.choice(visibility))
+
+    def share(self, visibility: float) -> float:
+        """Share of the speed in clear air, 1 for a choice without a method ``share`` [-] (`visibility` [m])."""
+        return checked_share(self.name, speed_share(self.choice, visibility))
 
 
 SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(

@@ -169,7 +169,7 @@ def test_a_users_own_choice(tmp_path: Path, command: Callable[..., tuple[int, st
 
 def test_a_choice_that_is_registered_is_checked_and_keeps_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
     class Halved:
-        def __call__(self, visibility: float) -> float:
+        def __call__(self, _: float) -> float:
             return math.nan
 
         def share(self, visibility: float) -> float:
@@ -178,7 +178,7 @@ def test_a_choice_that_is_registered_is_checked_and_keeps_its_share(monkeypatch:
     monkeypatch.setitem(SPEED_CHOICES._entries, "halved", Halved)
     choice = driver_setup(load_scenario("motorway_fog_bank", ["drivers.speed_choice=halved"])).speed_choice
     assert speed_share(choice, 60.0) == 0.5
-    with pytest.raises(InputError, match="speed choice 'halved' must return at least 0 .* got nan"):
+    with pytest.raises(InputError, match=r"speed choice 'halved' must return at least 0 .* got nan"):
         choice(60.0)
     with pytest.raises(InputError, match=r"speed choice 'halved': share\(\) must return at least 0 .* got -0.5"):
         speed_share(choice, 20.0)

@@ -61,7 +61,7 @@ class _Glide:
 
 
 class _Before(NamedTuple):
-    """What is compared with the next state, in arrays of its own: those of a state are whoever gets it free to change."""
+    """What is compared with the next state, in arrays of its own: whoever gets a state may change its arrays."""
 
     time: float
     ids: tuple[str, ...]

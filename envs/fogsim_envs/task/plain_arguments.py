@@ -46,6 +46,10 @@ def _without_paths(value: Any) -> Any:
 
 def _made(name: str, annotation: Any, value: Any) -> Any:
     among = get_args(annotation) or (annotation,)
+    if isinstance(value, list):
+        # JSON has a named tuple as a list.
+        named = (one for one in among if hasattr(one, "_fields") and len(one._fields) == len(value))
+        return next((one(*value) for one in named), value)
     kinds = [one for one in among if isinstance(one, type) and dataclasses.is_dataclass(one)]
     if not (kinds and isinstance(value, Mapping) and all(isinstance(key, str) for key in value)):
         return value

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -66,7 +66,7 @@ def checked_estimate(method: str, value: object) -> Estimate:
         _check_kind(who, "optical_depths", curve, OpticalDepths, "of type fogsim.values.OpticalDepths, or None")
         _check_curve(f"{who}: optical_depths", curve)
     numbers = {name: getattr(estimate, name) for name in _ESTIMATED} if estimate.valid else {}
-    plain = {name: float(number) for name, number in numbers.items() if type(number) is not float}
+    plain: dict[str, Any] = {name: float(number) for name, number in numbers.items() if type(number) is not float}
     if plain or type(estimate.valid) is not bool:
         return replace(estimate, valid=bool(estimate.valid), **plain)
     return estimate
@@ -254,13 +254,14 @@ def _check_part(who: str, field: str, value: object, kind: type[ExtinctionBounds
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:
-    """A metric's result; InputError unless it is a nested mapping of names to None, words and finite numbers."""
+    """A metric's result, with numbers of Python.
+
+    InputError unless it is a nested mapping of names to None, words and finite numbers.
+    """
     who = f"metric {metric!r}: result()"
     if not isinstance(value, Mapping):
         raise InputError(f"{who} must return a mapping of keys to values, got {shown(value)}")
-    for key, entry in value.items():
-        _check_entry(who, key, entry)
-    return value
+    return {key: _checked_entry(who, key, entry) for key, entry in value.items()}
 
 
 def checked_recorder(name: str, value: T) -> T:
@@ -273,17 +274,18 @@ def checked_recorder(name: str, value: T) -> T:
     return value
 
 
-def _check_entry(who: str, key: object, entry: object) -> None:
+def _checked_entry(who: str, key: object, entry: Any) -> Any:
     if not isinstance(key, str):
         raise InputError(f"{who}: keys must be words, got {shown(key)}")
     if isinstance(entry, Mapping):
-        for inner, value in entry.items():
-            _check_entry(who, f"{key}.{inner}", value)
-    elif isinstance(entry, float | int) and not isinstance(entry, bool):
+        return {inner: _checked_entry(who, f"{key}.{inner}", value) for inner, value in entry.items()}
+    if _is_number(entry):
         if not math.isfinite(entry):
             raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {shown(entry)}")
-    elif entry is not None and not isinstance(entry, str):
+        return int(entry) if isinstance(entry, Integral) else float(entry)
+    if entry is not None and not isinstance(entry, str):
         raise InputError(f"{who}: {key} must be None, a word, a finite number or a mapping of such; got {shown(entry)}")
+    return entry
 
 
 def _of_type(who: str, value: object, kind: type[T]) -> T:

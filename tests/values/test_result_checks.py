@@ -187,6 +187,17 @@ def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -
         RunMetrics(names=["motion"]).summary()
 
 
+def test_numbers_of_numpy_are_metrics() -> None:
+    found = checked_values("mine", {"a": np.int64(3), "b": {"c": np.float32(0.5)}, "d": None, "e": "word"})
+    assert json.dumps(found) == '{"a": 3, "b": {"c": 0.5}, "d": null, "e": "word"}'
+
+
+def test_a_metric_does_not_take_the_key_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(type(METRICS["comfort"](None)), "result", lambda _: {"duration_s": 1.0})  # type: ignore[arg-type]  # unused
+    with pytest.raises(InputError, match=r"^metric 'comfort': .* another metric has the key 'duration_s'"):
+        RunMetrics(names=["motion", "comfort"]).summary()
+
+
 def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) -> None:
     config = load_scenario("motorway_fog_bank").run_config()
     step = make_step(0, time=0.0)

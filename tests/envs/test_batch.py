@@ -223,8 +223,8 @@ def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         made(2, rule=RuleConstants(quantile=0.1))
     with pytest.raises(InputError, match=r"rule\.hold: must be a number 0 … 3600 s, got -1"):
         made(2, rule=RuleConstants(hold=-1.0))
+    monkeypatch.setitem(SPEED_CHOICES._entries, "mine", lambda: lambda _: 20.0)
     with pytest.raises(InputError, match=r"drivers: expected those of unaffected, .*, got 'mine'"):
-        monkeypatch.setitem(SPEED_CHOICES._entries, "mine", lambda: lambda _: 20.0)
         made(2, scenario_distribution=ScenarioDistribution(demand=(500.0,), drivers={"mine": 1.0}))
 
 

@@ -227,8 +227,6 @@ class ObservedSpeed:
 
 
 unaffected, within_sight, too_fast, observed = Unaffected(), WithinSight(), TooFast(), ObservedSpeed()
-OWN_CHOICES = (Unaffected, WithinSight, TooFast, ObservedSpeed)
-"""FogSim's own, whose results need no check."""
 
 
 def _clipped(share: float) -> float:
@@ -249,6 +247,12 @@ class CheckedChoice:
     def share(self, visibility: float) -> float:
         """Share of the speed in clear air, 1 for a choice without a method ``share`` [-] (`visibility` [m])."""
         return checked_share(self.name, speed_share(self.choice, visibility))
+
+
+def checked_choice(name: str, choice: SpeedChoice) -> SpeedChoice:
+    """A choice of speed whose results are checked unless it is FogSim's own."""
+    is_own = type(choice) in (Unaffected, WithinSight, TooFast, ObservedSpeed)
+    return choice if is_own else CheckedChoice(name, choice)
 
 
 SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(

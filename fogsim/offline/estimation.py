@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from fogsim.core.parameters import accepted_parameters
-from fogsim.errors import InputError, UnknownNameError, shown
+from fogsim.core.parameters import NUMBER_OR_NAN, accepted_parameters, checked_parameters
+from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale, scale_left
 from fogsim.offline.camera_file import Calibration
@@ -67,13 +68,14 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(meant))
 
 
+@checked_parameters
 def estimate_images(
-    inputs: Sequence[str | Path] | str | Path,
+    inputs: Iterable[str | Path] | str | Path,
     camera: Camera | Calibration,
-    methods: Sequence[str] | str = _ALL,
+    methods: Iterable[str] | str = _ALL,
     *,
     sequence: bool | None = None,
-    rate: float | None = None,
+    rate: Annotated[float, NUMBER_OR_NAN] | None = None,
     signs: str | Path | None = None,
     track: str | Path | None = None,
     night: NightDrive | None = None,
@@ -82,13 +84,13 @@ def estimate_images(
 
     Parameters
     ----------
-    inputs : path or sequence of paths
+    inputs : path or iterable of paths
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
         Their calibration (`fogsim.offline.load_calibration` reads it from a file, and its standard deviations, which
         widen the intervals; a `Camera` alone counts as exact but for its pitch). Images of a lens that distorts or of
         a camera with yaw are rectified first, and the results contain the rectified images.
-    methods : str or sequence of str
+    methods : str or iterable of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None
         Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
@@ -113,9 +115,7 @@ def estimate_images(
     """
     if (signs is None) != (track is None):
         raise InputError("signs and track go together: a map says nothing without places, nor places without a map")
-    if not isinstance(camera, Camera | Calibration):
-        raise InputError(f"expected a Camera, or a Calibration from `load_calibration`, got {shown(camera)}")
-    names = [methods] if isinstance(methods, str) else methods
+    names = [methods] if isinstance(methods, str) else [*methods]
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
     watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]

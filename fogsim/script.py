@@ -146,7 +146,7 @@ def to_yaml(
 @checked_parameters
 def write(
     scenario: Scenario,
-    path: Path,
+    path: str | Path,
     vary: Mapping[str, Varied] | None = None,
     verdict: Verdict | None = None,
     *,
@@ -158,7 +158,7 @@ def write(
     ----------
     scenario, vary, verdict
         See `to_yaml`.
-    path : Path
+    path : str or Path
         The file; ``NAME.fog.yaml`` is found by ``fogsim test`` and pytest.
     overwrite : bool
         True to replace what is there.
@@ -173,6 +173,7 @@ def write(
     InputError
         If it is there already or cannot be written, or what would stand in it does not fit; nothing is written then.
     """
+    path = Path(path)
     refuse_unwritable(path, overwrite=overwrite)
     text = to_yaml(scenario, vary, verdict, path.parent)
     # SUMO's files are named relative to the folder.

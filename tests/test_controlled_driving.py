@@ -98,8 +98,8 @@ def test_a_standing_truck_in_fog(tmp_path, controller: str, passes: bool) -> Non
 def test_the_stronger_of_driver_and_controller_brakes(tmp_path) -> None:
     """A gentle brake does not hold back a driver who sees the truck; without a driver it ends in the truck."""
     (tmp_path / "mine.py").write_text(
-        "from fogsim.values import Control\nclass Gentle:\n"
-        "    def control(self, seen):\n        return Control(acceleration=-0.1)\n"
+        "import numpy as np\nfrom fogsim.values import Control\nclass Gentle:\n"
+        "    def control(self, seen):\n        return Control(acceleration=np.float32(-0.1))\n"  # a network's
     )
     for driver, collisions in (("human", 0), ("none", 1)):
         text = SCENARIO.replace("CONTROLLER", "'mine:Gentle'").replace("driver: none", f"driver: {driver}")

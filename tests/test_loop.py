@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +12,7 @@ import pytest
 from early_motorway import EARLY, ROUTES
 
 import fogsim
-from fogsim.errors import SimulationError
+from fogsim.errors import InputError, SimulationError
 from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.simulation.advised_driving import spread_advice
 from fogsim.simulation.loop import ClosedLoop, DriversFog
@@ -30,6 +30,7 @@ from fogsim.values import (
     Step,
     Stretch,
     StretchAdvice,
+    TrafficState,
 )
 from tests.helpers.attached import GRID
 from tests.helpers.command import run_python
@@ -52,6 +53,22 @@ def test_steps_follow_the_clocks_and_end_in_time(foggy: list[Step]) -> None:
     assert [s.time for s in foggy] == [i / 10 for i in range(41)]  # 3.8 is 3.8, not 3.8000000000000003
     assert [s.ending for s in foggy[:-1]] == [None] * 40
     assert foggy[-1].ending is Ending.TIME
+
+
+def test_whoever_gets_a_step_may_change_its_arrays() -> None:
+    def moved(changes: bool) -> float:
+        with ClosedLoop(small(*BLIND)) as loop:
+            steps = [loop.start(1)]
+            while steps[-1].ending is None:
+                for field in fields(TrafficState) if changes else ():
+                    if isinstance(values := getattr(steps[-1].traffic, field.name), np.ndarray):
+                        values[...] = 0
+                steps.append(loop.advance(Command(SpeedAdvice(15.0))))
+        return float(
+            np.sum([steps[-1].traffic.position.sum(), steps[-1].traffic.length.sum(), steps[-1].route_position])
+        )
+
+    assert moved(changes=True) == moved(changes=False)
 
 
 def test_a_command_is_decided_once_a_decision_period(foggy: list[Step]) -> None:
@@ -233,6 +250,8 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
         with pytest.raises(SimulationError, match="not been started"):
             loop.advance(Command())
         loop.start(1)
+        with pytest.raises(InputError, match="periods: expected at least 1, got 0"):
+            loop.advance(Command(), 0)
         assert loop.advance(Command()).ending is Ending.TIME
         with pytest.raises(SimulationError, match="is over"):
             loop.advance(Command())

@@ -4,6 +4,7 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from early_motorway import EARLY
 from pyarrow import parquet
@@ -40,7 +41,7 @@ def test_a_failing_run_leaves_what_was_recorded_and_says_why(tmp_path: Path) -> 
 def test_the_metrics_of_a_run_are_its_summary_to_the_last_digit_and_the_same_again(tmp_path: Path) -> None:
     texts = []
     for out in (tmp_path / "one", tmp_path / "again"):
-        summary = record_run(short(), 1, out, recorders=("table",)).summary
+        summary = record_run(short(), np.int64(1), out, recorders=("table",)).summary
         texts.append((out / "metrics.json").read_text(encoding="utf-8"))
         assert json.loads(texts[-1]) == {"complete": True, **summary.to_json()}
     assert texts[0] == texts[1]

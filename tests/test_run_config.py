@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import fogsim
@@ -10,6 +12,7 @@ from fogsim.errors import InputError
 from fogsim.simulation import AdviceConfig, FogConfig, Periods, RunConfig, TrafficSetup, WorldConfig
 from fogsim.simulation.recording import record_run
 from fogsim.simulation.road_advice import RoadAdvice
+from fogsim.traffic.setup import AfterCollision
 from fogsim.values import FogField
 from tests.data.early_motorway import EARLY
 
@@ -31,6 +34,36 @@ def test_a_scenario_and_the_values_that_it_becomes_are_the_same_run() -> None:
 def test_clocks_that_do_not_fit_are_refused() -> None:
     with pytest.raises(InputError, match=r"2 traffic steps of 0.1 s are not one camera period, 0.1 s"):
         replace(CONFIG, periods=Periods(traffic_steps=2))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: TrafficSetup("a.net.xml"), r"TrafficSetup: net must be a path or nothing, got 'a\.net\.xml'"),
+        (lambda: TrafficSetup(None, routes=Path("a.rou.xml")), "routes must be a list, each a path"),
+        (lambda: TrafficSetup(None, keep_lane="ego"), "keep_lane must be a list, each text, got 'ego'"),
+        (lambda: TrafficSetup(None, after_collision="explode"), "after_collision must be one of stop, remove"),
+        (lambda: TrafficSetup(None, reading_radius=-5.0), "reading_radius must be a number ≥ 1 m"),
+        (lambda: Periods(decision_frames=0), "decision_frames must be a whole number ≥ 1"),
+        (lambda: WorldConfig(FogField(0.03, (1000.0,) * 3)), "WorldConfig: fog must be a FogConfig"),
+        (lambda: replace(CONFIG.world, illuminance=-1.0), "illuminance must be a number 0 … 200000 lx"),
+        (lambda: replace(CONFIG, estimators=("negru2013",)), "estimators must be a list, each a MethodConfig"),
+        (
+            lambda: replace(CONFIG, estimators=2 * CONFIG.estimators),
+            "estimators must differ, got joint_road, joint",
+        ),
+        (lambda: replace(CONFIG, camera=CONFIG.camera.camera), "camera must be a CameraConfig"),
+    ],
+)
+def test_mistakes_in_its_parts_are_named(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_numpys_numbers_and_words_are_taken() -> None:
+    setup: Any = TrafficSetup(None, step_length=np.float32(0.5), after_collision="remove")  # type: ignore[arg-type]
+    assert (repr(setup.step_length), setup.after_collision) == ("0.5", AfterCollision.REMOVE)
+    assert type(setup.after_collision) is AfterCollision
 
 
 def test_advice_without_sections_is_refused() -> None:

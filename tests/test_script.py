@@ -66,7 +66,7 @@ def test_what_python_says_comes_out_as_the_file_that_says_it(tmp_path, patchy):
     first = load_scenario(file)
     assert first.actors["slow"].gap_m == 350
     assert first.fog.patches.strength == 0.4
-    assert resolved(load_scenario(fs.write(patchy, tmp_path / "plain.yaml"))) == resolved(patchy)
+    assert resolved(load_scenario(fs.write(patchy, str(tmp_path / "plain.yaml")))) == resolved(patchy)
 
 
 def test_shipped_scenarios_come_out_as_they_went_in(tmp_path):

@@ -17,7 +17,7 @@ from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
 from fogsim_envs.infos import numbers_of
-from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of
+from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of, action_space
 from fogsim_envs.task.drive import FogDriveEnv
 from fogsim_envs.task.rewards import FRONT_FOG_LAMP_VISIBILITY, REAR_FOG_LAMP_VISIBILITY, TaskWeights
 
@@ -134,11 +134,6 @@ BASELINES: Registry[Callable[..., Policy]] = Registry(
 
 def baseline(name: str, action_space: spaces.Space[Any], weights: TaskWeights | None = None) -> Policy:
     """Make a baseline for an environment that pays by some weights."""
-    if isinstance(action_space, spaces.Discrete) and action_space.n != math.prod(ACTION_LEVELS):
-        # Who has signs has PettingZoo, without which that room cannot be imported.
-        from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415
-
-        return make(SIGN_BASELINES, name, action_space)
     known = {"weights": weights} if name == "oracle" else {}
     return make(BASELINES, name, action_space, **known)
 
@@ -149,9 +144,20 @@ def reward_weights(env: Any) -> TaskWeights | None:
     return weights if isinstance(weights, TaskWeights) else None
 
 
+_ADVISING = (spaces.Discrete(math.prod(ACTION_LEVELS)), action_space(continuous=False), action_space(continuous=True))
+"""Spaces of advice and lamps."""
+
+
 def check_baseline(name: str, env: gymnasium.Env[Any, Any]) -> None:
-    """Refuse a baseline that advises speeds where the agent drives."""
-    if name != "random" and isinstance(env.unwrapped, FogDriveEnv):
+    """Refuse a baseline that advises speeds where the agent does something else, or by other numbers."""
+    if name == "random":
+        return
+    if isinstance(env.unwrapped, FogDriveEnv):
         raise InputError(
             f"policy: the agent of FogDrive drives, and baselines other than 'random' advise speeds; got {name!r}"
+        )
+    if env.action_space not in _ADVISING:
+        raise InputError(
+            "policy: baselines other than 'random' take the actions of fogsim/FogAdvisory, one of "
+            f"{', '.join(map(str, _ADVISING))}; got {name!r} for {env.action_space}"
         )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed
+from fogsim.core.registry import make
 from fogsim.errors import InputError, shown
 from fogsim.units import finite_or_none
 from fogsim_envs.advising import AdvisingEnv
@@ -373,7 +374,13 @@ def _batch_episodes(
 
 def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -> EpisodeResult:
     """One episode of several agents who are paid the same."""
-    policies = {agent: _own_policy(policy, env.action_space(agent)) for agent in env.possible_agents}
+    # Who has signs has PettingZoo, without which that room cannot be imported.
+    from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415
+
+    policies = {
+        agent: make(SIGN_BASELINES, policy, space) if isinstance(policy, str) else _own_policy(policy, space)
+        for agent, space in ((one, env.action_space(one)) for one in env.possible_agents)
+    }
     for number, one in enumerate(policies.values()):
         one.reset(len(policies) * seed + number)
     observations, infos = env.reset(seed=seed)

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.layer_airlight import layer_thickness
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogField, FogShelter, Structure
 from fogsim.values.obstruction import Tunnel, tunnels_of
@@ -25,6 +27,7 @@ class RouteBank:
     extra_extinction: float  # What it adds to the extinction coefficient outside [1/m]
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogConfig:
     """Fog along a route.
@@ -47,7 +50,7 @@ class FogConfig:
 
     field: FogField
     banks: tuple[RouteBank, ...] = ()
-    in_tunnels: float = 10.0
+    in_tunnels: Annotated[float, Range(0.0, math.inf)] = 10.0
     droplets: Droplets = Droplets.MODERATE_RADIATION
     has_patches_of_run: bool = True
     eye_height: float = 0.0

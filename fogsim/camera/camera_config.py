@@ -8,6 +8,7 @@ from fogsim.camera.exposure import AutoExposure, Metering, Sensor
 from fogsim.camera.mount import USUAL_MOUNTS, CameraMount, Suspension
 from fogsim.camera.sensor import CameraSensor
 from fogsim.camera.shutter import Shutter
+from fogsim.core.parameters import checked_parameters
 from fogsim.values import Camera
 
 CAR = "car"
@@ -43,6 +44,7 @@ class StereoConfig:
     roll: float = 0.0
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class CameraConfig:
     """A vehicle's camera.

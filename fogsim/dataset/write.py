@@ -290,6 +290,8 @@ def write_dataset(
         If a part of the loop cannot start or fails.
     """
     build.check_frames(scenario, "a dataset")
+    # JSON has no numbers of NumPy.
+    frames, seed, every = int(frames), int(seed), int(every)
     with Interruption() as interruption, DatasetDirectory(Path(out), identity(scenario, seed, every)) as directory:
         if more := directory.beyond(frames):
             raise InputError(f"{directory.path} holds {more} frames already, more than the {frames} asked for")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fogsim.core.registry import Registry
-from fogsim.errors import SimulationError
+from fogsim.errors import InputError, SimulationError
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
 from fogsim.metrics.estimation.belief_ahead import FogWarnings
@@ -185,7 +185,10 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
         values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
         definitions = {"ending": Definition("Why the run ended; none if it was interrupted.")}
         for name, metric in self._metrics.items():
-            values.update(checked_values(name, metric.result()))
+            found = checked_values(name, metric.result())
+            if twice := sorted(found.keys() & values.keys()):
+                raise InputError(f"metric {name!r}: result(): another metric has the key {twice[0]!r}; choose another")
+            values.update(found)
             definitions.update(metric.definitions)
         return RunSummary(values, definitions)
 

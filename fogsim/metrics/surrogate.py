@@ -5,11 +5,13 @@ Every function takes scalars or arrays that broadcast, and gives float64 of thei
 
 from dataclasses import dataclass
 from importlib import import_module
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME
+from fogsim.core.parameters import Range, checked_parameters
 
 QUEUE_SPEED = 5.0
 """Speed below which a vehicle counts as queued [m/s]; slower followers only close up and are in no conflict."""
@@ -28,6 +30,7 @@ AVAILABLE_DECELERATION = (8.45, 1.40, 4.23, 12.68)
 truncated normal distribution (Cunto & Saccomanno 2008)."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SafetyStandard:
     """What the measures of a run are judged by.
@@ -44,10 +47,10 @@ class SafetyStandard:
         Speed above the advice that still counts as following it [m/s]; 1 km/h, what a speedometer can show.
     """
 
-    reaction_time: float = REACTION_TIME
-    deceleration: float = DECELERATION
-    time_to_collision: float = 3.0
-    advice_tolerance: float = 1.0 / 3.6
+    reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = REACTION_TIME
+    deceleration: Annotated[float, Range(0.01, 100.0, "m/s²")] = DECELERATION
+    time_to_collision: Annotated[float, Range(0.0, 3600.0, "s")] = 3.0
+    advice_tolerance: Annotated[float, Range(0.0, 100.0, "m/s")] = 1.0 / 3.6
 
 
 def time_to_collision(gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike) -> NDArray[np.float64]:

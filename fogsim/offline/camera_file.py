@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, ValidationError
 
@@ -35,6 +35,8 @@ class Calibration:
     the optical axis to the left of the vehicle's axis [rad]; `remarks` are assumptions where the file says nothing;
     `deviations` say how uncertain the camera's values are.
     """
+
+    EXPECTED: ClassVar[str] = "a Calibration, as load_calibration returns it"
 
     camera: Camera
     distortion: tuple[float, ...] = ()

@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from fogsim.core.parameters import accepted_parameters
-from fogsim.errors import InputError, UnknownNameError, shown
+from fogsim.core.parameters import NUMBER_OR_NAN, accepted_parameters, checked_parameters
+from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations, on_any_scale, scale_left
 from fogsim.offline.camera_file import Calibration
@@ -19,6 +20,7 @@ from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 from fogsim.values.result_checks import checked_estimate
+from fogsim.vision.restoration.picture import refuse_short_range
 
 _ALL = "all"
 """Represents every method of the registry."""
@@ -66,13 +68,14 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(meant))
 
 
+@checked_parameters
 def estimate_images(
-    inputs: Sequence[str | Path] | str | Path,
+    inputs: Iterable[str | Path] | str | Path,
     camera: Camera | Calibration,
-    methods: Sequence[str] | str = _ALL,
+    methods: Iterable[str] | str = _ALL,
     *,
     sequence: bool | None = None,
-    rate: float | None = None,
+    rate: Annotated[float, NUMBER_OR_NAN] | None = None,
     signs: str | Path | None = None,
     track: str | Path | None = None,
     night: NightDrive | None = None,
@@ -81,13 +84,13 @@ def estimate_images(
 
     Parameters
     ----------
-    inputs : path or sequence of paths
+    inputs : path or iterable of paths
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
         Their calibration (`fogsim.offline.load_calibration` reads it from a file, and its standard deviations, which
         widen the intervals; a `Camera` alone counts as exact but for its pitch). Images of a lens that distorts or of
         a camera with yaw are rectified first, and the results contain the rectified images.
-    methods : str or sequence of str
+    methods : str or iterable of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None
         Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
@@ -112,9 +115,7 @@ def estimate_images(
     """
     if (signs is None) != (track is None):
         raise InputError("signs and track go together: a map says nothing without places, nor places without a map")
-    if not isinstance(camera, Camera | Calibration):
-        raise InputError(f"expected a Camera, or a Calibration from `load_calibration`, got {shown(camera)}")
-    names = [methods] if isinstance(methods, str) else methods
+    names = [methods] if isinstance(methods, str) else [*methods]
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
     watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]
@@ -233,11 +234,6 @@ def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:
-        most = int(image.max(initial=0))
-        if 2**8 <= most < 2**_WHOLE_RANGE_BITS:
-            raise InputError(
-                f"the image has 16 bits and no value above {most}: write `bits: {10 if most < 2**10 else 12}` in the "
-                "camera file if it is the camera's, or spread the values over 0 … 65535"
-            )
+        refuse_short_range(int(image.max(initial=0)))
         return (image >> (16 - _WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=_WHOLE_RANGE_BITS)
     return image, camera

@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 from PIL import Image
 
+from fogsim.core.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.errors import InputError
 from fogsim.offline.calibration_deviations import CalibrationDeviations
 from fogsim.offline.drive.road_scale import RoadMotion
@@ -90,12 +91,13 @@ class CameraGuess:
     warnings: tuple[str, ...]
 
 
+@checked_parameters
 def guess_camera(
     source: Source,
     *,
-    mount_height: float | None = None,
-    field_of_view: float | None = None,
-    horizon_row: float | None = None,
+    mount_height: Annotated[float, NUMBER_OR_NAN] | None = None,
+    field_of_view: Annotated[float, NUMBER_OR_NAN] | None = None,
+    horizon_row: Annotated[float, NUMBER_OR_NAN] | None = None,
     way: Callable[[float], float | None] | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> CameraGuess:

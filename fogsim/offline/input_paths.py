@@ -7,8 +7,10 @@ import re
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Annotated
 
 from fogsim.core.files.readers import nearest_file
+from fogsim.core.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.errors import InputError
 from fogsim.offline.image_files import IMAGE_ENDINGS
 from fogsim.offline.source import Animation, ImageFiles, Source
@@ -24,14 +26,18 @@ _SEQUENCE_RATE = 10.0
 """Default number of images of a numbered sequence per second [1/s]."""
 
 
+@checked_parameters
 def find_source(
-    inputs: Sequence[str | Path] | str | Path, *, sequence: bool | None = None, rate: float | None = None
+    inputs: Iterable[str | Path] | str | Path,
+    *,
+    sequence: bool | None = None,
+    rate: Annotated[float, NUMBER_OR_NAN] | None = None,
 ) -> Source:
     """Find the images of paths, folders and patterns.
 
     Parameters
     ----------
-    inputs : path or sequence of paths
+    inputs : path or iterable of paths
         One video, or any number of image files, folders of them (in the order of the numbers in their names), and
         patterns like ``"drive/*.png"``.
     sequence : bool or None

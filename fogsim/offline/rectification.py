@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.linear_algebra import matrix_product
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels, read_image
@@ -227,6 +228,7 @@ class StraightenedSource:
             yield replace(picture, image=image, opacity=opacity)
 
 
+@checked_parameters
 def straightened(source: Source, calibration: Calibration) -> tuple[Source, Camera]:
     """Images as a pinhole along the vehicle's axis sees them, and that pinhole.
 

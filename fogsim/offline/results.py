@@ -5,6 +5,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from numbers import Real
 
 from fogsim.offline.drive.sign_watch import SignSummary
 from fogsim.offline.estimation import FrameEstimates
@@ -156,9 +157,9 @@ def denser_text(estimate: Estimate) -> str:
 
 def _number(value: object) -> float | None:
     """Value with the shown digits; None for values without a JSON number, such as infinite visibility."""
-    if not isinstance(value, int | float) or not math.isfinite(value):
+    if not isinstance(value, Real) or not math.isfinite(value):
         return None
-    return float(f"{value:.{_DIGITS}g}")
+    return float(f"{float(value):.{_DIGITS}g}")
 
 
 _MOST_NAME = 48
@@ -238,5 +239,5 @@ def _cells(estimate: Estimate) -> tuple[str, ...]:
         interval_text(estimate),
         f"{estimate.extinction:.4f} /m",
         estimate.category.value,
-        f"row {horizon:.1f}" if isinstance(horizon, int | float) else "",
+        f"row {float(horizon):.1f}" if isinstance(horizon, Real) else "",
     )

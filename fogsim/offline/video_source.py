@@ -122,6 +122,7 @@ _STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _SOUND = re.compile(r"Stream #.*: Audio:")
 _HIGH_RANGE = re.compile(r"Video:.*\b(arib-std-b67|smpte2084)\b")  # ITU-R BT.2100: HLG and PQ
+_JOINED = "Found duplicated MOOV Atom"  # of an MP4 file that was appended to another
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
 _ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
@@ -184,7 +185,7 @@ class VideoFile:
         Raises
         ------
         InputError
-            If it cannot be read as one, has no frames, or is HDR.
+            If it cannot be read as one, has no frames, is several, or is HDR.
         """
         # ffmpeg would wait for a writer of a pipe.
         if not path.is_file():
@@ -196,6 +197,11 @@ class VideoFile:
         rate = _RATE.search(header_text)
         if rate is None:
             raise InputError(f"{path}: this is no video that can be read")
+        if _JOINED in header_text:
+            raise InputError(
+                f"{path}: several videos one after another in a file, and ffmpeg reads the first alone; give them one "
+                "by one, or join them with ffmpeg's concat demuxer"
+            )
         if curve := _HIGH_RANGE.search(header_text):
             raise InputError(
                 f"{path}: an HDR video ({curve[1]}), whose pixel values follow no `response` of a camera; record or "

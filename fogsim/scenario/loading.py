@@ -308,7 +308,7 @@ def _overridden(document: Document, overrides: Iterable[str]) -> Document:
     """Copy of a document with overrides, without the block ``sut`` around its keys."""
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
-    overrides = tuple(without_sut_in_path(text) for text in overrides)
+    overrides = tuple(one for text in overrides for one in without_sut_in_path(text))
 
     def change(one: Document) -> Document:
         one = without_sut(one)

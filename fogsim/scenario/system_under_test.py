@@ -1,9 +1,12 @@
 """The block ``sut``: another way to write what is under test, which are keys of their own."""
 
+import json
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 from fogsim.errors import InputError, shown, suggest
-from fogsim.scenario.document import Document
+from fogsim.scenario.document import Document, parse_override
 
 BLOCK = "sut"
 """Name of the block."""
@@ -32,6 +35,10 @@ def without_sut(document: Document) -> Document:
     return replace(document, data={**data, **block}, origins=origins)
 
 
-def without_sut_in_path(override: str) -> str:
-    """An override of a key in ``sut`` as one of the key itself."""
-    return override.strip().removeprefix(f"{BLOCK}.")
+def without_sut_in_path(override: str) -> Iterator[str]:
+    """An override of ``sut`` or of a key in it as overrides of the keys themselves."""
+    if override.partition("=")[0].strip() != BLOCK:
+        yield override.strip().removeprefix(f"{BLOCK}.")
+        return
+    written = Document(Path(), {BLOCK: parse_override(override)[1]}, {}).overridden((override,))
+    yield from (f"{key}={json.dumps(value)}" for key, value in without_sut(written).data.items())

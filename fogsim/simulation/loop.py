@@ -10,7 +10,7 @@ from typing import Annotated, Protocol, Self
 from fogsim.atmosphere import FogNow
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.randomness import Seed, spawn_streams
-from fogsim.errors import SimulationError, UnplayedWarning
+from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.ego.equipment import EgoEquipment
 from fogsim.simulation.ego.view_rendering import Surrounding
@@ -291,10 +291,12 @@ class ClosedLoop:
         Raises
         ------
         InputError
-            If the command is none, or a speed in it is nan or negative.
+            If the command is none, a speed in it is nan or negative, or there are no periods.
         SimulationError
             If the run has not been started or is over.
         """
+        if periods < 1:
+            raise InputError(f"periods: expected at least 1, got {periods!r}")
         step = self._step
         if step is None or step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")

@@ -179,7 +179,7 @@ def record_run(
             watch,
         )
 
-    return _record(of_ego, config, scenario.run_record, seed, Path(out), overwrite, recorders, command_line)
+    return _record(of_ego, config, scenario.run_record, int(seed), Path(out), overwrite, recorders, command_line)
 
 
 @checked_parameters
@@ -209,7 +209,7 @@ def record_traffic(
             road,
         )
 
-    return _record(alone, config, scenario.run_record, seed, Path(out), overwrite, recorders, command_line)
+    return _record(alone, config, scenario.run_record, int(seed), Path(out), overwrite, recorders, command_line)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

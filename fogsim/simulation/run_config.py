@@ -4,11 +4,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 from fogsim.atmosphere import FogConfig
 from fogsim.camera import DEFAULT_CAMERA, CameraConfig
 from fogsim.conditions import Condition
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.registry import MethodConfig
 from fogsim.errors import InputError
 from fogsim.sensors import Gps, LeadSensor
@@ -18,6 +19,8 @@ from fogsim.values import Display, Fault, Pavement, StretchAdvice
 from fogsim.values.scene import USUAL_PAVEMENT
 from fogsim.values.script import Actions
 
+_FROM_0, _FROM_1, _ABOVE_0 = Range(0, math.inf), Range(1, math.inf), Range(0.001, math.inf, "s")
+
 NO_RENDERER = "none"
 """Name that stands for drawing nothing, in runs that need no camera."""
 
@@ -26,6 +29,7 @@ _ESTIMATORS, _FUSION = (MethodConfig("joint_road"),), MethodConfig("grid_filter"
 _ADVISER, _LIGHTING = MethodConfig("stopping_sight_distance"), MethodConfig("fog_lamp_rules")
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class Periods:
     """The clocks of a run as whole numbers.
@@ -42,10 +46,10 @@ class Periods:
         Most camera periods that a run may last.
     """
 
-    camera_period: float = 0.1
-    traffic_steps: int = 1
-    decision_frames: int = 5
-    frames: int = 1200
+    camera_period: Annotated[float, _ABOVE_0] = 0.1
+    traffic_steps: Annotated[int, _FROM_1] = 1
+    decision_frames: Annotated[int, _FROM_1] = 5
+    frames: Annotated[int, _FROM_0] = 1200
 
     def time(self, index: int) -> float:
         """Time of a camera period since the run began [s].
@@ -58,6 +62,7 @@ class Periods:
         return clock_time(index * self.camera_period)
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class WorldConfig:
     """Fog, light, and what is drawn.
@@ -81,8 +86,8 @@ class WorldConfig:
     """
 
     fog: FogConfig
-    illuminance: float = 10_000.0
-    darkest: float = math.inf
+    illuminance: Annotated[float, Range(0.0, 200_000.0, "lx")] = 10_000.0
+    darkest: Annotated[float, _FROM_0] = math.inf
     renderer: str = "auto"
     has_street_lamps: bool = False
     scenery_seed: int = 0
@@ -108,6 +113,7 @@ class LightSensor:
     field_of_view: float = math.radians(40.0)  # Full horizontal angle within which it looks for lamps [rad]
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SensorsConfig:
     """Sensors next to the camera, and the faults of all."""
@@ -158,6 +164,7 @@ class RoadsideSender(ReportSender):
     camera: MastCamera | None = None
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class ReportsConfig:
     """Senders that report fog elsewhere to the ego."""
@@ -190,6 +197,7 @@ class SectionsConfig:
     along: tuple[str, ...] = ()  # Edges of the route, where there is no ego
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class AdviceConfig:
     """From the belief to advice, lamps, and who hears the advice.
@@ -214,11 +222,12 @@ class AdviceConfig:
     lighting: MethodConfig = _LIGHTING
     informed_by: str = "belief"
     lighting_informed_by: str = "belief"
-    reach: float = 0.0
+    reach: Annotated[float, _FROM_0] = 0.0
     stretch: StretchAdvice | None = None
     sections: SectionsConfig | None = None
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class ControllerConfig:
     """A controller in the ego, and what its actuators can do."""
@@ -294,6 +303,7 @@ class ScenarioLike(ABC):
         return RunRecord()
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class RunConfig(ScenarioLike):
     """What a run is made of.
@@ -359,10 +369,12 @@ class RunConfig(ScenarioLike):
     description: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse clocks that do not fit."""
+        """Refuse clocks that do not fit, and estimators that would count twice."""
         step, steps, period = self.traffic.step_length, self.periods.traffic_steps, self.periods.camera_period
         if not math.isclose(step * steps, period, rel_tol=1e-5):
             raise InputError(f"periods: {steps} traffic steps of {step:g} s are not one camera period, {period:g} s")
+        if len({one.name for one in self.estimators}) < len(self.estimators):
+            raise InputError(f"estimators must differ, got {', '.join(one.name for one in self.estimators)}")
 
     @property
     def has_equipped(self) -> bool:

@@ -45,7 +45,7 @@ def _unwatched(_: int, __: str | None) -> None:
 @checked_parameters
 def run_study(
     study: Study,
-    out: Path,
+    out: str | Path,
     *,
     processes: Annotated[int, Range(1, 10_000)] | None = None,
     engine: Engine | None = None,
@@ -57,7 +57,7 @@ def run_study(
     ----------
     study : Study
         From `load_study`.
-    out : Path
+    out : str or Path
         Directory: ``study.parquet`` and ``study.csv`` (a row for each run: factors, seed, metrics), ``comparison.csv``,
         ``report.html``, ``figures/`` (SVG and CSV); ``runs/`` has a file for each run, from which a study is continued.
     processes : int or None
@@ -89,6 +89,7 @@ def run_study(
     if engine is not None and processes is not None:
         raise InputError("processes are this machine's: give either processes or an engine")
     engine = engine or ProcessPool(processes or os.cpu_count() or 1)
+    out = Path(out)
     refuse_unwritable_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     with WriterLock(out):

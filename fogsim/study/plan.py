@@ -22,7 +22,7 @@ from fogsim.scenario.document import Document, apply_overrides, read_document, r
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.loading import CountWatch, scenario_file, scenario_reader
 from fogsim.scenario.mistakes import mistake_lines
-from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.plain_yaml import KeyPath, parse_yaml
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.scenario.variation import differing_cases, grid_mistake
@@ -111,8 +111,12 @@ class StudyFile(Section):
         for name, level in self.baseline.items():
             if name not in self.factors:
                 yield ("baseline", name), f"unknown factor; {suggest(name, self.factors)}"
-            elif level not in self.factors[name]:
+            elif self.key_of(name, level) not in self.factors[name]:
                 yield ("baseline", name), f"unknown level {shown(level)}; {suggest(level, self.factors[name])}"
+
+    def key_of(self, factor: str, level: str) -> str:
+        """A level of the baseline as it stands among the levels, where ``off`` and ``1e3`` are text."""
+        return next((one for one in self.factors[factor] if level in (one, _as_key(parse_yaml(one)[0]))), level)
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +270,8 @@ def load_study(
     return Study(
         name=path.stem,
         factors={name: tuple(levels) for name, levels in written.factors.items()},
-        baseline=written.baseline or {first: next(iter(levels))},
+        baseline={name: written.key_of(name, one) for name, one in written.baseline.items()}
+        or {first: next(iter(levels))},
         confidence=written.confidence,
         runs=tuple(_runs(document, written, may_import, watch)),
         metrics=written.metrics,

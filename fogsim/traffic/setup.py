@@ -1,11 +1,13 @@
 """What a traffic simulation is, and what it needs to know before it starts."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol
+from typing import Annotated, Protocol
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup, unaffected
@@ -27,6 +29,7 @@ class AfterCollision(StrEnum):
     REMOVE = "remove"
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class TrafficSetup:
     """A SUMO simulation, and who the ego is if there is one.
@@ -69,11 +72,11 @@ class TrafficSetup:
     routes: tuple[Path, ...] = ()
     additional: tuple[Path, ...] = ()
     ego: str | None = "ego"
-    step_length: float = 0.1
+    step_length: Annotated[float, Range(0.001, 10.0, "s")] = 0.1
     keep_lane: tuple[str, ...] = ()
     warm_up_limit: float = 600.0
     advice_deceleration: float = 2.0
-    reading_radius: float = 1000.0
+    reading_radius: Annotated[float, Range(1.0, math.inf, "m")] = 1000.0
     events: tuple[Event, ...] = ()
     sight: DriverSight | None = None
     drivers: DriverSetup = UNTOUCHED
@@ -81,6 +84,11 @@ class TrafficSetup:
     config: Path | None = None
     sumo_options: tuple[tuple[str, str], ...] = ()
     warm_up: float = 0.0
+
+    def __post_init__(self) -> None:
+        # SUMO takes no number of NumPy's, and its options are chosen by identity.
+        object.__setattr__(self, "step_length", float(self.step_length))
+        object.__setattr__(self, "after_collision", AfterCollision(self.after_collision))
 
 
 class AnyTraffic(Protocol):

@@ -94,8 +94,13 @@ class Camera:
             raise InputError(f"camera bits must be 8, 10 or 12, got {shown(self.bits)}")
         if not (_finite(self.black_level) and 0 <= self.black_level <= _MOST_BLACK):
             raise InputError(f"camera black_level must lie in 0 … {_MOST_BLACK:g}, got {shown(self.black_level)}")
-        for name in ("width", "height", "bits"):
-            object.__setattr__(self, name, int(getattr(self, name)))
+        # For other numbers, such as NumPy's short ones, kernels would be compiled again, and count less exactly.
+        self._take(int, "width", "height", "bits")
+        self._take(float, "focal_length", "mount_height", "pitch", "roll", "black_level")
+
+    def _take(self, kind: type[int | float], *names: str) -> None:
+        for name in names:
+            object.__setattr__(self, name, kind(getattr(self, name)))
 
     def __hash__(self) -> int:
         """Of the numbers in which cameras mostly differ: what is remembered by camera is looked up for each frame."""

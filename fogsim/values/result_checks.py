@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from numbers import Real
+from dataclasses import fields, replace
+from numbers import Integral, Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -36,8 +37,14 @@ _SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of a belief's probabilities."""
 
 
+_ESTIMATED = ("extinction", "standard_deviation", "common_deviation", "scale_deviation")
+
+
 def checked_estimate(method: str, value: object) -> Estimate:
-    """An estimator's result; InputError unless it is an `Estimate` of that method with valid numbers."""
+    """An estimator's result; InputError unless it is an `Estimate` of that method with valid numbers.
+
+    NumPy's numbers become Python's: short ones, which networks give, overflow in the fusion, and JSON has none.
+    """
     who = f"estimator {method!r}: update()"
     estimate = _of_type(who, value, Estimate)
     if estimate.method != method:
@@ -53,9 +60,30 @@ def checked_estimate(method: str, value: object) -> Estimate:
             _check_number(who, name, getattr(estimate, name), " [-]")
     if not (_is_number(estimate.reach) and estimate.reach >= 0.0):
         raise InputError(f"{who}: reach must be at least 0 [m], or inf; got {shown(estimate.reach)}")
-    for name, kind in (("bounds", ExtinctionBounds), ("optical_depths", OpticalDepths), ("denser", DenserFog)):
-        _check_part(who, name, getattr(estimate, name), kind)
+    _check_part(who, "bounds", estimate.bounds, ExtinctionBounds)
+    _check_part(who, "denser", estimate.denser, DenserFog)
+    if (curve := estimate.optical_depths) is not None:
+        _check_kind(who, "optical_depths", curve, OpticalDepths, "of type fogsim.values.OpticalDepths, or None")
+        _check_curve(f"{who}: optical_depths", curve)
+    numbers = {name: getattr(estimate, name) for name in _ESTIMATED} if estimate.valid else {}
+    plain: dict[str, Any] = {name: float(number) for name, number in numbers.items() if type(number) is not float}
+    if plain or type(estimate.valid) is not bool:
+        return replace(estimate, valid=bool(estimate.valid), **plain)
     return estimate
+
+
+def _check_curve(who: str, curve: OpticalDepths) -> None:
+    columns = (curve.distance, curve.depth, curve.standard_deviation)
+    try:
+        fits = len({len(column) for column in columns}) == 1 and math.isfinite(sum(map(sum, columns)))
+        ascends = [*curve.distance] == sorted({*curve.distance}) != []
+    except (TypeError, ValueError):
+        fits = ascends = False
+    if not (fits and ascends and curve.distance[0] > 0.0):
+        raise InputError(
+            f"{who} must have as many depths and deviations as distances, which ascend from more than 0 [m], all finite"
+            f"; got {shown(curve)}"
+        )
 
 
 def checked_belief(method: str, value: object) -> Belief:
@@ -80,10 +108,9 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
         )
-    if belief.denser is not None:
-        _check_part(who, "denser", belief.denser, DenserFog)
+    _check_part(who, "denser", belief.denser, DenserFog)
     if belief.profile is not None:
-        _check_part(who, "profile", belief.profile, FogProfile)
+        _check_kind(who, "profile", belief.profile, FogProfile, "of type fogsim.values.FogProfile, or None")
     if not (_is_number(belief.age) and belief.age >= 0.0):
         raise InputError(f"{who}: age must be at least 0 [s], or inf; got {shown(belief.age)}")
     return belief
@@ -113,7 +140,14 @@ def checked_speed(choice: str, speed: float) -> float:
     """A speed choice's result; InputError unless it is a speed of at least 0 [m/s], or `inf` for no limit."""
     if not (_is_number(speed) and speed >= 0.0):
         raise InputError(f"speed choice {choice!r} must return at least 0 [m/s], or inf; got {shown(speed)}")
-    return speed
+    return float(speed)
+
+
+def checked_share(choice: str, share: float) -> float:
+    """A speed choice's share; InputError unless it is a finite number of at least 0 [-]."""
+    if not (_is_number(share) and 0.0 <= share < math.inf):
+        raise InputError(f"speed choice {choice!r}: share() must return at least 0 [-]; got {shown(share)}")
+    return float(share)
 
 
 def checked_lamps(method: str, value: object) -> Lamp:
@@ -209,20 +243,25 @@ def _check_kind(who: str, field: str, value: object, kind: type, expected: str) 
         raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
 
 
-def _check_part(who: str, field: str, value: object, kind: type) -> None:
-    if value is not None and not isinstance(value, kind):
-        expected = f"of type {kind.__module__}.{kind.__name__}, or None"
-        raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
+def _check_part(who: str, field: str, value: object, kind: type[ExtinctionBounds | DenserFog]) -> None:
+    if value is None:
+        return
+    _check_kind(who, field, value, kind, f"of type {kind.__module__}.{kind.__name__}, or None")
+    for part in fields(kind):
+        number = getattr(value, part.name)
+        if not (_is_number(number) and number >= 0.0):
+            raise InputError(f"{who}: {field}.{part.name} must be a number of at least 0; got {shown(number)}")
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:
-    """A metric's result; InputError unless it is a nested mapping of names to None, words and finite numbers."""
+    """A metric's result, with numbers of Python.
+
+    InputError unless it is a nested mapping of names to None, words and finite numbers.
+    """
     who = f"metric {metric!r}: result()"
     if not isinstance(value, Mapping):
         raise InputError(f"{who} must return a mapping of keys to values, got {shown(value)}")
-    for key, entry in value.items():
-        _check_entry(who, key, entry)
-    return value
+    return {key: _checked_entry(who, key, entry) for key, entry in value.items()}
 
 
 def checked_recorder(name: str, value: T) -> T:
@@ -235,17 +274,18 @@ def checked_recorder(name: str, value: T) -> T:
     return value
 
 
-def _check_entry(who: str, key: object, entry: object) -> None:
+def _checked_entry(who: str, key: object, entry: Any) -> Any:
     if not isinstance(key, str):
         raise InputError(f"{who}: keys must be words, got {shown(key)}")
     if isinstance(entry, Mapping):
-        for inner, value in entry.items():
-            _check_entry(who, f"{key}.{inner}", value)
-    elif isinstance(entry, float | int) and not isinstance(entry, bool):
+        return {inner: _checked_entry(who, f"{key}.{inner}", value) for inner, value in entry.items()}
+    if _is_number(entry):
         if not math.isfinite(entry):
             raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {shown(entry)}")
-    elif entry is not None and not isinstance(entry, str):
+        return int(entry) if isinstance(entry, Integral) else float(entry)
+    if entry is not None and not isinstance(entry, str):
         raise InputError(f"{who}: {key} must be None, a word, a finite number or a mapping of such; got {shown(entry)}")
+    return entry
 
 
 def _of_type(who: str, value: object, kind: type[T]) -> T:

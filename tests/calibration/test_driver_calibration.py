@@ -14,7 +14,7 @@ from fogsim.scenario import load_scenario
 from fogsim.scenario.parts.methods import driver_setup
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS, Surroundings
 from fogsim.traffic.drivers.sight import DriverSight, leader_reach
-from fogsim.traffic.drivers.speed_choice import ObservedSpeed, chosen_speed
+from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, ObservedSpeed, chosen_speed, speed_share
 
 TRUE = {"slowest_share": 0.75, "overdriving": 1.7, "speed_spread": 0.15}
 KINDS = {"in_sight": 0.3, "unaffected": 0.4, "careful": 0.15, "out_of_sight": 0.15}
@@ -165,3 +165,20 @@ def test_a_users_own_choice(tmp_path: Path, command: Callable[..., tuple[int, st
     assert setup.following_shares == {"unaffected": 1.0}
     with pytest.raises(InputError, match="speed choice 'commuters:Bold' must return at least 0"):
         setup.speed_choice(10.0)
+
+
+def test_a_choice_that_is_registered_is_checked_and_keeps_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Halved:
+        def __call__(self, _: float) -> float:
+            return math.nan
+
+        def share(self, visibility: float) -> float:
+            return 0.5 if visibility > 50.0 else -0.5
+
+    monkeypatch.setitem(SPEED_CHOICES._entries, "halved", Halved)
+    choice = driver_setup(load_scenario("motorway_fog_bank", ["drivers.speed_choice=halved"])).speed_choice
+    assert speed_share(choice, 60.0) == 0.5
+    with pytest.raises(InputError, match=r"speed choice 'halved' must return at least 0 .* got nan"):
+        choice(60.0)
+    with pytest.raises(InputError, match=r"speed choice 'halved': share\(\) must return at least 0 .* got -0.5"):
+        speed_share(choice, 20.0)

@@ -102,7 +102,7 @@ def test_what_was_lost_or_never_finished_is_made_again_and_more_can_be_had(whole
     (tmp_path / "records" / "000002.json").unlink()
     (tmp_path / "records" / "000000.json").write_text('{"image": {"run": ')
     (tmp_path / "frames" / "000003.png.part").write_bytes(b"torn")
-    again = fogsim.write_dataset(small(), tmp_path, FRAMES, seed=4, every=EVERY)
+    again = fogsim.write_dataset(small(), tmp_path, FRAMES, seed=np.int64(4), every=np.int64(EVERY))
     assert again.written == 4
     (tmp_path / "frames" / "000003.png.part").unlink()
     assert contents(tmp_path) == contents(whole)

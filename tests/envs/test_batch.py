@@ -11,6 +11,7 @@ from scipy.stats import ks_2samp
 import fogsim_envs
 from fogsim.errors import InputError
 from fogsim.fusion import GridFilter
+from fogsim.traffic import SPEED_CHOICES
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 from fogsim_envs.batch import RuleConstants
@@ -203,7 +204,7 @@ def test_returns_are_distributed_as_on_sumo(policy: str) -> None:
     assert policy == "random" or np.corrcoef(*values)[0, 1] > 0.6
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     envs = made(2)
     with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
         envs.step(np.zeros((2, 2), int))
@@ -220,6 +221,11 @@ def test_what_does_not_fit_is_refused() -> None:
         made(2, scenario_distribution=ScenarioDistribution(demand=(500.0, 2100.0)))
     with pytest.raises(InputError, match=r"rule\.quantile: expected one of"):
         made(2, rule=RuleConstants(quantile=0.1))
+    with pytest.raises(InputError, match=r"rule\.hold: must be a number 0 … 3600 s, got -1"):
+        made(2, rule=RuleConstants(hold=-1.0))
+    monkeypatch.setitem(SPEED_CHOICES._entries, "mine", lambda: lambda _: 20.0)
+    with pytest.raises(InputError, match=r"drivers: expected those of unaffected, .*, got 'mine'"):
+        made(2, scenario_distribution=ScenarioDistribution(demand=(500.0,), drivers={"mine": 1.0}))
 
 
 def test_options_reach_the_batch_through_stable_baselines() -> None:

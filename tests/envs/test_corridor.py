@@ -11,13 +11,13 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
+from fogsim.core.registry import make
 from fogsim.errors import InputError
 from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.values import Collision, Command, RoadSection, Stretch, TrafficState, TrafficStep, Truth
 from fogsim_envs import evaluate
-from fogsim_envs.baselines import baseline
 from fogsim_envs.corridor import CorridorWeights, FogCorridorEnv, parallel_env
-from fogsim_envs.corridor.baselines import DARK
+from fogsim_envs.corridor.baselines import DARK, SIGN_BASELINES
 from fogsim_envs.corridor.loops import InductionLoops, LoopReading
 from fogsim_envs.corridor.observation import CORRIDOR_FEATURES, RoadKnowledge, loop_places, sign_observation
 from fogsim_envs.corridor.rewards import CorridorReward, lost_share, overdriven
@@ -151,11 +151,11 @@ def test_policies_of_signs_are_evaluated(signs: FogCorridorEnv) -> None:
     [("none", 20.0, 5), ("fixed", math.inf, 1), ("rule", 75.0 / 3.6, 1), ("rule", 5.0, 0), ("rule", math.inf, 5)],
 )
 def test_baselines_of_a_sign(name: str, advised: float, level: int) -> None:
-    assert baseline(name, spaces.Discrete(6))(None, {"built_in_advice_mps": advised}) == level
+    assert make(SIGN_BASELINES, name, spaces.Discrete(6))(None, {"built_in_advice_mps": advised}) == level
 
 
 def test_chance_comes_again() -> None:
-    policy = baseline("random", spaces.Discrete(6))
+    policy = make(SIGN_BASELINES, "random", spaces.Discrete(6))
     policy.reset(4)
     first = [int(policy(None, {})) for _ in range(20)]
     policy.reset(4)

@@ -1,6 +1,7 @@
 """Episodes that are drawn: repeated, and of splits."""
 
 import copy
+import json
 from typing import Any
 
 import gymnasium
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError, LeftOutWarning
-from fogsim.scenario import Scenario, load_scenario
+from fogsim.scenario import Scenario, catalogue, load_scenario
+from fogsim_envs.batch import RuleConstants
 from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
@@ -17,9 +19,11 @@ def test_a_repeated_episode_is_of_the_same_scenario() -> None:
     scenarios = [load_scenario(MOTORWAY, [f"duration_s={10 + i}"]) for i in range(8)]
     source, rng = EpisodeSource(None, scenarios, None, (), "train"), np.random.default_rng(0)
     seed, drawn = source.draw(rng, EpisodeChoice())
-    for _ in range(3):
-        again, repeated = source.draw(rng, EpisodeChoice(episode=drawn.episode.as_info()))
+    # A vector environment has an array of seeds.
+    for given in (seed, np.int64(seed)):
+        again, repeated = source.draw(rng, EpisodeChoice(episode={**drawn.episode.as_info(), "seed": given}))
         assert (again, repeated.scenario) == (seed, drawn.scenario)
+        assert json.loads(json.dumps(repeated.episode.as_info()))["seed"] == seed
 
 
 def test_numpys_numbers_draw_the_same_episodes() -> None:
@@ -66,6 +70,18 @@ def test_distributions_survive_the_json_of_a_specification() -> None:
     read = type(spec).from_json(spec.to_json())
     source = gymnasium.make(read).unwrapped._source
     assert (source._given_fog, source._scenes) == (given["fog_distribution"], given["scenario_distribution"])
+    batch = gymnasium.make_vec("fogsim/FogAdvisoryBatch-v2", num_envs=2, rule=RuleConstants(0.05, hold=1.0))
+    again = gymnasium.make_vec(type(spec).from_json(batch.spec.to_json()))
+    assert again.unwrapped._rule == batch.unwrapped._rule
+
+
+def test_paths_survive_the_json_of_an_environment() -> None:
+    file = catalogue()["motorway_fog_bank"]
+    for given in ({"scenario": file}, {"scenario_distribution": [file], "image_size": None}):
+        env = gymnasium.make("fogsim/FogAdvisoryFast-v2", **given)
+        again = gymnasium.make(type(env.spec).from_json(env.spec.to_json()))
+        assert again.unwrapped._source._scenarios == (str(file),)
+        assert copy.deepcopy(env).spec == env.spec
 
 
 def test_what_may_be_drawn_may_be_arrays() -> None:

@@ -1,6 +1,7 @@
 """Evaluation of policies, whatever the shape of ``info``, and what it refuses."""
 
 import json
+import sys
 import threading
 from typing import Any, ClassVar
 
@@ -10,6 +11,7 @@ import pytest
 import fogsim_envs
 from fogsim.errors import InputError
 from fogsim_envs.advisory import FogAdvisoryEnv
+from fogsim_envs.baselines import baseline
 from fogsim_envs.task import TaskWeights
 
 FAST = "fogsim/FogAdvisoryFast-v2"
@@ -74,6 +76,21 @@ def test_the_oracle_goes_by_the_weights_of_the_reward() -> None:
     fogsim_envs.evaluate("oracle", env, [0])
     freely, carefully = env.actions[0], env.actions[-1]
     assert (freely, carefully < freely) == (3 * 12, True)
+
+
+def test_a_baseline_of_other_actions_is_refused() -> None:
+    for space in (gymnasium.spaces.Discrete(6), gymnasium.spaces.Box(0.0, 1.0, (2,))):
+        env = Foggy()
+        env.action_space = space
+        with pytest.raises(InputError, match=r"policy: .* of fogsim/FogAdvisory, one of Discrete\(39\), .* got 'rule'"):
+            fogsim_envs.evaluate("rule", env, [0])
+
+
+def test_chance_needs_no_signs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "fogsim_envs.corridor.baselines", None)
+    policy = baseline("random", gymnasium.spaces.Discrete(18))
+    policy.reset(3)
+    assert {int(policy(None, {})) for _ in range(200)} == set(range(18))
 
 
 def test_who_strikes_somebody_and_drives_on_has_struck() -> None:

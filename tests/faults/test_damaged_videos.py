@@ -49,6 +49,12 @@ def test_a_whole_video_has_no_warning(videos: Path, name: str, frames: int) -> N
     assert not any(picture.error for picture in pictures)
 
 
+def test_videos_that_a_shell_has_joined_are_not_read_as_the_first(videos: Path, tmp_path: Path) -> None:
+    (tmp_path / "joined.mp4").write_bytes(2 * (videos / "whole.mp4").read_bytes())
+    with pytest.raises(InputError, match=r"joined\.mp4: several videos one after another"):
+        find_source(tmp_path / "joined.mp4")
+
+
 @pytest.mark.parametrize("name", ["cut.mp4", "cut.mkv", "cut.avi", "flipped.avi"])
 def test_what_was_read_of_a_damaged_video_is_estimated(command: Command, videos: Path, name: str) -> None:
     code, out, err = command(

@@ -11,7 +11,7 @@ from PIL import Image
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, make
-from fogsim.offline import chosen_methods, estimate_images
+from fogsim.offline import chosen_methods, estimate_images, find_source, guess_camera, straightened
 from fogsim.values import Camera, Estimate, Frame, Observation
 
 
@@ -115,8 +115,20 @@ def test_images_of_12_bits_need_a_camera_of_12(drive, tmp_path: Path) -> None:
 
 
 def test_a_camera_is_no_path() -> None:
-    with pytest.raises(InputError, match="expected a Camera, or a Calibration from"):
+    with pytest.raises(InputError, match=r"a Camera or a Calibration, as load_calibration returns it, got 'c.yaml'"):
         next(estimate_images("drive", "c.yaml"))
+
+
+def test_arguments_of_other_types_are_named(drive) -> None:
+    image = drive.frames[0]
+    for call, message in [
+        (lambda: estimate_images(image, drive.camera), r"estimate_images\(\): inputs must be .* an array of uint8"),
+        (lambda: find_source(drive.folder, rate="5"), r"find_source\(\): rate must be a number or nothing, got '5'"),
+        (lambda: guess_camera(str(drive.folder)), r"guess_camera\(\): source must be a Source"),
+        (lambda: straightened(find_source(drive.folder / "images"), drive.camera), "calibration must be a Calibration"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            call()
 
 
 def test_no_readable_image_is_an_error(drive, tmp_path: Path) -> None:

@@ -155,6 +155,15 @@ def test_a_missing_heading_leaves_the_others(folder: Path) -> None:
     assert np.degrees(heading) == pytest.approx([60.0] + [50.0] * IMAGES, abs=1e-3)
 
 
+def test_rows_before_a_receiver_has_its_position_are_passed_over(folder: Path) -> None:
+    rows = csv_track(folder / "late.csv").read_text("utf-8").splitlines()
+    rows[1:3] = ["0.0,0,0", "1.0,0.000000,-0.0"]
+    (folder / "late.csv").write_text("\n".join(rows), "utf-8")
+    track = load_track(folder / "late.csv")
+    assert track.pose_at(1.0) is None
+    assert track.way_at(4.0) == pytest.approx(2.0 * SPEED, rel=1e-4)
+
+
 def test_summary_and_remarks_of_what_came_of_it(folder: Path) -> None:
     found, missed = watch(), watch()
     for index in range(IMAGES):

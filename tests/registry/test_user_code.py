@@ -83,6 +83,10 @@ def test_parameters_of_a_users_method_are_checked_in_the_file(tmp_path):
     )
     with pytest.raises(InputError, match=r"own\.yaml:5: advice\.parameters\.headway: must be a number 0\.5 … 10 s"):
         load_scenario(file)
+    for wrong in ("sut={advice: {method: 'adas_fog:Cautious', parameters: {headway: 20.0}}}", "sut={advise: none}"):
+        with pytest.raises(InputError, match=r"headway: must be a number 0\.5 … 10 s|sut\.advise: unknown key"):
+            load_scenario(file, [wrong])
+    assert load_scenario(file, ["sut={advice: none, lighting: low_beam}"]).advice.method == "none"
     scenario = load_scenario(file, ["sut.advice.parameters.headway=4.0"])
     assert chosen_methods.adviser(build.method(scenario, scenario.advice)).headway == 4.0
     versions = Manifest(Status.RUNNING, 0, {}, datetime.now(UTC), own_methods=build.own_methods(scenario)).to_json()[

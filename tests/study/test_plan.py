@@ -89,8 +89,9 @@ def test_mistakes_are_named_with_their_place(tmp_path: Path) -> None:
 
 
 def test_a_level_that_is_a_number_can_be_the_baseline(tmp_path: Path) -> None:
-    text = STUDY.replace("v60:", "60:", 1).replace("seeds: 3", "baseline: {visibility: 60}")
-    assert load_study(written(tmp_path, text)).baseline == {"visibility": "60"}
+    for level in ("off", "1e3", "060", "60"):  # what YAML reads as a number or a boolean where it is no key
+        text = STUDY.replace("v60:", f"{level}:", 1).replace("seeds: 3", f"baseline: {{visibility: {level}}}")
+        assert load_study(written(tmp_path, text)).baseline == {"visibility": level}
     with pytest.raises(InputError, match=r"baseline\.visibility: unknown level '60\.0'; did you mean '60'"):
         load_study(written(tmp_path, text.replace("visibility: 60}", "visibility: 60.0}")))
 

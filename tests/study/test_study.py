@@ -142,7 +142,7 @@ def test_cells_with_the_same_scenario_share_one_run(tmp_path: Path) -> None:
     estimators = "  estimator: {joint: ['estimators=[joint_road]'], zhu: ['estimators=[zhu2015]']}\nseeds: 2"
     study = load_study(study_file(tmp_path, STUDY.replace("seeds: 2", estimators)), ["lighting=low_beam"])
     engine, done = PlayedRuns(), [0]
-    rows = run_study(study, tmp_path / "out", engine=engine, watch=lambda number, _: done.append(number))
+    rows = run_study(study, str(tmp_path / "out"), engine=engine, watch=lambda number, _: done.append(number))
     assert (len(rows), len(engine.run_numbers), done[-1]) == (8, len({run.key for run in study.runs}), 8)
     assert len(engine.run_numbers) == 4
     assert {row["status"] for row in rows} == {"complete"}

@@ -60,4 +60,5 @@ def test_numbers_of_any_type_make_the_same_camera() -> None:
     assert other == CAMERA
     assert hash(other) == hash(CAMERA)
     assert [type(size) for size in (other.width, other.height, other.bits)] == [int, int, int]
+    assert [type(one) for one in (other.focal_length, other.mount_height, other.pitch, other.roll)] == 4 * [float]
     assert other.response is Response.LINEAR

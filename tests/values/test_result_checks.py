@@ -1,7 +1,9 @@
 """What methods of the user's return is checked and named."""
 
 import dataclasses
+import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +12,24 @@ from fogsim.errors import InputError
 from fogsim.fusion import make as make_fusion
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import METRICS, RunMetrics
+from fogsim.offline import FrameEstimates, record_lines
+from fogsim.offline.source import Picture
 from fogsim.scenario import load_scenario
 from fogsim.simulation.advised_driving import AdvisedDriving
-from fogsim.values import Command, Control, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import (
+    Command,
+    Control,
+    DenserFog,
+    Display,
+    Estimate,
+    Lamp,
+    LampChoice,
+    OpticalDepths,
+    SpeedAdvice,
+    Stretch,
+    StretchAdvice,
+)
+from fogsim.values.estimate import ExtinctionBounds
 from fogsim.values.result_checks import (
     checked_advice,
     checked_belief,
@@ -40,6 +57,19 @@ def test_estimates() -> None:
         (Estimate("mine", 0.1, 0.1, valid=None), "valid must be True or False"),  # type: ignore[arg-type]  # wrong
         (Estimate("mine", 0.1, 0.1, reach=math.nan), "reach must be at least 0 .*; got nan"),
         (Estimate("mine", 0.1, 0.1, denser=50.0), "denser must be of type .*DenserFog, or None; got 50"),  # type: ignore[arg-type]  # wrong
+        (Estimate("mine", 0.1, 0.1, denser=DenserFog(math.nan, 1.0, 0.1)), "denser.distance must be .* got nan"),
+        (Estimate("mine", 0.1, 0.1, bounds=ExtinctionBounds(least=-1.0)), "bounds.least must be .* got -1.0"),
+        *(
+            (
+                Estimate("mine", 0.1, 0.1, optical_depths=OpticalDepths(*curve)),
+                "optical_depths must have as many depths",
+            )
+            for curve in (((), (), ()), ((10.0, 20.0), (0.1,), (0.1, 0.1)), ((10.0,), (math.nan,), (0.1,)))
+        ),
+        *(
+            (Estimate("mine", 0.1, 0.1, optical_depths=OpticalDepths(places, (0.1, 0.2), (0.1, 0.1))), "which ascend")
+            for places in ((20.0, 10.0), (0.0, 10.0), ("near", "far"))
+        ),
         (Estimate("other", 0.1, 0.1), "method must be its name in the registry, 'mine'; got 'other'"),
     ]:
         with pytest.raises(InputError, match=message):
@@ -47,8 +77,19 @@ def test_estimates() -> None:
 
 
 def test_what_cannot_tell_need_not_have_numbers() -> None:
-    for estimate in (Estimate.invalid("mine", "dark"), Estimate("mine", np.float32(0.1), 0)):  # type: ignore[arg-type]  # a number
-        assert checked_estimate("mine", estimate) is estimate
+    estimate = Estimate.invalid("mine", "dark")
+    assert checked_estimate("mine", estimate) is estimate
+
+
+def test_numbers_of_a_network_become_those_of_python() -> None:
+    """Half a float squared is 0, and JSON has neither."""
+    given: Any = {"extinction": np.float16(0.125), "standard_deviation": 0, "valid": np.bool_(True)}
+    diagnostics = {"horizon_row": np.float32(60)}
+    found = checked_estimate("mine", Estimate("mine", **given, diagnostics=diagnostics))
+    assert [type(one) for one in (found.extinction, found.standard_deviation, found.valid)] == [float, float, bool]
+    picture = Picture("a.png", 0.0, np.zeros((2, 2), np.uint8))
+    record = json.loads(next(record_lines(FrameEstimates(picture, (found,)))))
+    assert (record["visibility_m"], record["horizon_row"]) == (pytest.approx(math.log(20.0) / 0.125, rel=1e-5), 60.0)
 
 
 def test_beliefs() -> None:
@@ -144,6 +185,17 @@ def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(type(METRICS["motion"](None)), "result", lambda _: value)  # type: ignore[arg-type]  # unused
     with pytest.raises(InputError, match=f"^metric 'motion': .*{message}"):
         RunMetrics(names=["motion"]).summary()
+
+
+def test_numbers_of_numpy_are_metrics() -> None:
+    found = checked_values("mine", {"a": np.int64(3), "b": {"c": np.float32(0.5)}, "d": None, "e": "word"})
+    assert json.dumps(found) == '{"a": 3, "b": {"c": 0.5}, "d": null, "e": "word"}'
+
+
+def test_a_metric_does_not_take_the_key_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(type(METRICS["comfort"](None)), "result", lambda _: {"duration_s": 1.0})  # type: ignore[arg-type]  # unused
+    with pytest.raises(InputError, match=r"^metric 'comfort': .* another metric has the key 'duration_s'"):
+        RunMetrics(names=["motion", "comfort"]).summary()
 
 
 def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -193,3 +193,5 @@ def test_mistakes_say_what_is_allowed() -> None:
         restore_contrast(GREY, DEEP, K)
     with pytest.raises(InputError, match="of 12 bits are 0 … 4095, got 5000"):
         restore_contrast(np.full((120, 160), 5000, np.uint16), DEEP, K)
+    with pytest.raises(InputError, match="16 bits and no value above 4000: write `bits: 12`"):
+        restore_contrast(np.full((120, 160), 4000, np.uint16), CAMERA, K)

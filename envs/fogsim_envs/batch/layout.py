@@ -1,10 +1,11 @@
 """Arrays that hold many episodes at once, and the numbers that kernels share with the task on SUMO."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range
 from fogsim.fusion.grid_filter import LOG_HIGH, LOG_LOW
 from fogsim.traffic import SPEED_CHOICES
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE, speed_share
@@ -142,7 +143,7 @@ class RuleConstants(NamedTuple):
     """
 
     quantile: float = 0.25
-    fallback: float = np.inf
-    widest: float = 0.7
-    sight_share: float = 1.0
-    hold: float = 3.0
+    fallback: Annotated[float, Range(0.0, np.inf, "m/s")] = np.inf
+    widest: Annotated[float, Range(0.01, 10.0)] = 0.7
+    sight_share: Annotated[float, Range(0.01, 1.0)] = 1.0
+    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 3.0

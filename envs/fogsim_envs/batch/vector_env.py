@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME
-from fogsim.core.parameters import Range, checked_parameters
+from fogsim.core.parameters import Range, checked_parameters, parameter_mistakes
 from fogsim.errors import InputError
 from fogsim_envs.actions import checked_action
 from fogsim_envs.batch.beginning_kernels import begin
@@ -22,6 +22,7 @@ from fogsim_envs.batch.drive_kernels import LIMIT, advance
 from fogsim_envs.batch.layout import (
     COLLISION,
     DRAWN,
+    DRIVERS,
     ENDINGS,
     KNOWN_QUANTILES,
     MOST_DEMAND,
@@ -111,11 +112,19 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
                 f"scenario_distribution.demand: expected at most {MOST_DEMAND:g} vehicles/h, since at most "
                 f"{OTHERS - 1} vehicles are in traffic, got {most:g}; fogsim/FogAdvisoryFast-v2 takes more"
             )
+        own = [one for one, weight in self._scenes.drivers.items() if weight > 0.0 and one not in DRIVERS]
+        if own:
+            raise InputError(
+                f"scenario_distribution.drivers: expected those of {', '.join(DRIVERS)}, which the kernel has, got "
+                f"{own[0]!r}; fogsim/FogAdvisoryFast-v2 takes others"
+            )
         self.reward_weights = reward_weights or TaskWeights()
         self._weights = np.array([getattr(self.reward_weights, name) for name in TERMS])
         table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()
+        for name, mistake in parameter_mistakes(RuleConstants, self._rule._asdict()):
+            raise InputError(f"rule.{name}: {mistake}")
         if self._rule.quantile not in KNOWN_QUANTILES:
             raise InputError(f"rule.quantile: expected one of {KNOWN_QUANTILES}, got {self._rule.quantile!r}")
         self._episodes = Episodes.empty(num_envs)

@@ -19,7 +19,7 @@ from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import AdvisedDriving, spread_advice
 from fogsim.simulation.ego.view_rendering import prepare_lamplight
 from fogsim.traffic import SPEED_CHOICES
-from fogsim.traffic.drivers.speed_choice import speed_share
+from fogsim.traffic.drivers.speed_choice import checked_choice, speed_share
 from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
@@ -45,7 +45,7 @@ class _OwnDriver:
     """A driver who goes by the advice, or by an own choice of speed where that is lower."""
 
     def __init__(self, choice: str) -> None:
-        self._choice = SPEED_CHOICES[choice]()
+        self._choice = checked_choice(choice, SPEED_CHOICES[choice]())
 
     def follow(self, command: Command, step: Step) -> Command:
         """Command that the vehicle gets."""

@@ -139,7 +139,7 @@ class EpisodeSource:
         seed, own = numbered(rng, self._split)
         stated = choice.stated_episode
         if stated is not None and stated.seed is not None:
-            seed, own = stated.seed, np.random.default_rng(stated.seed)
+            seed, own = int(stated.seed), np.random.default_rng(stated.seed)
         named = self._scenarios[int(own.integers(len(self._scenarios)))]
         is_replaced = self._is_own and choice.scenario is not None
         defaults, scenes = (_NO_DEFAULTS, None) if is_replaced else (self._defaults, self._scenes)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from fogsim.core.parameters import parameter_mistakes, paths_in
+from fogsim.core.parameters import checked_parameters, parameter_mistakes, paths_in
 from fogsim.core.registry.guard import guarded
 from fogsim.core.registry.user_code import (
     MayImport,
@@ -173,6 +173,7 @@ def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **
     return factory(*arguments, **options)
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class MethodConfig:
     """A method of a registry, and its parameters.

@@ -98,7 +98,8 @@ def load_track(path: Path) -> Track:
     readers = {".gpx": _gpx_points, ".csv": _csv_points}
     if path.suffix.lower() not in readers:
         raise InputError(f"--track {path}: expected a name that ends in .gpx or .csv")
-    points = list(readers[path.suffix.lower()](path))
+    # Receivers write 0, 0 as long as they have no position.
+    points = [one for one in readers[path.suffix.lower()](path) if one[1:3] != (0.0, 0.0)]
     points = [one for number, one in enumerate(points) if number == 0 or one[0] != points[number - 1][0]]
     if len(points) < 2:
         raise InputError(f"--track {path}: expected two positions with different times or more, got {len(points)}")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ def _first_row(estimates: Sequence[Estimate], key: str) -> float | None:
 def found_row(estimate: Estimate, key: str) -> float | None:
     """Row in the diagnostics of an estimate; None if there is none."""
     row = estimate.diagnostics.get(key)
-    return float(row) if isinstance(row, int | float) and math.isfinite(row) else None
+    return float(row) if isinstance(row, Real) and math.isfinite(row) else None
 
 
 def _mark(draw: ImageDraw.ImageDraw, sides: tuple[int, int], y: float, label: str, colour: Colour) -> None:

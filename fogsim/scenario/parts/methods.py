@@ -22,7 +22,7 @@ from fogsim.simulation.run_config import (
     check_ego,
 )
 from fogsim.traffic import SPEED_CHOICES, Compliance, DriverSetup, DriverSight
-from fogsim.traffic.drivers.speed_choice import CheckedChoice, SpeedChoice
+from fogsim.traffic.drivers.speed_choice import SpeedChoice, checked_choice
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Display, Stretch, StretchAdvice
 
@@ -151,7 +151,7 @@ def _speed_choice(scenario: ScenarioFile) -> SpeedChoice:
     """How fast drivers drive in fog; results of a user's class are checked."""
     written = scenario.drivers.speed_choice
     made = method(scenario, written).make(SPEED_CHOICES)
-    return made if type(made) in SPEED_CHOICES.values() else CheckedChoice(written.method, made)
+    return checked_choice(written.method, made)
 
 
 def _compliance(written: ComplianceSection) -> Compliance:

@@ -20,7 +20,7 @@ from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.values import Display
-from fogsim.values.result_checks import checked_speed
+from fogsim.values.result_checks import checked_share, checked_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,6 +243,16 @@ class CheckedChoice:
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
         return checked_speed(self.name, self.choice(visibility))
+
+    def share(self, visibility: float) -> float:
+        """Share of the speed in clear air, 1 for a choice without a method ``share`` [-] (`visibility` [m])."""
+        return checked_share(self.name, speed_share(self.choice, visibility))
+
+
+def checked_choice(name: str, choice: SpeedChoice) -> SpeedChoice:
+    """A choice of speed whose results are checked unless it is FogSim's own."""
+    is_own = type(choice) in (Unaffected, WithinSight, TooFast, ObservedSpeed)
+    return choice if is_own else CheckedChoice(name, choice)
 
 
 SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(

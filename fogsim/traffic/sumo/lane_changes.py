@@ -8,6 +8,7 @@ from the old lane to the new one; all that SUMO computes with (gaps, speeds, col
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,16 @@ class _Glide:
         return left, self.rate * rest * (1.0 - 3.0 * s) - 6.0 * self.offset / self.duration * s * rest
 
 
+class _Before(NamedTuple):
+    """What is compared with the next state, in arrays of its own: whoever gets a state may change its arrays."""
+
+    time: float
+    ids: tuple[str, ...]
+    lane: tuple[str, ...]
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+
 class LaneChangeSmoothing:
     """Lets vehicles that change lane glide to it: a cubic from their place and sideways speed to rest in the new lane.
 
@@ -67,7 +78,7 @@ class LaneChangeSmoothing:
     """
 
     def __init__(self) -> None:
-        self._last: TrafficState | None = None
+        self._last: _Before | None = None
         self._glides: dict[str, _Glide] = {}
         self._wanted: dict[str, float] = {}
 
@@ -77,14 +88,15 @@ class LaneChangeSmoothing:
 
     def smoothed(self, state: TrafficState) -> TrafficState:
         """The state as it is to be seen; the states of one run are to be given in their order."""
-        last, self._last = self._last, state
+        last = self._last
+        self._last = _Before(state.time, state.ids, state.lane, state.position.copy(), state.heading.copy())
         if last is not None:
             changed = _lane_changed(last, state)
             if changed:
                 self._begin(last, state, changed)
         return self._glided(state) if self._glides else state
 
-    def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
+    def _begin(self, last: _Before, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
         for (_, row), jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
             if _LEAST_JUMP <= abs(jump) <= _LARGEST_JUMP:
@@ -112,7 +124,7 @@ class LaneChangeSmoothing:
         return replace(state, position=position, heading=heading) if self._glides else state
 
 
-def _lane_changed(last: TrafficState, state: TrafficState) -> list[tuple[int, int]]:
+def _lane_changed(last: _Before, state: TrafficState) -> list[tuple[int, int]]:
     """Rows in both states of vehicles on lanes whose lane is another, be it only the next along the road."""
     before: Sequence[int] = range(len(last.ids))
     if state.ids != last.ids:
@@ -125,7 +137,7 @@ def _lane_changed(last: TrafficState, state: TrafficState) -> list[tuple[int, in
     return [(old, new) for new, (old, lane) in both if lane and lanes[old] not in ("", lane)]
 
 
-def _sideways_jumps(last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+def _sideways_jumps(last: _Before, state: TrafficState, changed: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
     """How far vehicles have moved to their left (n,) [m]; ``inf`` for those who were not driven there."""
     old, new = np.array(changed).T
     moved = state.position[new, :2] - last.position[old, :2]

@@ -77,9 +77,7 @@ class _Constants(NamedTuple):
     ids: Sequence[str]
     ego: int | None
     kinds: tuple[str, ...]
-    length: NDArray[np.float64]
-    width: NDArray[np.float64]
-    height: NDArray[np.float64]
+    sizes: NDArray[np.float64]  # (3, n): Length, width and height
     paint: NDArray[np.float64]
     speed_factor: NDArray[np.float64]
     top_speed: NDArray[np.float64]
@@ -168,6 +166,8 @@ class VehicleReader:
         off_lanes = _off_lanes(now)
         constants = self._constants_of(now.ids)
         ego = constants.ego
+        # Whoever gets a state may change its arrays.
+        (length, width, height), paint = constants.sizes.copy(), constants.paint.copy()
         lamps = self._lamps(now.signals)
         lit_lamps = [] if ego is None else [(ego, ego_lamps)]
         lit_lamps += [(now.ids.index(other), lit) for other, lit in (lamps_of or {}).items() if other in now.ids]
@@ -181,12 +181,12 @@ class VehicleReader:
             heading=np.radians(90.0 - now.angle),
             speed=now.speed,
             acceleration=now.acceleration,
-            length=constants.length,
-            width=constants.width,
-            height=constants.height,
+            length=length,
+            width=width,
+            height=height,
             lane=now.lane,
             lamps=lamps,
-            paint=constants.paint,
+            paint=paint,
             grade=np.radians(now.slope),
             free_speed=self._free_speeds(now.lane, constants),
             advised_speed=advised_speeds(now.ids, heard or {}),
@@ -201,7 +201,7 @@ class VehicleReader:
         if lanes != self._free[0] or constants is not self._free[1]:
             limits = np.fromiter(map(self._lane_limit, lanes), np.float64, len(lanes)) * constants.speed_factor
             self._free = lanes, constants, np.minimum(limits, constants.top_speed)
-        return self._free[2]
+        return self._free[2].copy()
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
         """Lamps of all by their own signals; computed again when a signal has changed."""
@@ -214,9 +214,9 @@ class VehicleReader:
         if self._constants is None or self._constants.ids is not ids:
             kinds, numbers = self._bodies.look_up(ids)
             # Each in memory of its own, as those who read them in each step need it.
-            length, width, height, *_, speed_factor, top_speed = np.ascontiguousarray(numbers.T)
-            paint, ego = np.ascontiguousarray(numbers[:, 3:6]), None if self._ego is None else ids.index(self._ego)
-            self._constants = _Constants(ids, ego, kinds, length, width, height, paint, speed_factor, top_speed)
+            columns, ego = np.ascontiguousarray(numbers.T), None if self._ego is None else ids.index(self._ego)
+            paint = np.ascontiguousarray(numbers[:, 3:6])
+            self._constants = _Constants(ids, ego, kinds, columns[:3], paint, columns[6], columns[7])
         return self._constants
 
     def _dynamic_state(self) -> _DynamicState:

@@ -130,7 +130,7 @@ class EgoDriving:
             # Another vehicle may have come under the ego's name.
             modes.hold(ego, _NO_CHECKS)
         self._is_driven = True
-        now, acceleration = float(vehicles.getSpeed(ego)), control.acceleration
+        now, acceleration = float(vehicles.getSpeed(ego)), float(control.acceleration)
         if control.brakes_with_driver and acceleration < 0.0:
             acceleration = min(acceleration, self._planned_by_driver(ego))
         self._planned_from = now

@@ -101,7 +101,18 @@ def largest_value(image: Pixels, camera: Camera) -> float:
         if camera.bits > 8:
             raise InputError(f"the image has 8 bits, the camera {camera.bits}; they must be the same")
         return 255.0
-    full = 2 ** (camera.bits if camera.bits > 8 else 16) - 1
-    if image.size and int(image.max()) > full:
-        raise InputError(f"pixel values of a camera of {camera.bits} bits are 0 … {full}, got {int(image.max())}")
+    full, most = 2 ** (camera.bits if camera.bits > 8 else 16) - 1, int(image.max(initial=0))
+    if most > full:
+        raise InputError(f"pixel values of a camera of {camera.bits} bits are 0 … {full}, got {most}")
+    if camera.bits == 8:
+        refuse_short_range(most)
     return float(full)
+
+
+def refuse_short_range(most: int) -> None:
+    """Refuse an image of 16 bits whose largest value shows that its camera has 10 or 12."""
+    if 2**8 <= most < 2**12:
+        raise InputError(
+            f"the image has 16 bits and no value above {most}: write `bits: {10 if most < 2**10 else 12}` in the "
+            "camera file if it is the camera's, or spread the values over 0 … 65535"
+        )

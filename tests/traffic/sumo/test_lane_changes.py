@@ -66,7 +66,8 @@ def ego_at(time: float, x: float, y: float, lane: str, heading: float = 0.0) -> 
 
 def test_the_egos_pose_follows_a_smoothstep() -> None:
     smoothing = LaneChangeSmoothing()
-    smoothing.smoothed(ego_at(0.0, 0.0, -3.0, "road_0"))
+    first = smoothing.smoothed(ego_at(0.0, 0.0, -3.0, "road_0"))
+    first.position[:] = 0.0  # as its user may
     begun = smoothing.smoothed(ego_at(0.1, 2.0, 0.0, "road_1"))
     assert (begun.position[0].tolist(), begun.heading[0]) == ([2.0, -3.0, 0.0], 0.0)
     half = smoothing.smoothed(ego_at(0.1 + 0.5 * DURATION, 32.0, 0.0, "road_1"))

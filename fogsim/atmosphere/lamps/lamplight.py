@@ -10,16 +10,23 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.frustum import grid_depths
 from fogsim.atmosphere.fog.koschmieder_kernels import (
     ENDLESS,
-    bilinear,
-    fill_channels,
     interpolate_rows,
-    repeat_channels,
     transmittances,
 )
 from fogsim.atmosphere.fog.medium import is_uniform_below, medium_of
 from fogsim.atmosphere.lamps.lamp_tables import FOLD, SIZE, lamp_table
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
+from fogsim.atmosphere.lamps.pieces import (
+    choose_pixels,
+    cut_lengths,
+    piece_length,
+    read_between,
+    row_pieces,
+    row_points,
+    split_places,
+    spread_over_row,
+    values_of_row,
+)
 from fogsim.atmosphere.lamps.veil import (
     FOLD_DISTANCE,
     INTERVALS,
@@ -42,11 +49,9 @@ _FOLD = np.float32(FOLD)
 _MIDDLE = np.float32(0.5 * (SIZE - 1))
 _LAST_CELL = np.float32(SIZE - 1.001)
 _LEAST = np.float32(1e-6)
-_NEXT = np.uint32(1)
+_FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 
 _Floats = NDArray[np.float32]
-_ChoiceRows = tuple[_Floats, _Floats, NDArray[np.uint32], _Floats, NDArray[np.uint64], NDArray[np.bool_]]
-_LightRows = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats]
 
 
 class LampGroup(NamedTuple):
@@ -69,37 +74,66 @@ class VeilGrid(NamedTuple):
     attenuation: NDArray[np.float32]
 
 
+class _Places(NamedTuple):
+    """Places of a row's pixels along one axis of a table."""
+
+    cell: NDArray[np.int32]  # (n,): Number of the value before each
+    share: NDArray[np.float32]  # (n,): How far it is on to the next
+
+
+class _Work(NamedTuple):
+    """Memory for what is computed of a row's pixels."""
+
+    row: _Places
+    column: _Places
+    weight: NDArray[np.float32]
+    kept: NDArray[np.float32]
+    power: NDArray[np.int32]
+    cell: NDArray[np.int32]
+
+
 @kernel
 def _read_profiles(
     count: np.uint64,
     values: NDArray[np.float32],
-    nodes: np.uint32,
-    left: NDArray[np.uint32],
-    aside: NDArray[np.float32],
-    node: NDArray[np.float32],
+    grid: VeilGrid,
+    pixel: _Places,
+    node: _Places,
+    cell: NDArray[np.int32],
     out: NDArray[np.float32],
 ) -> None:
     """Value for each chosen pixel of a row, linear between two rays and two nodes."""
     for u in range(count):
-        n = np.uint32(node[u])
-        along, share = node[u] - np.float32(n), aside[u]
-        a = left[u] + n
-        b = a + nodes
-        near = values[a] + (values[b] - values[a]) * share
-        far = values[a + _NEXT] + (values[b + _NEXT] - values[a + _NEXT]) * share
-        out[u] = near + (far - near) * along
+        cell[u] = pixel.cell[u] + node.cell[u]
+    read_between(count, values, int(grid.nodes), cell, pixel.share, node.share, out)
 
 
 @kernel
 def _add_lamplight(
     colour: NDArray[np.float32],
     scattered: NDArray[np.float32],
-    shone: NDArray[np.float32],
+    light: NDArray[np.float32],
     response: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    for j in range(out.shape[0]):
-        out[j] += colour[j] * (scattered[j] + shone[j] * response[j])
+    """Add what fog scatters, and what surfaces return of light, to a row (`response`, `out` (3 · n,))."""
+    red, green, blue = colour[0], colour[1], colour[2]
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        veil, shone, at = scattered[u], light[u], _THREE * u
+        out[at] += red * (veil + shone * response[at])
+        out[at + _FIRST] += green * (veil + shone * response[at + _FIRST])
+        out[at + _SECOND] += blue * (veil + shone * response[at + _SECOND])
+
+
+@kernel
+def _add_veil(colour: NDArray[np.float32], scattered: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Add what fog scatters to a row (`out` (3 · n,))."""
+    red, green, blue = colour[0], colour[1], colour[2]
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        veil, at = scattered[u], _THREE * u
+        out[at] += red * veil
+        out[at + _FIRST] += green * veil
+        out[at + _SECOND] += blue * veil
 
 
 @kernel
@@ -109,27 +143,28 @@ def _table_places(
     across: NDArray[np.float32],
     start_along: np.float32,
     start_across: np.float32,
-    out: NDArray[np.float32],
+    stride: int,
+    out: _Places,
 ) -> None:
     """Where in a beam's table a row's pixels are, by one of the two tangents."""
+    share = out.share
     for u in range(count):
         x, y = max(along[u] - start_along, _LEAST), across[u] - start_across
-        out[u] = min((y / (_FOLD * x + abs(y)) + _ONE) * _MIDDLE, _LAST_CELL)
+        share[u] = min((y / (_FOLD * x + abs(y)) + _ONE) * _MIDDLE, _LAST_CELL)
+    split_places(count, share, stride, out.cell, share)
 
 
 @kernel
 def _distance_weights(
     count: np.uint64,
-    forward: NDArray[np.float32],
-    right: NDArray[np.float32],
-    up: NDArray[np.float32],
+    points: NDArray[np.float32],
     lamp: NDArray[np.float32],
     length: NDArray[np.float32],
     attenuation: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
     """e^(κ (r − s)) / s² for a row's pixels; the ways r to the eye and s to the lamp differ by little."""
-    lamp_forward, lamp_right, lamp_up = lamp[0], lamp[1], lamp[2]
+    forward, right, up, lamp_forward, lamp_right, lamp_up = points[0], points[1], points[2], lamp[0], lamp[1], lamp[2]
     for u in range(count):
         x, y, z = forward[u] - lamp_forward, right[u] - lamp_right, up[u] - lamp_up
         square = x * x + y * y + z * z
@@ -139,35 +174,14 @@ def _distance_weights(
 
 
 @kernel
-def _add_intensity(
-    count: np.uint64,
-    table: NDArray[np.float32],
-    row: NDArray[np.float32],
-    column: NDArray[np.float32],
-    weight: NDArray[np.float32],
-    out: NDArray[np.float32],
-) -> None:
-    """Add to a row's pixels the intensity of a lamp times their weight."""
-    for u in range(count):
-        out[u] += bilinear(table, row[u], column[u]) * weight[u]
-
-
-@kernel
-def _column_places(
-    count: np.uint64,
-    pixel: NDArray[np.float32],
-    columns: int,
-    cells: int,
-    nodes: int,
-    left: NDArray[np.uint32],
-    aside: NDArray[np.float32],
-) -> None:
+def _column_places(count: np.uint64, pixel: NDArray[np.float32], columns: int, grid: VeilGrid, out: _Places) -> None:
     """For each chosen pixel, where the profile of the ray left of it begins, and how far it is on to the next."""
-    scale = np.float32(cells) / np.float32(max(columns - 1, 1))
+    scale, last = np.float32(grid.columns - 1) / np.float32(max(columns - 1, 1)), np.int32(grid.columns - 2)
+    nodes = np.int32(grid.nodes)
     for u in range(count):
         place = pixel[u] * scale
-        cell = min(np.int32(place), np.int32(cells - 1))
-        left[u], aside[u] = np.uint32(cell * np.int32(nodes)), place - np.float32(cell)
+        whole = min(np.int32(place), last)
+        out.cell[u], out.share[u] = whole * nodes, place - np.float32(whole)
 
 
 @kernel
@@ -177,73 +191,55 @@ def _light_surfaces(
     length: NDArray[np.float32],
     mean: NDArray[np.float32],
     lamps: LampGroup,
-    scratch: NDArray[np.float32],
-    power: NDArray[np.int32],
+    work: _Work,
     light: NDArray[np.float32],
 ) -> None:
     """Light of all lamps on what chosen pixels see, times its transmittance to the eye [lx]."""
-    forward, right, up = points[0], points[1], points[2]
-    column, row, weight, kept = scratch[0], scratch[1], scratch[2], scratch[3]
+    row, column, weight, kept, cell = work.row, work.column, work.weight, work.kept, work.cell
     for u in range(count):
         light[u] = _ZERO
     places = lamps.places
     for i in range(places.shape[0]):
-        _table_places(count, forward, right, places[i, 0], places[i, 1], column)
+        _table_places(count, points[0], points[1], places[i, 0], places[i, 1], 1, column)
         if i == 0 or places[i, 0] != places[i - 1, 0] or places[i, 2] != places[i - 1, 2]:
-            _table_places(count, forward, up, places[i, 0], places[i, 2], row)
-        _distance_weights(count, forward, right, up, places[i], length, mean, weight)
-        _add_intensity(count, lamps.tables[i], row, column, weight, light)
+            _table_places(count, points[0], points[2], places[i, 0], places[i, 2], SIZE, row)
+        for u in range(count):
+            cell[u] = row.cell[u] + column.cell[u]
+        read_between(count, lamps.tables[i].reshape(-1), SIZE, cell, row.share, column.share, kept)
+        _distance_weights(count, points, places[i], length, mean, weight)
+        for u in range(count):
+            light[u] += kept[u] * weight[u]
     for u in range(count):
         weight[u] = np.float32(2.0) * mean[u] * length[u]
-    transmittances(weight[:count], power, kept)
+    transmittances(weight[:count], work.power, kept)
     for u in range(count):
         light[u] *= kept[u]
 
 
 @kernel
-def _any_lit(response: NDArray[np.float32]) -> bool:
-    """Whether a row (cols · 3) reacts to light at all. Bitwise, so that compilers emit vector instructions."""
-    lit = np.int32(0)
-    for j in range(response.shape[0]):
-        lit |= np.int32(response[j] > _ZERO)
-    return bool(lit != 0)
-
-
-@kernel
-def _cut_lengths(distance: NDArray[np.float32], length: NDArray[np.float32]) -> None:
-    """Distances of a row, endless ones cut to a length that can be computed with."""
-    for u in range(length.shape[0]):
-        length[u] = min(distance[u], np.float32(ENDLESS))
-
-
-@kernel
-def _node_places(
-    count: np.uint64, length: NDArray[np.float32], last: np.float32, fold: np.float32, node: NDArray[np.float32]
-) -> None:
-    """Positions between the nodes of their rays (the last is `last`) of the surfaces that the chosen pixels see."""
+def _node_places(count: np.uint64, length: NDArray[np.float32], grid: VeilGrid, out: _Places) -> None:
+    """Positions between the nodes of their rays of the surfaces that the chosen pixels see."""
+    last, share = np.float32(grid.nodes - 1), out.share
     for u in range(count):
-        node[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + fold))
+        share[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + grid.fold))
+    split_places(count, share, 1, out.cell, share)
 
 
 @kernel
-def _choice_rows(columns: int, cells: int, nodes: int) -> _ChoiceRows:
-    """Rows for the pixels that are chosen: columns, distances, profiles left of them and how far on, and pieces.
-
-    They begin as if every pixel were chosen.
-    """
-    pixel, chosen = np.arange(columns).astype(np.float32), np.empty(columns, np.float32)
-    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
-    _column_places(np.uint64(columns), pixel, columns, cells, nodes, left, aside)
-    return pixel, chosen, left, aside, np.empty(columns, np.uint64), np.empty(columns, np.bool_)
+def _places(columns: int) -> _Places:
+    return _Places(np.empty(columns, np.int32), np.empty(columns, np.float32))
 
 
 @kernel
-def _light_rows(columns: int) -> _LightRows:
-    """Rows for what is scattered and what shines on surfaces: of the chosen pixels, of every pixel, of each channel."""
-    few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
-    veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
-    return few_scattered, few_light, scattered, light, veiled, shone
+def _work_for(columns: int) -> _Work:
+    return _Work(
+        _places(columns),
+        _places(columns),
+        np.empty(columns, np.float32),
+        np.empty(columns, np.float32),
+        np.empty(columns, np.int32),
+        np.empty(columns, np.int32),
+    )
 
 
 @kernel
@@ -263,49 +259,46 @@ def add_own_light(
     Takes `distance` (rows, cols) [m], `response` (rows, cols · 3) [cd/m² per lx], `ray_map` (3, 3), `out` (rows, cols ·
     3) [cd/m²].
     """
-    nodes, fold, veil, attenuation = grid.nodes, grid.fold, grid.veil, grid.attenuation
+    veil, attenuation = grid.veil, grid.attenuation
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
-    grid_rows, cells, last = max(veil.shape[0], attenuation.shape[0]), grid.columns - 1, np.float32(nodes - 1)
-    profiles, node = np.zeros(grid.columns * int(nodes), np.float32), np.empty(columns, np.float32)
-    points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
-    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    bent, power = np.empty(columns, np.uint8), np.empty(columns, np.int32)
-    mean, channels = np.full(columns, attenuation[0, 0]), np.empty(3 * columns, np.float32)
-    no_response, n = np.zeros(3 * columns, np.float32), np.uint64(columns)
-    pixel, chosen, left, aside, first, even = _choice_rows(columns, cells, int(nodes))
-    few_scattered, few_light, scattered, light, veiled, shone = _light_rows(columns)
-    fill_channels(lamps.colour, channels)
-    if step == 1:
-        # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
-        chosen, scattered, light = length, few_scattered, few_light
+    grid_rows = max(veil.shape[0], attenuation.shape[0])
+    profiles, points = np.zeros(grid.columns * int(grid.nodes), np.float32), np.empty((3, columns), np.float32)
+    length, mean = np.empty(columns, np.float32), np.full(columns, attenuation[0, 0])
+    pieces, work, pixel, node = row_pieces(columns, step), _work_for(columns), _places(columns), _places(columns)
+    few_scattered, few_light = values_of_row(columns), values_of_row(columns)
+    # Where every pixel is chosen, what is found for the chosen ones is every pixel's.
+    scattered = few_scattered if step == 1 else values_of_row(columns)
+    light = few_light if step == 1 else values_of_row(columns)
+    _column_places(np.uint64(columns), pieces.pixel, columns, grid, pixel)
     for v in range(top, bottom):
-        lit = surfaces and _any_lit(response[v])
+        # The sky returns no light.
+        lit = cut_lengths(distance[v], np.float32(ENDLESS), length) and surfaces
         if clear and not lit:
             continue
-        _cut_lengths(distance[v], length)
+        n = choose_pixels(length, pieces)
+        chosen = pieces.length
         if step > 1:
-            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            _column_places(n, pixel, columns, cells, int(nodes), left, aside)
-        _node_places(n, chosen, last, fold, node)
+            _column_places(n, pieces.pixel, columns, grid, pixel)
+        _node_places(n, chosen, grid, node)
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:
             interpolate_rows(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
-            _read_profiles(n, profiles, nodes, left, aside, node, few_scattered)
+            _read_profiles(n, profiles, grid, pixel, node, work.cell, few_scattered)
             if step > 1:
-                spread_over_row(few_scattered, step, first, even, scattered)
-            repeat_channels(scattered, veiled)
-        if lit:
-            if not uniform:
-                interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
-                _read_profiles(n, profiles, nodes, left, aside, node, mean)
-            row_points(n, ray_map, v, pixel, chosen, points)
-            _light_surfaces(n, points, chosen, mean, lamps, scratch, power, few_light)
-            if step > 1:
-                spread_over_row(few_light, step, first, even, light)
-            repeat_channels(light, shone)
-        _add_lamplight(channels, veiled, shone, response[v] if lit else no_response, out[v])
+                spread_over_row(few_scattered, pieces, scattered)
+        if not lit:
+            _add_veil(lamps.colour, scattered, out[v])
+            continue
+        if not uniform:
+            interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
+            _read_profiles(n, profiles, grid, pixel, node, work.cell, mean)
+        row_points(n, ray_map, v, pieces.pixel, chosen, points)
+        _light_surfaces(n, points, chosen, mean, lamps, work, few_light)
+        if step > 1:
+            spread_over_row(few_light, pieces, light)
+        _add_lamplight(lamps.colour, scattered, light, response[v], out[v])
 
 
 def _add_to_band(

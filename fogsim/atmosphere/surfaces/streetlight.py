@@ -8,10 +8,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, fill_channels, repeat_channels
 from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
-from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
+from fogsim.atmosphere.lamps.pieces import (
+    choose_pixels,
+    cut_lengths,
+    piece_length,
+    read_between,
+    row_pieces,
+    row_points,
+    split_places,
+    spread_over_row,
+    values_of_row,
+)
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.core.jit import Bands, kernel
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
@@ -20,6 +29,7 @@ from fogsim.values.pinhole import ray_from_pixel
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
 _LIT, _SURROUNDED = np.uint8(1), np.uint8(2)
+_NONE, _FIRST, _SECOND, _THREE = np.int32(0), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 class Beams(NamedTuple):
@@ -107,15 +117,6 @@ def _add_lamp_illuminance(
 
 
 @kernel
-def _any_near(distance: NDArray[np.float32]) -> bool:
-    """Whether a row sees anything that a lamp of the map may light."""
-    near = False
-    for u in range(distance.shape[0]):
-        near |= distance[u] < _FARTHEST
-    return near
-
-
-@kernel
 def _places_on_map(
     count: np.uint64, points: NDArray[np.float32], eye: EyeOnMap, ground: GroundLight, places: NDArray[np.float32]
 ) -> None:
@@ -187,33 +188,45 @@ def _read_map(
     above: NDArray[np.float32],
     eye: EyeOnMap,
     ground: GroundLight,
+    cells: NDArray[np.int32],
     light: NDArray[np.float32],
 ) -> bool:
-    """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any."""
-    illuminance, tops, eye_height, x, y = ground.illuminance, ground.tops, eye.height, places[0], places[1]
-    any_light = False
+    """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any.
+
+    Takes `places` (2, n), which become shares of cells, `cells` (2, n) int32.
+    """
+    columns, tops, eye_height = ground.tops.shape[1], ground.tops.reshape(-1), eye.height
+    aside, down, column, cell = places[0], places[1], cells[0], cells[1]
+    split_places(count, aside, 1, column, aside)
+    split_places(count, down, columns, cell, down)
     for n in range(count):
-        light[n] = _ZERO
-        if x[n] < _ZERO:
-            continue
-        value = bilinear(illuminance, y[n], x[n])
-        if value > _ZERO:
-            top = tops[np.uint32(y[n]), np.uint32(x[n])]
-            light[n] = value * min(max(top - (eye_height + above[n]), _ZERO), _ONE)
-            any_light = True
-    return any_light
+        # Outside the map the place is −1, and nothing is read there.
+        is_inside = column[n] >= _NONE
+        cell[n] = cell[n] + column[n] if is_inside else _NONE
+        column[n] = np.int32(is_inside)
+    read_between(count, ground.illuminance.reshape(-1), columns, cell, down, aside, light)
+    for n in range(count):
+        aside[n] = tops[np.uint32(cell[n])]
+    found = _NONE
+    for n in range(count):
+        value = light[n] * min(max(aside[n] - (eye_height + above[n]), _ZERO), _ONE)
+        is_lit = (column[n] != _NONE) & (light[n] > _ZERO)
+        light[n] = value if is_lit else _ZERO
+        found |= np.int32(is_lit)
+    return bool(found != _NONE)
 
 
 @kernel
 def _light_row(
-    luminance: NDArray[np.float32],
-    light: NDArray[np.float32],
-    factor: NDArray[np.float32],
-    most: np.float32,
-    out: NDArray[np.float32],
+    luminance: NDArray[np.float32], light: NDArray[np.float32], reflection: Reflection, out: NDArray[np.float32]
 ) -> None:
-    for j in range(out.shape[0]):
-        out[j] = luminance[j] + min(luminance[j], most) * light[j] * factor[j]
+    """Add what surfaces return of the light on them to a row (`luminance`, `out` (3 · n,))."""
+    red, green, blue, most = reflection.factor[0], reflection.factor[1], reflection.factor[2], reflection.most
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        lit, at = light[u], _THREE * u
+        out[at] = luminance[at] + min(luminance[at], most) * lit * red
+        out[at + _FIRST] = luminance[at + _FIRST] + min(luminance[at + _FIRST], most) * lit * green
+        out[at + _SECOND] = luminance[at + _SECOND] + min(luminance[at + _SECOND], most) * lit * blue
 
 
 @kernel
@@ -234,34 +247,26 @@ def add_street_light(
     Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     columns = distance.shape[1]
-    points, light, few = (
-        np.empty((3, columns), np.float32),
-        np.empty(columns, np.float32),
-        np.empty(columns, np.float32),
-    )
-    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
-    lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    beams, places = ground.beams, np.empty((2, columns), np.float32)
-    cells = np.empty((2, 4 * columns), np.uint32)
-    fill_channels(reflection.factor, channels)
+    points, places = np.empty((3, columns), np.float32), np.empty((2, columns), np.float32)
+    cells, unlit = np.empty((2, columns), np.int32), np.empty((2, 4 * columns), np.uint32)
+    length, pieces = np.empty(columns, np.float32), row_pieces(columns, step)
+    few, beams = values_of_row(columns), ground.beams
+    light = few if step == 1 else values_of_row(columns)
     for v in range(top, bottom):
         any_light = False
-        if _any_near(distance[v]):
-            for u in range(columns):
-                length[u] = min(distance[v, u], _FARTHEST)
-            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            row_points(n, ray_map, v, pixel, chosen, points)
+        # The sky, and what no lamp of the map may light, are left out.
+        if cut_lengths(distance[v], _FARTHEST, length):
+            n = choose_pixels(length, pieces)
+            row_points(n, ray_map, v, pieces.pixel, pieces.length, points)
             _places_on_map(n, points, eye, ground, places)
             if len(beams.lamps):
-                found = _cells_to_light(n, places, ground.tops.shape[1], beams.known, cells)
-                _light_cells(cells, found, beams, ground)
-            any_light = _read_map(n, places, points[2], eye, ground, few)
+                found = _cells_to_light(n, places, ground.tops.shape[1], beams.known, unlit)
+                _light_cells(unlit, found, beams, ground)
+            any_light = _read_map(n, places, points[2], eye, ground, cells, few)
         if any_light:
-            spread_over_row(few, step, first, even, light)
-            repeat_channels(light, lit)
-            _light_row(luminance[v], lit, channels, reflection.most, out[v])
+            if step > 1:
+                spread_over_row(few, pieces, light)
+            _light_row(luminance[v], light, reflection, out[v])
         else:
             for j in range(3 * columns):
                 out[v, j] = luminance[v, j]

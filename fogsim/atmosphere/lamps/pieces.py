@@ -117,7 +117,8 @@ def _bent_within(
         for u in range(columns):
             out[u] = here[u] | here[u + further]
         source, span = target, span + further
-    return memory[source]
+    found: NDArray[np.uint8] = memory[source]
+    return found
 
 
 @kernel

@@ -76,20 +76,22 @@ class RoadGlow:
 
 def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSources:
     """The lit road before other vehicles as sources of light, one a pair of lamps."""
-    eye = np.asarray(pose.position, dtype=np.float64)
-    chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:_MOST]
-    roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
-    dense = extinction(fog, beams.position[chosen])[:, None]
-    kept = np.exp(-LOSS_OF_SPREAD_LIGHT * dense * roads[0].range_)
-    flux = np.array([road.flux for road in roads]) * kept * beams.scale[chosen, None]
-    total = flux.sum(axis=1)
-    ahead = (flux * np.array([road.middle[:, 0] for road in roads])).sum(axis=1) / total
-    heading = beams.heading[chosen]
-    rise = ahead * np.tan(beams.grade[chosen]) - beams.height[chosen]
-    position = beams.position[chosen] + np.array((ahead * np.cos(heading), ahead * np.sin(heading), rise)).T
-    way = eye - position
-    slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)
-    return _shining_up(position, ROAD_ALBEDO * total / math.pi, slant, _LIT_AREA * slant)
+    eye, places = pose.position, beams.position.tolist()
+    away = [math.dist(place, eye) for place in places]
+    chosen = sorted(range(len(places)), key=away.__getitem__)[:_MOST]
+    found, dense = [], extinction(fog, beams.position[chosen]).tolist()
+    for i, lost in zip(chosen, dense, strict=True):
+        (x, y, z), height, heading = places[i], float(beams.height[i]), float(beams.heading[i])
+        road = _lit_road(beams.kinds[beams.kind[i]], round(height, 2))
+        flux = road.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * lost * road.range_) * beams.scale[i]
+        total = float(flux.sum())
+        ahead = float((flux * road.middle[:, 0]).sum()) / total
+        rise = ahead * math.tan(beams.grade[i]) - height
+        position = (x + ahead * math.cos(heading), y + ahead * math.sin(heading), z + rise)
+        found.append((*position, total, max((eye[2] - position[2]) / math.dist(eye, position), 0.01)))
+    table = np.array(found)
+    slant = table[:, 4]
+    return _shining_up(table[:, :3], ROAD_ALBEDO * table[:, 3] / math.pi, slant, _LIT_AREA * slant)
 
 
 def _shining_up(

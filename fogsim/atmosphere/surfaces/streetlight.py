@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.pieces import (
     choose_pixels,
@@ -356,16 +355,10 @@ class StreetLight:
         else:
             middle, known = eye, None
         near = lamps.position[np.abs(lamps.position[:, :2] - middle).max(axis=1) < 0.5 * _CELLS * _CELL + REACH]
-        dense = _extinction_at(fog, near - (0.0, 0.0, 0.5 * lamps.height))
+        dense = extinction(fog, near - (0.0, 0.0, 0.5 * lamps.height))
         if known is None or np.any(np.abs(dense - known.extinction) > _CHANGED):
             known = self._map = _map_of(lamps, middle, near, dense)
         return known
-
-
-def _extinction_at(fog: FogField, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    if len(places) and is_uniform_below(fog, float(places[:, 2].max())):
-        return np.full(len(places), fog.extinction)
-    return extinction(fog, places)
 
 
 def _map_of(

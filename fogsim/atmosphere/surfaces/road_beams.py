@@ -21,6 +21,9 @@ _LOOKED_AHEAD = 60.0
 REACH, _HALF_WIDTH, STEP = 70.0, 20.0, 0.5
 """How far ahead and to either side a lamp lights the road, and the step of its pattern [m]."""
 
+_FADED = math.hypot(REACH, _HALF_WIDTH) + 2.0 * _CELL
+"""Distance from a lamp at which nothing is lit any more [m]."""
+
 _WHITEST = 0.95
 """Reflectance above which a surface must be a lamp [-]."""
 
@@ -83,7 +86,10 @@ def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
     which = np.array([alike.index(each[row]) for row in order])
     shape = (CELLS, CELLS)
     on_map = Beams(np.array([lamps[row] for row in order]), which, patterns, STEP, np.zeros(CELLS * CELLS, np.uint8))
-    return GroundLight(origin, _CELL, np.empty(shape, np.float32), np.empty(shape, np.float32), on_map)
+    farthest = max(math.dist(place, pose.position) for place in columns[0]) + _FADED
+    return GroundLight(
+        origin, _CELL, np.empty(shape, np.float32), np.empty(shape, np.float32), np.float32(farthest), on_map
+    )
 
 
 def _extinction_before(fog: FogField, beams: RoadBeams) -> NDArray[np.float64]:

@@ -26,7 +26,6 @@ from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
-_FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
 _LIT, _SURROUNDED = np.uint8(1), np.uint8(2)
 _NONE, _FIRST, _SECOND, _THREE = np.int32(0), np.uint64(1), np.uint64(2), np.uint64(3)
 
@@ -58,6 +57,7 @@ class GroundLight(NamedTuple):
     # columns to the east
     illuminance: NDArray[np.float32]
     tops: NDArray[np.float32]
+    farthest: np.float32  # Distance from the eye beyond which nothing is lit [m]
     beams: Beams
 
 
@@ -254,7 +254,7 @@ def add_street_light(
     for v in range(top, bottom):
         any_light = False
         # The sky, and what no lamp of the map may light, are left out.
-        if cut_lengths(distance[v], _FARTHEST, length):
+        if cut_lengths(distance[v], ground.farthest, length):
             n = choose_pixels(length, pieces)
             row_points(n, ray_map, v, pieces.pixel, pieces.length, points)
             _places_on_map(n, points, eye, ground, places)
@@ -302,6 +302,7 @@ REACH = 48.0
 """Distance along the ground beyond which a lamp lights nothing [m]; there it gives less than 0.02 lx."""
 
 _CELLS = 320
+_FARTHEST = 500.0  # half the diagonal of the map, and more [m]
 _STAY = 64.0  # the map moves on when the camera has left its middle by so much [m]
 _CHANGED = 0.002  # change of extinction beyond which the map is made again [1/m]
 _WHITEST = 0.95  # reflectance above which a surface must be a lamp
@@ -366,6 +367,8 @@ def _map_of(
 ) -> _Map:
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
-    light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops, Beams.none())
+    light = GroundLight(
+        middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops, np.float32(_FARTHEST), Beams.none()
+    )
     _add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
     return _Map(lamps, middle, dense, light)

@@ -16,18 +16,18 @@ from fogsim.atmosphere.lamps.pieces import (
     read_between,
     row_pieces,
     row_points,
-    split_places,
     spread_over_row,
     values_of_row,
 )
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
+from fogsim.core.exponential import exponential
 from fogsim.core.jit import Bands, kernel
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _LIT, _SURROUNDED = np.uint8(1), np.uint8(2)
-_NONE, _FIRST, _SECOND, _THREE = np.int32(0), np.uint64(1), np.uint64(2), np.uint64(3)
+_OUTSIDE, _FIRST, _SECOND, _THREE = np.int32(-1), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 class Beams(NamedTuple):
@@ -117,38 +117,51 @@ def _add_lamp_illuminance(
 
 @kernel
 def _places_on_map(
-    count: np.uint64, points: NDArray[np.float32], eye: EyeOnMap, ground: GroundLight, places: NDArray[np.float32]
+    count: np.uint64,
+    points: NDArray[np.float32],
+    eye: EyeOnMap,
+    ground: GroundLight,
+    cells: NDArray[np.int32],
+    shares: NDArray[np.float32],
 ) -> None:
-    """Columns and rows of a map (2, n) that chosen pixels see, at `points` (3, n) from the eye; -1 outside the map."""
+    """Cells of a map (n,) that chosen pixels see at `points` (3, n) from the eye, and how far on in them (2, n).
+
+    Outside the map the cell is −1.
+    """
     last_row, last_column = np.float32(ground.tops.shape[0] - 1.001), np.float32(ground.tops.shape[1] - 1.001)
-    east, north, per_metre, x, y = points[0], points[1], eye.cells_per_metre, places[0], places[1]
+    east, north, per_metre, down, aside = points[0], points[1], eye.cells_per_metre, shares[0], shares[1]
+    columns = np.int32(ground.tops.shape[1])
     for n in range(count):
-        column, row = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
-        is_inside = (column >= _ZERO) & (column < last_column) & (row >= _ZERO) & (row < last_row)
-        x[n], y[n] = column if is_inside else -_ONE, row
+        x, y = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
+        is_inside = (x >= _ZERO) & (x < last_column) & (y >= _ZERO) & (y < last_row)
+        x, y = x if is_inside else _ZERO, y if is_inside else _ZERO
+        column, row = np.int32(x), np.int32(y)
+        cells[n] = row * columns + column if is_inside else _OUTSIDE
+        down[n], aside[n] = y - np.float32(row), x - np.float32(column)
 
 
 @kernel
 def _cells_to_light(
-    count: np.uint64, places: NDArray[np.float32], columns: int, known: NDArray[np.uint8], cells: NDArray[np.uint32]
+    count: np.uint64, cells: NDArray[np.int32], columns: int, known: NDArray[np.uint8], unlit: NDArray[np.uint32]
 ) -> int:
-    """Find the cells about chosen pixels' places that are not lit yet (2, n); their count."""
-    x, y, found, width, before = places[0], places[1], np.uint64(0), np.uint32(columns), np.uint32(known.shape[0])
+    """Find the cells about those that chosen pixels see that are not lit yet (2, n); their count."""
+    found, width, before = np.uint64(0), np.uint32(columns), _OUTSIDE
     for n in range(count):
-        if x[n] < _ZERO:
+        seen = cells[n]
+        if seen == before:
             continue
-        column, row = np.uint32(x[n]), np.uint32(y[n])
-        first = np.uint32(row * width + column)
-        if first == before or known[first] & _SURROUNDED:
+        before = seen
+        if seen == _OUTSIDE:
             continue
-        before = first
+        first = np.uint32(seen)
+        if known[first] & _SURROUNDED:
+            continue
         known[first] |= _SURROUNDED
         for corner in range(4):
-            right, up = np.uint32(corner & 1), np.uint32(corner >> 1)
-            cell = first + right + up * width
+            cell = first + np.uint32(corner & 1) + np.uint32(corner >> 1) * width
             if not known[cell] & _LIT:
                 known[cell] |= _LIT
-                cells[0, found], cells[1, found] = column + right, row + up
+                unlit[0, found], unlit[1, found] = cell % width, cell // width
                 found += np.uint64(1)
     return int(found)
 
@@ -175,7 +188,7 @@ def _light_cells(cells: NDArray[np.uint32], count: int, beams: Beams, ground: Gr
             near = pattern[a, b] + (pattern[a, b + 1] - pattern[a, b]) * right
             far = pattern[a + 1, b] + (pattern[a + 1, b + 1] - pattern[a + 1, b]) * right
             way = math.sqrt(square + step**2 * (along**2 + (across - half) ** 2))
-            illuminance[row, column] += np.float32(lit * (near + (far - near) * down) * math.exp(loss * way))
+            illuminance[row, column] += np.float32(lit * (near + (far - near) * down) * exponential(loss * way))
             # Light fades from the height of the lamps to a metre above it.
             tops[row, column] = max(tops[row, column], np.float32(height + rise * along + 1.0))
 
@@ -183,36 +196,29 @@ def _light_cells(cells: NDArray[np.uint32], count: int, beams: Beams, ground: Gr
 @kernel
 def _read_map(
     count: np.uint64,
-    places: NDArray[np.float32],
+    cells: NDArray[np.int32],
+    shares: NDArray[np.float32],
     above: NDArray[np.float32],
     eye: EyeOnMap,
     ground: GroundLight,
-    cells: NDArray[np.int32],
     light: NDArray[np.float32],
 ) -> bool:
     """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any.
 
-    Takes `places` (2, n), which become shares of cells, `cells` (2, n) int32.
+    Takes `cells` (2, n), which `_places_on_map` sets the first row of, and `shares` (2, n).
     """
-    columns, tops, eye_height = ground.tops.shape[1], ground.tops.reshape(-1), eye.height
-    aside, down, column, cell = places[0], places[1], cells[0], cells[1]
-    split_places(count, aside, 1, column, aside)
-    split_places(count, down, columns, cell, down)
+    tops, seen, at, top, found = ground.tops.reshape(-1), cells[0], cells[1], shares[0], np.int32(0)
     for n in range(count):
-        # Outside the map the place is −1, and nothing is read there.
-        is_inside = column[n] >= _NONE
-        cell[n] = cell[n] + column[n] if is_inside else _NONE
-        column[n] = np.int32(is_inside)
-    read_between(count, ground.illuminance.reshape(-1), columns, cell, down, aside, light)
+        at[n] = max(seen[n], np.int32(0))
+    read_between(count, ground.illuminance.reshape(-1), ground.tops.shape[1], at, shares[0], shares[1], light)
     for n in range(count):
-        aside[n] = tops[np.uint32(cell[n])]
-    found = _NONE
+        top[n] = tops[np.uint32(at[n])]
     for n in range(count):
-        value = light[n] * min(max(aside[n] - (eye_height + above[n]), _ZERO), _ONE)
-        is_lit = (column[n] != _NONE) & (light[n] > _ZERO)
+        value = light[n] * min(max(top[n] - (eye.height + above[n]), _ZERO), _ONE)
+        is_lit = (seen[n] != _OUTSIDE) & (light[n] > _ZERO)
         light[n] = value if is_lit else _ZERO
         found |= np.int32(is_lit)
-    return bool(found != _NONE)
+    return bool(found != 0)
 
 
 @kernel
@@ -246,7 +252,7 @@ def add_street_light(
     Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     columns = distance.shape[1]
-    points, places = np.empty((3, columns), np.float32), np.empty((2, columns), np.float32)
+    points, shares = np.empty((3, columns), np.float32), np.empty((2, columns), np.float32)
     cells, unlit = np.empty((2, columns), np.int32), np.empty((2, 4 * columns), np.uint32)
     length, pieces = np.empty(columns, np.float32), row_pieces(columns, step)
     few, beams = values_of_row(columns), ground.beams
@@ -257,11 +263,11 @@ def add_street_light(
         if cut_lengths(distance[v], ground.farthest, length):
             n = choose_pixels(length, pieces)
             row_points(n, ray_map, v, pieces.pixel, pieces.length, points)
-            _places_on_map(n, points, eye, ground, places)
+            _places_on_map(n, points, eye, ground, cells[0], shares)
             if len(beams.lamps):
-                found = _cells_to_light(n, places, ground.tops.shape[1], beams.known, unlit)
+                found = _cells_to_light(n, cells[0], ground.tops.shape[1], beams.known, unlit)
                 _light_cells(unlit, found, beams, ground)
-            any_light = _read_map(n, places, points[2], eye, ground, cells, few)
+            any_light = _read_map(n, cells, shares, points[2], eye, ground, few)
         if any_light:
             if step > 1:
                 spread_over_row(few, pieces, light)

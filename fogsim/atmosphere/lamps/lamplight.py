@@ -58,7 +58,7 @@ class LampGroup(NamedTuple):
     """Lamps of one colour."""
 
     places: NDArray[np.float32]  # (n, 3): Where they are from the eye in the vehicle's axes (forward, right, up) [m]
-    tables: NDArray[np.float32]  # Their beams, sharp [cd]
+    tables: NDArray[np.float32]  # (n, SIZE²): Their beams, sharp, row by row [cd]
     colour: NDArray[np.float32]  # (3,): Linear colour of luminance 1
 
 
@@ -68,6 +68,9 @@ class VeilGrid(NamedTuple):
     columns: int  # Columns of the grid
     nodes: np.uint32  # Nodes of a ray, which lie evenly over r / (r + fold)
     fold: np.float32  # See `nodes` [m]
+    # ray_step, node_step: from a value to that of the next ray, and to that of the next node, one of which is 1
+    ray_step: int
+    node_step: int
     # (rows, columns · nodes): Veil from the eye to each node [cd/m²]; without rows in clear air
     veil: NDArray[np.float32]
     # (rows, columns · nodes): Mean extinction coefficient to each node; one entry where fog is even [1/m]
@@ -90,22 +93,31 @@ class _Work(NamedTuple):
     kept: NDArray[np.float32]
     power: NDArray[np.int32]
     cell: NDArray[np.int32]
+    profiles: NDArray[np.float32]
 
 
 @kernel
 def _read_profiles(
     count: np.uint64,
-    values: NDArray[np.float32],
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    share: np.float32,
     grid: VeilGrid,
     pixel: _Places,
     node: _Places,
-    cell: NDArray[np.int32],
+    work: _Work,
     out: NDArray[np.float32],
 ) -> None:
-    """Value for each chosen pixel of a row, linear between two rays and two nodes."""
+    """Value for each chosen pixel of a row between two rows of a grid, linear between two rays and two nodes."""
+    cell, begin, end = work.cell, np.int32(low.shape[0]), np.int32(0)
     for u in range(count):
         cell[u] = pixel.cell[u] + node.cell[u]
-    read_between(count, values, int(grid.nodes), cell, pixel.share, node.share, out)
+        begin, end = min(begin, node.cell[u]), max(end, node.cell[u])
+    # Node by node, only those that are seen are needed.
+    first, last = (begin, end + 2 * grid.node_step) if grid.ray_step == 1 else (0, low.shape[0])
+    interpolate_rows(low[first:last], high[first:last], share, work.profiles[first:last])
+    down, aside = (node, pixel) if grid.ray_step == 1 else (pixel, node)
+    read_between(count, work.profiles, max(grid.ray_step, grid.node_step), cell, down.share, aside.share, out)
 
 
 @kernel
@@ -177,11 +189,11 @@ def _distance_weights(
 def _column_places(count: np.uint64, pixel: NDArray[np.float32], columns: int, grid: VeilGrid, out: _Places) -> None:
     """For each chosen pixel, where the profile of the ray left of it begins, and how far it is on to the next."""
     scale, last = np.float32(grid.columns - 1) / np.float32(max(columns - 1, 1)), np.int32(grid.columns - 2)
-    nodes = np.int32(grid.nodes)
+    step = np.int32(grid.ray_step)
     for u in range(count):
         place = pixel[u] * scale
         whole = min(np.int32(place), last)
-        out.cell[u], out.share[u] = whole * nodes, place - np.float32(whole)
+        out.cell[u], out.share[u] = whole * step, place - np.float32(whole)
 
 
 @kernel
@@ -205,7 +217,7 @@ def _light_surfaces(
             _table_places(count, points[0], points[2], places[i, 0], places[i, 2], SIZE, row)
         for u in range(count):
             cell[u] = row.cell[u] + column.cell[u]
-        read_between(count, lamps.tables[i].reshape(-1), SIZE, cell, row.share, column.share, kept)
+        read_between(count, lamps.tables[i], SIZE, cell, row.share, column.share, kept)
         _distance_weights(count, points, places[i], length, mean, weight)
         for u in range(count):
             light[u] += kept[u] * weight[u]
@@ -222,7 +234,7 @@ def _node_places(count: np.uint64, length: NDArray[np.float32], grid: VeilGrid, 
     last, share = np.float32(grid.nodes - 1), out.share
     for u in range(count):
         share[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + grid.fold))
-    split_places(count, share, 1, out.cell, share)
+    split_places(count, share, grid.node_step, out.cell, share)
 
 
 @kernel
@@ -231,7 +243,7 @@ def _places(columns: int) -> _Places:
 
 
 @kernel
-def _work_for(columns: int) -> _Work:
+def _work_for(columns: int, grid: VeilGrid) -> _Work:
     return _Work(
         _places(columns),
         _places(columns),
@@ -239,6 +251,7 @@ def _work_for(columns: int) -> _Work:
         np.empty(columns, np.float32),
         np.empty(columns, np.int32),
         np.empty(columns, np.int32),
+        np.empty(grid.columns * int(grid.nodes), np.float32),
     )
 
 
@@ -263,9 +276,9 @@ def add_own_light(
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
     grid_rows = max(veil.shape[0], attenuation.shape[0])
-    profiles, points = np.zeros(grid.columns * int(grid.nodes), np.float32), np.empty((3, columns), np.float32)
-    length, mean = np.empty(columns, np.float32), np.full(columns, attenuation[0, 0])
-    pieces, work, pixel, node = row_pieces(columns, step), _work_for(columns), _places(columns), _places(columns)
+    points, length = np.empty((3, columns), np.float32), np.empty(columns, np.float32)
+    mean = np.full(columns, attenuation[0, 0])
+    pieces, work, pixel, node = row_pieces(columns, step), _work_for(columns, grid), _places(columns), _places(columns)
     few_scattered, few_light = values_of_row(columns), values_of_row(columns)
     # Where every pixel is chosen, what is found for the chosen ones is every pixel's.
     scattered = few_scattered if step == 1 else values_of_row(columns)
@@ -283,17 +296,16 @@ def add_own_light(
         _node_places(n, chosen, grid, node)
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
+        share = place - np.float32(upper)
         if not clear:
-            interpolate_rows(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
-            _read_profiles(n, profiles, grid, pixel, node, work.cell, few_scattered)
+            _read_profiles(n, veil[upper], veil[upper + 1], share, grid, pixel, node, work, few_scattered)
             if step > 1:
                 spread_over_row(few_scattered, pieces, scattered)
         if not lit:
             _add_veil(lamps.colour, scattered, out[v])
             continue
         if not uniform:
-            interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
-            _read_profiles(n, profiles, grid, pixel, node, work.cell, mean)
+            _read_profiles(n, attenuation[upper], attenuation[upper + 1], share, grid, pixel, node, work, mean)
         row_points(n, ray_map, v, pieces.pixel, chosen, points)
         _light_surfaces(n, points, chosen, mean, lamps, work, few_light)
         if step > 1:
@@ -355,13 +367,16 @@ class OwnLamplight:
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
         returned = np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns)
         out, step = luminance.reshape(rows, 3 * columns), piece_length(camera.focal_length)
+        even = mean.size == 1
         for group in self._groups(camera, lamps):
             grid = VeilGrid(
                 columns=rays.shape[1],
                 nodes=np.uint32(INTERVALS + 1),
                 fold=np.float32(FOLD_DISTANCE),
-                veil=self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
-                attenuation=mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
+                ray_step=1 if even else INTERVALS + 1,
+                node_step=rays.shape[1] if even else 1,
+                veil=self._veil(group, rays.shape, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
+                attenuation=mean if even else mean.reshape(rays.shape[0], -1),
             )
             add = partial(_add_to_band, (distance, returned, ray_map, step, group.light, grid), out)
             self._bands.work(add, rows, columns)
@@ -371,7 +386,10 @@ class OwnLamplight:
         of_colour = [tuple(lamp for lamp in lamps if lamp.colour == colour) for colour in colours]
         return [_group(camera, together, self._droplets) for together in of_colour]
 
-    def _veil(self, group: _Group, mean: NDArray[np.float32], local: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _veil(
+        self, group: _Group, shape: tuple[int, int], mean: NDArray[np.float32], local: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """The veil on rays of a shape: ray by ray, but node by node in even fog, where it is remembered."""
         if mean.size > 1:
             return veil_along(group.air, local, mean)
         if mean[0, 0] == 0:
@@ -382,7 +400,8 @@ class OwnLamplight:
         if known is None or known[0] is not group:
             while len(self._veils) >= _REMEMBERED:
                 del self._veils[next(iter(self._veils))]
-            known = self._veils[key] = (group, veil_along(group.air, local, mean))
+            by_node = veil_along(group.air, local, mean).reshape(*shape, INTERVALS + 1).transpose(0, 2, 1)
+            known = self._veils[key] = (group, np.ascontiguousarray(by_node))
         return known[1]
 
 
@@ -404,7 +423,7 @@ def _group(camera: Camera, lamps: tuple[HeadLamp, ...], droplets: Droplets) -> _
     return _Group(
         light=LampGroup(
             places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
-            tables=np.stack([table[..., 0] for table in tables]),
+            tables=np.stack([table[..., 0].reshape(-1) for table in tables]),
             colour=np.array(lamps[0].colour, dtype=np.float32),
         ),
         air=lit_air(_rays(camera)[0], list(zip(places, tables, strict=True)), droplets),

@@ -200,17 +200,19 @@ def _read_map(
     shares: NDArray[np.float32],
     above: NDArray[np.float32],
     eye: EyeOnMap,
-    ground: GroundLight,
+    illuminance: NDArray[np.float32],
+    tops: NDArray[np.float32],
+    columns: int,
     light: NDArray[np.float32],
 ) -> bool:
     """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any.
 
-    Takes `cells` (2, n), which `_places_on_map` sets the first row of, and `shares` (2, n).
+    Takes `cells` (2, n), which `_places_on_map` sets the first row of, `shares` (2, n), and the map's arrays, flat.
     """
-    tops, seen, at, top, found = ground.tops.reshape(-1), cells[0], cells[1], shares[0], np.int32(0)
+    seen, at, top, found = cells[0], cells[1], shares[0], np.int32(0)
     for n in range(count):
         at[n] = max(seen[n], np.int32(0))
-    read_between(count, ground.illuminance.reshape(-1), ground.tops.shape[1], at, shares[0], shares[1], light)
+    read_between(count, illuminance, columns, at, shares[0], shares[1], light)
     for n in range(count):
         top[n] = tops[np.uint32(at[n])]
     for n in range(count):
@@ -256,6 +258,7 @@ def add_street_light(
     cells, unlit = np.empty((2, columns), np.int32), np.empty((2, 4 * columns), np.uint32)
     length, pieces = np.empty(columns, np.float32), row_pieces(columns, step)
     few, beams = values_of_row(columns), ground.beams
+    illuminance, tops = ground.illuminance.reshape(-1), ground.tops.reshape(-1)
     light = few if step == 1 else values_of_row(columns)
     for v in range(top, bottom):
         any_light = False
@@ -267,7 +270,7 @@ def add_street_light(
             if len(beams.lamps):
                 found = _cells_to_light(n, cells[0], ground.tops.shape[1], beams.known, unlit)
                 _light_cells(unlit, found, beams, ground)
-            any_light = _read_map(n, cells, shares, points[2], eye, ground, few)
+            any_light = _read_map(n, cells, shares, points[2], eye, illuminance, tops, ground.tops.shape[1], few)
         if any_light:
             if step > 1:
                 spread_over_row(few, pieces, light)

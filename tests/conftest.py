@@ -1,7 +1,6 @@
 """What tests of several folders use."""
 
 import contextlib
-import hashlib
 import signal
 import socket
 import subprocess
@@ -10,14 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import sumo
 from hypothesis import HealthCheck, settings
 
-from fogsim.render import drawing
-from fogsim.scene import build as scene_build
-from fogsim.values.scene import Mesh
 from tests.helpers.attached import libsumo_in_town, traci_in_town
 from tests.helpers.command import Command, Ran, run_command
 
@@ -26,35 +21,6 @@ settings.register_profile("fogsim", deadline=None, suppress_health_check=[Health
 settings.load_profile("fogsim")
 
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _shapes_made_once() -> Iterator[None]:
-    """Keep what hundreds of runs would compute again, a third of their start: trees by seed, closed solids by mesh.
-
-    Tests of the two functions import them from where they are defined, which is unchanged.
-    """
-    trees: dict[str, tuple[dict[str, Mesh], Any]] = {}
-    solids: dict[bytes, np.ndarray] = {}
-    grow, find = scene_build.tree_shapes, drawing.in_solids
-
-    def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
-        key = f"{kinds} {rng.bit_generator.state}"
-        if key not in trees:
-            trees[key] = grow(rng, kinds), rng.bit_generator.state
-        shapes, rng.bit_generator.state = trees[key]
-        return dict(shapes)
-
-    def in_solids(mesh: Mesh) -> np.ndarray:
-        key = hashlib.sha256(mesh.positions.tobytes() + mesh.faces.tobytes()).digest()
-        if key not in solids:
-            solids[key] = find(mesh)
-        return solids[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scene_build, "tree_shapes", tree_shapes)
-        patch.setattr(drawing, "in_solids", in_solids)
-        yield
 
 
 @pytest.fixture(autouse=True)

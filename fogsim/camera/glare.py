@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import Bands, kernel
 from fogsim.values import Camera
 
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
+_ZERO, _ONE, _THREE = np.float32(0.0), np.float32(1.0), np.uint64(3)
 
 
 class Places(NamedTuple):
@@ -163,13 +163,15 @@ def _interpolate_columns(
 
     Takes `grid` (rows, 3 · cols), `wide` (rows, 3 · finer cols).
     """
+    places, shares = columns.at, columns.share
     for row in range(grid.shape[0]):
         line, out = grid[row], wide[row]
-        for column in range(columns.at.shape[0]):
-            cell, right = 3 * columns.at[column], columns.share[column]
-            for i in range(3):
+        for column in range(np.uint64(places.shape[0])):
+            # Unsigned, because indices that may be negative cost a comparison each.
+            cell, right, at = _THREE * np.uint64(places[column]), shares[column], _THREE * column
+            for i in range(_THREE):
                 left = line[cell + i]
-                out[3 * column + i] = left + right * (line[cell + 3 + i] - left)
+                out[at + i] = left + right * (line[cell + _THREE + i] - left)
 
 
 @kernel

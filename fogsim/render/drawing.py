@@ -7,6 +7,7 @@ numba and by OpenGL, so where both see the same triangle they give the same pict
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -17,8 +18,9 @@ from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.scene import Mesh
 
 
+@lru_cache(maxsize=512)
 def in_solids(mesh: Mesh) -> NDArray[np.bool_]:
-    """Find the triangles that belong to closed solids.
+    """Find the triangles that belong to closed solids; remembered, since most shapes are in every scene.
 
     Returns for each triangle whether every edge of it and of all that hang together with it has one other triangle on
     its other side, and they enclose what lies behind them (m,) bool.
@@ -36,7 +38,9 @@ def in_solids(mesh: Mesh) -> NDArray[np.bool_]:
     gaps = np.bincount(np.tile(part, 3), ~twin, count)
     a, b, c = mesh.positions[mesh.faces].astype(np.float64).transpose(1, 0, 2)
     volume = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)), count)
-    return np.asarray(((gaps == 0) & (volume > 0))[part], np.bool_)
+    solid = np.asarray(((gaps == 0) & (volume > 0))[part], np.bool_)
+    solid.flags.writeable = False
+    return solid
 
 
 def _least_connected(start: NDArray[np.int64], end: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -68,11 +68,13 @@ class _LampCarriers(NamedTuple):
     """Vehicles with lamps."""
 
     position: NDArray[np.float64]  # (v, 3): Middles of the front bumpers [m]
-    turned: NDArray[np.float64]  # (4, v): Cosine and sine of their headings, and of their grades
-    size: NDArray[np.float64]  # (3, v): Length, width and height [m]
-    # lit, body (v,) int64: bits of lit lamps, and number of the body
-    lit: NDArray[np.int64]
-    body: NDArray[np.int64]
+    heading: NDArray[np.float64]
+    grade: NDArray[np.float64]
+    length: NDArray[np.float64]
+    width: NDArray[np.float64]
+    height: NDArray[np.float64]
+    lit: NDArray[np.int32]  # (v,) int32: Bits of lit lamps
+    body: NDArray[np.int64]  # (v,) int64: Number of the body
 
 
 @kernel
@@ -102,6 +104,7 @@ def _share_toward(lamps: _LampTable, lamp: int, forward: float, left: float, up:
 @kernel
 def _find_lamps(
     vehicles: _LampCarriers,
+    skip: int,
     lamps: _LampTable,
     eye: NDArray[np.float64],
     farthest: float,
@@ -112,19 +115,20 @@ def _find_lamps(
 
     Takes `eye` (3,) [m], `farthest` [m], `which` (2, n) int64.
     """
-    position, turned, size = vehicles.position, vehicles.turned, vehicles.size
-    count = 0
+    position, count = vehicles.position, 0
     for row in range(len(vehicles.body)):
         dx, dy, dz = eye[0] - position[row, 0], eye[1] - position[row, 1], eye[2] - position[row, 2]
-        if abs(dx) + abs(dy) > farthest:
+        lit = np.int64(vehicles.lit[row])
+        if row == skip or lit == 0 or abs(dx) + abs(dy) > farthest:
             continue
-        cosine, sine, level, rise = turned[0, row], turned[1, row], turned[2, row], turned[3, row]
-        length, width, height = size[0, row], size[1, row], size[2, row]
+        cosine, sine = math.cos(vehicles.heading[row]), math.sin(vehicles.heading[row])
+        level, rise = math.cos(vehicles.grade[row]), math.sin(vehicles.grade[row])
+        length, width, height = vehicles.length[row], vehicles.width[row], vehicles.height[row]
         onward, aside = dx * cosine + dy * sine, dy * cosine - dx * sine
         ahead, above = onward * level + dz * rise, dz * level - onward * rise
         for column in range(lamps.of_body.shape[1]):
             lamp = lamps.of_body[vehicles.body[row], column]
-            bits = vehicles.lit[row] & lamps.mask[lamp] & ~(vehicles.lit[row] >> lamps.dark_shift[lamp])
+            bits = lit & lamps.mask[lamp] & ~(lit >> lamps.dark_shift[lamp])
             # The eye sees lamps at the front from before it, those at the rear from behind it.
             before = ahead > 0.0 if lamps.forwards[lamp] > 0.0 else ahead + length < 0.0
             if lamp < 0 or bits == 0 or not before:
@@ -281,14 +285,12 @@ def _of_vehicles(
     numbers = _numbers(body_names(state))
     most = len(numbers) * table.lamps.of_body.shape[1]
     found, lit = np.empty((most, _FOUND)), np.empty((2, most), np.int64)
-    turned = np.array((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
-    size = np.array((state.length, state.width, state.height))
-    lamps = state.lamps.astype(np.int64)
-    if skip is not None:
-        lamps[skip] = 0
-    position = np.ascontiguousarray(state.position, np.float64)
-    vehicles = _LampCarriers(position, turned, size, lamps, numbers)
-    count = _find_lamps(vehicles, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
+    # Columns may lie in one table: without this a kernel is compiled for either.
+    columns = (state.position, state.heading, state.grade, state.length, state.width, state.height)
+    position, heading, grade, length, width, height = (np.ascontiguousarray(one, np.float64) for one in columns)
+    lamps = np.ascontiguousarray(state.lamps, np.int32)
+    vehicles = _LampCarriers(position, heading, grade, length, width, height, lamps, numbers)
+    count = _find_lamps(vehicles, -1 if skip is None else skip, table.lamps, eye, _FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, _INTENSITY], lit[1], (found[:, _FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, _INTENSITY] > 1e-3)
@@ -307,12 +309,11 @@ def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], be
     kinds, kind = list(SIGNAL_LOBES), table.lamps.lobe[lit[0]]
     scale = found[:, _FULL_INTENSITY] / FULL
     burning = lit[1] & sum(map(int, beams))
-    for bits in sorted(set(burning.tolist())):
-        if bits:
-            chosen = burning == bits
-            kind = np.where(chosen, len(kinds), kind)
-            scale = np.where(chosen, 1.0, scale)
-            kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & int(lamp))))
+    for bits in sorted(set(burning[burning != 0].tolist())):
+        chosen = burning == bits
+        kind = np.where(chosen, len(kinds), kind)
+        scale = np.where(chosen, 1.0, scale)
+        kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & int(lamp))))
     return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, _AXIS : _AXIS + 3]))
 
 
@@ -329,9 +330,10 @@ def _add_beams(
     beams: Mapping[Lamp, Beam],
 ) -> None:
     """Add what head lamps and front fog lamps shine in a direction (forward, left, up) to the intensities."""
+    any_lit = int(np.bitwise_or.reduce(lit))
     for lamp, beam in beams.items():
-        chosen = np.flatnonzero(lit & int(lamp))
-        if len(chosen):
+        if any_lit & int(lamp):
+            chosen = np.flatnonzero(lit & int(lamp))
             forward, left, up = (part[chosen] for part in toward)
             azimuth, elevation = np.arctan2(-left, forward), np.arctan2(up, np.hypot(forward, left))
             intensity[chosen] += luminous_intensity(beam, azimuth, elevation)

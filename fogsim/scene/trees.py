@@ -1,8 +1,9 @@
 """Shapes of conifers, broad-leaved trees and distant woodland, a little different with every seed."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import cache, lru_cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -284,13 +285,31 @@ def _woodland(rng: np.random.Generator, level: int) -> Mesh:
     return replace(whole, positions=(whole.positions / (1, 1, whole.positions[:, 2].max())).astype(np.float32))
 
 
+_GROWN: Mapping[str, Callable[[np.random.Generator, int], Mesh]] = {
+    "conifer": _conifer,
+    "broad_leaved": _broad_leaved,
+    "woodland": _woodland,
+}
+
+
 def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
     """Shapes of all trees by name, each with its levels of detail."""
     shapes: dict[str, Mesh] = {}
-    for name, grow in (("conifer", _conifer), ("broad_leaved", _broad_leaved), ("woodland", _woodland)):
+    for name in _GROWN:
         for i in range(kinds):
-            # All levels get the same random numbers first, so colour and spread agree.
-            seed = int(rng.integers(2**31))
-            for level, ending in enumerate(("", *LEVELS_OF_DETAIL)):
-                shapes[f"{name}_{i}{ending}"] = grow(np.random.default_rng(seed), level)
+            levels = _levels(name, int(rng.integers(2**31)))
+            shapes |= {f"{name}_{i}{ending}": level for ending, level in zip(_ENDINGS, levels, strict=True)}
     return shapes
+
+
+_ENDINGS = ("", *LEVELS_OF_DETAIL)
+
+
+@lru_cache(maxsize=64)
+def _levels(name: str, seed: int) -> tuple[Mesh, ...]:
+    """A tree at each level of detail, remembered since runs begin again with the same seed of the scenery."""
+    # All levels get the same random numbers first, so colour and spread agree.
+    levels = tuple(_GROWN[name](np.random.default_rng(seed), level) for level in range(len(_ENDINGS)))
+    for level, column in product(levels, fields(Mesh)):
+        getattr(level, column.name).flags.writeable = False
+    return levels

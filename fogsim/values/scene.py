@@ -56,9 +56,9 @@ class Surface(IntEnum):
     DIODES_RED = 16
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles.
+    """Triangles; a mesh equals none but itself.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.atmosphere.fog.medium import Medium, field_at, medium_of
+from fogsim.atmosphere.fog.medium import Medium, field_at, is_uniform_below, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
@@ -32,7 +32,10 @@ def extinction(field: FogField, points: ArrayLike, time: float = 0.0) -> NDArray
     (...) float64
         k ≥ 0; 0 above the top of the fog.
     """
-    return _extinctions(medium_of(field_at(field, time)), points)
+    now, places = field_at(field, time), np.asarray(points, dtype=np.float64)
+    if places.size and is_uniform_below(now, float(places[..., 2].max())):
+        return np.full(places.shape[:-1], float(now.extinction))
+    return _extinctions(medium_of(now), places)
 
 
 def _extinctions(medium: Medium, points: ArrayLike) -> NDArray[np.float64]:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import interpolate_rows, repeat_channels
 from fogsim.atmosphere.lamps.halo_lamps import (
     AHEAD,
     BEHIND,
@@ -27,6 +26,7 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     lamp_profile,
 )
 from fogsim.atmosphere.lamps.lobe_kernels import Angles, side_profiles
+from fogsim.atmosphere.lamps.pieces import read_between
 from fogsim.core.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
@@ -58,29 +58,24 @@ def add_wide_glows(
     """
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
-    place, turn = np.empty(count, np.float32), np.empty(count, np.float32)
+    onward, around = np.empty(count, np.float32), np.empty(count, np.float32)
+    cell, glow, number = np.empty(count, np.int32), np.empty(count, np.float32), np.uint64(count)
     profile, profiles = np.empty(WIDE_SIZE, np.float32), np.empty((WIDE_SIZE, SIDES + 1), np.float32)
-    flat, size = profiles.reshape(-1), np.uint32(SIDES + 1)
     for i in range(lamps.shape[0]):
         lamp = lamps[i]
         lamp_profile(table, lamp, HIDDEN_SHARE, log_depth, profile)
         if profile[0] * light[i].max() < faintest:
             continue
         side_profiles(profile, light[i], angles, profiles)
-        _place_about(directions, up, lamp, place, turn)
+        _place_about(directions, up, lamp, cell, onward, around)
+        read_between(number, profiles.reshape(-1), SIDES + 1, cell, onward, around, glow)
         r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
         n = (_RED * r + _GREEN * g + _BLUE * b) * np.float32(lamp[NEARNESS])
-        for p in range(count):
-            entry, side = np.uint32(place[p]), np.uint32(turn[p])
-            onward, around, first = place[p] - np.float32(entry), turn[p] - np.float32(side), entry * size + side
-            low = flat[first] + (flat[first + _NEXT] - flat[first]) * around
-            high = flat[first + size] + (flat[first + size + _NEXT] - flat[first + size]) * around
-            place[p] = low + (high - low) * onward
-        for p in range(count):
-            red[p] += place[p] * r
-            green[p] += place[p] * g
-            blue[p] += place[p] * b
-            near[p] += place[p] * n
+        for p in range(number):
+            red[p] += glow[p] * r
+            green[p] += glow[p] * g
+            blue[p] += glow[p] * b
+            near[p] += glow[p] * n
 
 
 @kernel
@@ -88,10 +83,14 @@ def _place_about(
     directions: NDArray[np.float32],
     up: NDArray[np.float64],
     lamp: NDArray[np.float64],
-    place: NDArray[np.float32],
-    turn: NDArray[np.float32],
+    cell: NDArray[np.int32],
+    onward: NDArray[np.float32],
+    around: NDArray[np.float32],
 ) -> None:
-    """Entry of directions in a lamp's profile, and the side of it on which they pass, as the lamp sees them."""
+    """Entry of directions in a lamp's profile, by the side of it on which they pass as the lamp sees them.
+
+    `onward` and `around` are how far on a direction is to the next entry and to the next side.
+    """
     x, y, z = directions[0], directions[1], directions[2]
     ax, ay, az = lamp[TOWARDS], lamp[TOWARDS + 1], lamp[TOWARDS + 2]
     bx, by, bz = up[1] * az - up[2] * ay, up[2] * ax - up[0] * az, up[0] * ay - up[1] * ax
@@ -100,15 +99,18 @@ def _place_about(
     lx, ly, lz = np.float32(ax), np.float32(ay), np.float32(az)
     rx, ry, rz = np.float32(bx), np.float32(by), np.float32(bz)
     ux, uy, uz = np.float32(ay * bz - az * by), np.float32(az * bx - ax * bz), np.float32(ax * by - ay * bx)
-    quarter = np.float32(SIDES / 4)
-    for p in range(place.shape[0]):
+    quarter, size = np.float32(SIDES / 4), np.int32(SIDES + 1)
+    for p in range(np.uint64(cell.shape[0])):
         square = max(_ZERO, _TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz))
-        place[p] = square / (square + _FOLD) * _LAST_WIDE
+        place = square / (square + _FOLD) * _LAST_WIDE
         right, above = x[p] * rx + y[p] * ry + z[p] * rz, x[p] * ux + y[p] * uy + z[p] * uz
         # An angle about the lamp without trigonometry: the share of a quarter turn by |above| / (|right| + |above|).
         bend = abs(above) / (abs(right) + abs(above) + _LEAST)
         half = bend if right >= _ZERO else _TWO - bend
-        turn[p] = min(_LAST_SIDE, (half if above >= _ZERO else _FOUR - half) * quarter)
+        turn = min(_LAST_SIDE, (half if above >= _ZERO else _FOUR - half) * quarter)
+        entry, side = np.int32(place), np.int32(turn)
+        cell[p] = entry * size + side
+        onward[p], around[p] = place - np.float32(entry), turn - np.float32(side)
 
 
 @kernel
@@ -151,7 +153,10 @@ def add_middle_glows(
     """
     rows, columns = out.shape[1], out.shape[2]
     profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
-    last = np.float32(CORE_SIZE - 1.001)
+    # At the end of a profile there is nothing left.
+    last = np.float32(CORE_SIZE - 1.00001)
+    entries, shares = np.empty(columns, np.int32), np.empty(columns, np.float32)
+    red, green, blue, near = out[0].reshape(-1), out[1].reshape(-1), out[2].reshape(-1), out[3].reshape(-1)
     for i in range(lamps.shape[0]):
         lamp = lamps[i]
         lamp_profile(table, lamp, 0.0, log_depth, profile)
@@ -162,18 +167,24 @@ def add_middle_glows(
         r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
         n = (_RED * r + _GREEN * g + _BLUE * b) * np.float32(lamp[NEARNESS])
         u0, v0, half = lamp[PLACE_U] / cell[0], lamp[PLACE_V] / cell[1], cell[2] / lamp[AHEAD] ** 2 + 1.0
+        begin, end = max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)
+        size = np.uint64(max(end - begin, 0))
         for v in range(max(0, math.ceil(v0 - half)), min(rows, math.floor(v0 + half) + 1)):
-            for u in range(max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)):
-                p = v * columns + u
+            first = np.uint64(v * columns + begin)
+            for m in range(size):
+                p = first + m
                 cosine = directions[0, p] * lx + directions[1, p] * ly + directions[2, p] * lz
-                place = np.sqrt(max(_TWO - _TWO * cosine, _ZERO)) * scale
-                if place < last:
-                    entry = np.uint32(place)
-                    glow = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place - np.float32(entry))
-                    out[0, v, u] += glow * r
-                    out[1, v, u] += glow * g
-                    out[2, v, u] += glow * b
-                    out[3, v, u] += glow * n
+                place = min(np.sqrt(max(_TWO - _TWO * cosine, _ZERO)) * scale, last)
+                entry = np.int32(place)
+                entries[m], shares[m] = entry, place - np.float32(entry)
+            for m in range(size):
+                p, entry_before = first + m, np.uint32(entries[m])
+                low = profile[entry_before]
+                glow = low + (profile[entry_before + _NEXT] - low) * shares[m]
+                red[p] += glow * r
+                green[p] += glow * g
+                blue[p] += glow * b
+                near[p] += glow * n
 
 
 @kernel
@@ -203,9 +214,20 @@ def _upsample_row(
 
 
 @kernel
-def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    for j in range(out.shape[0]):
-        out[j] += light[j] * seen[j]
+def _add_between(
+    lights: tuple[NDArray[np.float32], NDArray[np.float32]],
+    nears: tuple[NDArray[np.float32], NDArray[np.float32]],
+    share: np.float32,
+    distance: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Add to a row what is seen of the light between two stretched rows."""
+    (above, below), (far, near) = lights, nears
+    for u in range(np.uint64(distance.shape[0])):
+        seen, at = min(_ONE, distance[u] * (far[u] + (near[u] - far[u]) * share)), _THREE * u
+        out[at] += (above[at] + (below[at] - above[at]) * share) * seen
+        out[at + _FIRST] += (above[at + _FIRST] + (below[at + _FIRST] - above[at + _FIRST]) * share) * seen
+        out[at + _SECOND] += (above[at + _SECOND] + (below[at + _SECOND] - above[at + _SECOND]) * share) * seen
 
 
 @kernel
@@ -229,8 +251,6 @@ def add_upsampled(
     # Each coarse row is stretched once, those above the band are not.
     ready = min(int(np.float32(top) * np.float32(coarse_rows - 1) / np.float32(max(rows - 1, 1))), coarse_rows - 2) - 1
     lights, nears = np.empty((2, 3 * columns), np.float32), np.empty((2, columns), np.float32)
-    light, near = np.empty(3 * columns, np.float32), np.empty(columns, np.float32)
-    seen = np.empty(3 * columns, np.float32)
     for v in range(top, bottom):
         place = np.float32(v) * np.float32(coarse_rows - 1) / np.float32(max(rows - 1, 1))
         upper = min(int(place), coarse_rows - 2)
@@ -238,12 +258,8 @@ def add_upsampled(
             ready += 1
             _upsample_row(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
         share, first = place - np.float32(upper), upper % 2
-        interpolate_rows(lights[first], lights[1 - first], share, light)
-        interpolate_rows(nears[first], nears[1 - first], share, near)
-        for u in range(columns):
-            near[u] = min(_ONE, distance[v, u] * near[u])
-        repeat_channels(near, seen)
-        _add_product(light, seen, out[v])
+        last = 1 - first
+        _add_between((lights[first], lights[last]), (nears[first], nears[last]), share, distance[v], out[v])
 
 
 @kernel
@@ -261,7 +277,7 @@ def add_glow_cores(
     """
     rows, columns = distance.shape
     scale, last = np.float32((CORE_SIZE - 1.001) / reach), np.float32(CORE_SIZE - 1.001)
-    place = np.empty(columns, np.float32)
+    entries, shares = np.empty(columns, np.int32), np.empty(columns, np.float32)
     for i in range(lamps.shape[0]):
         if not bright[i]:
             continue
@@ -277,16 +293,20 @@ def add_glow_cores(
             height, start = np.float32((v - v0) ** 2), np.float32(first - u0)
             for n in range(size):
                 across = start + np.float32(np.int32(n))
-                place[n] = min(last, np.sqrt(height + across * across) * scale)
+                place = min(last, np.sqrt(height + across * across) * scale)
+                entry = np.int32(place)
+                entries[n], shares[n] = entry, place - np.float32(entry)
             for n in range(size):
-                entry = np.uint32(place[n])
-                place[n] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))
+                before = np.uint32(entries[n])
+                low = profile[before]
+                shares[n] = low + (profile[before + _NEXT] - low) * shares[n]
+            line, seen = out[v], distance[v]
             for n in range(size):
                 u = begin + n
-                light = place[n] * min(_ONE, distance[v, u] * near)
-                out[v, _THREE * u] += light * red
-                out[v, _THREE * u + _FIRST] += light * green
-                out[v, _THREE * u + _SECOND] += light * blue
+                light, at = shares[n] * min(_ONE, seen[u] * near), _THREE * u
+                line[at] += light * red
+                line[at + _FIRST] += light * green
+                line[at + _SECOND] += light * blue
 
 
 _SAME_PLACE = 1.0

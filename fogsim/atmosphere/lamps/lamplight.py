@@ -10,16 +10,23 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.frustum import grid_depths
 from fogsim.atmosphere.fog.koschmieder_kernels import (
     ENDLESS,
-    bilinear,
-    fill_channels,
     interpolate_rows,
-    repeat_channels,
     transmittances,
 )
 from fogsim.atmosphere.fog.medium import is_uniform_below, medium_of
 from fogsim.atmosphere.lamps.lamp_tables import FOLD, SIZE, lamp_table
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
+from fogsim.atmosphere.lamps.pieces import (
+    choose_pixels,
+    cut_lengths,
+    piece_length,
+    read_between,
+    row_pieces,
+    row_points,
+    split_places,
+    spread_over_row,
+    values_of_row,
+)
 from fogsim.atmosphere.lamps.veil import (
     FOLD_DISTANCE,
     INTERVALS,
@@ -42,18 +49,16 @@ _FOLD = np.float32(FOLD)
 _MIDDLE = np.float32(0.5 * (SIZE - 1))
 _LAST_CELL = np.float32(SIZE - 1.001)
 _LEAST = np.float32(1e-6)
-_NEXT = np.uint32(1)
+_FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 
 _Floats = NDArray[np.float32]
-_ChoiceRows = tuple[_Floats, _Floats, NDArray[np.uint32], _Floats, NDArray[np.uint64], NDArray[np.bool_]]
-_LightRows = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats]
 
 
 class LampGroup(NamedTuple):
     """Lamps of one colour."""
 
     places: NDArray[np.float32]  # (n, 3): Where they are from the eye in the vehicle's axes (forward, right, up) [m]
-    tables: NDArray[np.float32]  # Their beams, sharp [cd]
+    tables: NDArray[np.float32]  # (n, SIZE²): Their beams, sharp, row by row [cd]
     colour: NDArray[np.float32]  # (3,): Linear colour of luminance 1
 
 
@@ -63,43 +68,84 @@ class VeilGrid(NamedTuple):
     columns: int  # Columns of the grid
     nodes: np.uint32  # Nodes of a ray, which lie evenly over r / (r + fold)
     fold: np.float32  # See `nodes` [m]
+    # ray_step, node_step: from a value to that of the next ray, and to that of the next node, one of which is 1
+    ray_step: int
+    node_step: int
     # (rows, columns · nodes): Veil from the eye to each node [cd/m²]; without rows in clear air
     veil: NDArray[np.float32]
     # (rows, columns · nodes): Mean extinction coefficient to each node; one entry where fog is even [1/m]
     attenuation: NDArray[np.float32]
 
 
+class _Places(NamedTuple):
+    """Places of a row's pixels along one axis of a table."""
+
+    cell: NDArray[np.int32]  # (n,): Number of the value before each
+    share: NDArray[np.float32]  # (n,): How far it is on to the next
+
+
+class _Work(NamedTuple):
+    """Memory for what is computed of a row's pixels."""
+
+    row: _Places
+    column: _Places
+    weight: NDArray[np.float32]
+    kept: NDArray[np.float32]
+    power: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    profiles: NDArray[np.float32]
+
+
 @kernel
 def _read_profiles(
     count: np.uint64,
-    values: NDArray[np.float32],
-    nodes: np.uint32,
-    left: NDArray[np.uint32],
-    aside: NDArray[np.float32],
-    node: NDArray[np.float32],
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    share: np.float32,
+    grid: VeilGrid,
+    pixel: _Places,
+    node: _Places,
+    work: _Work,
     out: NDArray[np.float32],
 ) -> None:
-    """Value for each chosen pixel of a row, linear between two rays and two nodes."""
+    """Value for each chosen pixel of a row between two rows of a grid, linear between two rays and two nodes."""
+    cell, begin, end = work.cell, np.int32(low.shape[0]), np.int32(0)
     for u in range(count):
-        n = np.uint32(node[u])
-        along, share = node[u] - np.float32(n), aside[u]
-        a = left[u] + n
-        b = a + nodes
-        near = values[a] + (values[b] - values[a]) * share
-        far = values[a + _NEXT] + (values[b + _NEXT] - values[a + _NEXT]) * share
-        out[u] = near + (far - near) * along
+        cell[u] = pixel.cell[u] + node.cell[u]
+        begin, end = min(begin, node.cell[u]), max(end, node.cell[u])
+    # Node by node, only those that are seen are needed.
+    first, last = (begin, end + 2 * grid.node_step) if grid.ray_step == 1 else (0, low.shape[0])
+    interpolate_rows(low[first:last], high[first:last], share, work.profiles[first:last])
+    down, aside = (node, pixel) if grid.ray_step == 1 else (pixel, node)
+    read_between(count, work.profiles, max(grid.ray_step, grid.node_step), cell, down.share, aside.share, out)
 
 
 @kernel
 def _add_lamplight(
     colour: NDArray[np.float32],
     scattered: NDArray[np.float32],
-    shone: NDArray[np.float32],
+    light: NDArray[np.float32],
     response: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    for j in range(out.shape[0]):
-        out[j] += colour[j] * (scattered[j] + shone[j] * response[j])
+    """Add what fog scatters, and what surfaces return of light, to a row (`response`, `out` (3 · n,))."""
+    red, green, blue = colour[0], colour[1], colour[2]
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        veil, shone, at = scattered[u], light[u], _THREE * u
+        out[at] += red * (veil + shone * response[at])
+        out[at + _FIRST] += green * (veil + shone * response[at + _FIRST])
+        out[at + _SECOND] += blue * (veil + shone * response[at + _SECOND])
+
+
+@kernel
+def _add_veil(colour: NDArray[np.float32], scattered: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Add what fog scatters to a row (`out` (3 · n,))."""
+    red, green, blue = colour[0], colour[1], colour[2]
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        veil, at = scattered[u], _THREE * u
+        out[at] += red * veil
+        out[at + _FIRST] += green * veil
+        out[at + _SECOND] += blue * veil
 
 
 @kernel
@@ -109,27 +155,28 @@ def _table_places(
     across: NDArray[np.float32],
     start_along: np.float32,
     start_across: np.float32,
-    out: NDArray[np.float32],
+    stride: int,
+    out: _Places,
 ) -> None:
     """Where in a beam's table a row's pixels are, by one of the two tangents."""
+    share = out.share
     for u in range(count):
         x, y = max(along[u] - start_along, _LEAST), across[u] - start_across
-        out[u] = min((y / (_FOLD * x + abs(y)) + _ONE) * _MIDDLE, _LAST_CELL)
+        share[u] = min((y / (_FOLD * x + abs(y)) + _ONE) * _MIDDLE, _LAST_CELL)
+    split_places(count, share, stride, out.cell, share)
 
 
 @kernel
 def _distance_weights(
     count: np.uint64,
-    forward: NDArray[np.float32],
-    right: NDArray[np.float32],
-    up: NDArray[np.float32],
+    points: NDArray[np.float32],
     lamp: NDArray[np.float32],
     length: NDArray[np.float32],
     attenuation: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
     """e^(κ (r − s)) / s² for a row's pixels; the ways r to the eye and s to the lamp differ by little."""
-    lamp_forward, lamp_right, lamp_up = lamp[0], lamp[1], lamp[2]
+    forward, right, up, lamp_forward, lamp_right, lamp_up = points[0], points[1], points[2], lamp[0], lamp[1], lamp[2]
     for u in range(count):
         x, y, z = forward[u] - lamp_forward, right[u] - lamp_right, up[u] - lamp_up
         square = x * x + y * y + z * z
@@ -139,35 +186,14 @@ def _distance_weights(
 
 
 @kernel
-def _add_intensity(
-    count: np.uint64,
-    table: NDArray[np.float32],
-    row: NDArray[np.float32],
-    column: NDArray[np.float32],
-    weight: NDArray[np.float32],
-    out: NDArray[np.float32],
-) -> None:
-    """Add to a row's pixels the intensity of a lamp times their weight."""
-    for u in range(count):
-        out[u] += bilinear(table, row[u], column[u]) * weight[u]
-
-
-@kernel
-def _column_places(
-    count: np.uint64,
-    pixel: NDArray[np.float32],
-    columns: int,
-    cells: int,
-    nodes: int,
-    left: NDArray[np.uint32],
-    aside: NDArray[np.float32],
-) -> None:
+def _column_places(count: np.uint64, pixel: NDArray[np.float32], columns: int, grid: VeilGrid, out: _Places) -> None:
     """For each chosen pixel, where the profile of the ray left of it begins, and how far it is on to the next."""
-    scale = np.float32(cells) / np.float32(max(columns - 1, 1))
+    scale, last = np.float32(grid.columns - 1) / np.float32(max(columns - 1, 1)), np.int32(grid.columns - 2)
+    step = np.int32(grid.ray_step)
     for u in range(count):
         place = pixel[u] * scale
-        cell = min(np.int32(place), np.int32(cells - 1))
-        left[u], aside[u] = np.uint32(cell * np.int32(nodes)), place - np.float32(cell)
+        whole = min(np.int32(place), last)
+        out.cell[u], out.share[u] = whole * step, place - np.float32(whole)
 
 
 @kernel
@@ -177,73 +203,56 @@ def _light_surfaces(
     length: NDArray[np.float32],
     mean: NDArray[np.float32],
     lamps: LampGroup,
-    scratch: NDArray[np.float32],
-    power: NDArray[np.int32],
+    work: _Work,
     light: NDArray[np.float32],
 ) -> None:
     """Light of all lamps on what chosen pixels see, times its transmittance to the eye [lx]."""
-    forward, right, up = points[0], points[1], points[2]
-    column, row, weight, kept = scratch[0], scratch[1], scratch[2], scratch[3]
+    row, column, weight, kept, cell = work.row, work.column, work.weight, work.kept, work.cell
     for u in range(count):
         light[u] = _ZERO
     places = lamps.places
     for i in range(places.shape[0]):
-        _table_places(count, forward, right, places[i, 0], places[i, 1], column)
+        _table_places(count, points[0], points[1], places[i, 0], places[i, 1], 1, column)
         if i == 0 or places[i, 0] != places[i - 1, 0] or places[i, 2] != places[i - 1, 2]:
-            _table_places(count, forward, up, places[i, 0], places[i, 2], row)
-        _distance_weights(count, forward, right, up, places[i], length, mean, weight)
-        _add_intensity(count, lamps.tables[i], row, column, weight, light)
+            _table_places(count, points[0], points[2], places[i, 0], places[i, 2], SIZE, row)
+        for u in range(count):
+            cell[u] = row.cell[u] + column.cell[u]
+        read_between(count, lamps.tables[i], SIZE, cell, row.share, column.share, kept)
+        _distance_weights(count, points, places[i], length, mean, weight)
+        for u in range(count):
+            light[u] += kept[u] * weight[u]
     for u in range(count):
         weight[u] = np.float32(2.0) * mean[u] * length[u]
-    transmittances(weight[:count], power, kept)
+    transmittances(weight[:count], work.power, kept)
     for u in range(count):
         light[u] *= kept[u]
 
 
 @kernel
-def _any_lit(response: NDArray[np.float32]) -> bool:
-    """Whether a row (cols · 3) reacts to light at all. Bitwise, so that compilers emit vector instructions."""
-    lit = np.int32(0)
-    for j in range(response.shape[0]):
-        lit |= np.int32(response[j] > _ZERO)
-    return bool(lit != 0)
-
-
-@kernel
-def _cut_lengths(distance: NDArray[np.float32], length: NDArray[np.float32]) -> None:
-    """Distances of a row, endless ones cut to a length that can be computed with."""
-    for u in range(length.shape[0]):
-        length[u] = min(distance[u], np.float32(ENDLESS))
-
-
-@kernel
-def _node_places(
-    count: np.uint64, length: NDArray[np.float32], last: np.float32, fold: np.float32, node: NDArray[np.float32]
-) -> None:
-    """Positions between the nodes of their rays (the last is `last`) of the surfaces that the chosen pixels see."""
+def _node_places(count: np.uint64, length: NDArray[np.float32], grid: VeilGrid, out: _Places) -> None:
+    """Positions between the nodes of their rays of the surfaces that the chosen pixels see."""
+    last, share = np.float32(grid.nodes - 1), out.share
     for u in range(count):
-        node[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + fold))
+        share[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + grid.fold))
+    split_places(count, share, grid.node_step, out.cell, share)
 
 
 @kernel
-def _choice_rows(columns: int, cells: int, nodes: int) -> _ChoiceRows:
-    """Rows for the pixels that are chosen: columns, distances, profiles left of them and how far on, and pieces.
-
-    They begin as if every pixel were chosen.
-    """
-    pixel, chosen = np.arange(columns).astype(np.float32), np.empty(columns, np.float32)
-    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
-    _column_places(np.uint64(columns), pixel, columns, cells, nodes, left, aside)
-    return pixel, chosen, left, aside, np.empty(columns, np.uint64), np.empty(columns, np.bool_)
+def _places(columns: int) -> _Places:
+    return _Places(np.empty(columns, np.int32), np.empty(columns, np.float32))
 
 
 @kernel
-def _light_rows(columns: int) -> _LightRows:
-    """Rows for what is scattered and what shines on surfaces: of the chosen pixels, of every pixel, of each channel."""
-    few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
-    veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
-    return few_scattered, few_light, scattered, light, veiled, shone
+def _work_for(columns: int, grid: VeilGrid) -> _Work:
+    return _Work(
+        _places(columns),
+        _places(columns),
+        np.empty(columns, np.float32),
+        np.empty(columns, np.float32),
+        np.empty(columns, np.int32),
+        np.empty(columns, np.int32),
+        np.empty(grid.columns * int(grid.nodes), np.float32),
+    )
 
 
 @kernel
@@ -263,49 +272,45 @@ def add_own_light(
     Takes `distance` (rows, cols) [m], `response` (rows, cols · 3) [cd/m² per lx], `ray_map` (3, 3), `out` (rows, cols ·
     3) [cd/m²].
     """
-    nodes, fold, veil, attenuation = grid.nodes, grid.fold, grid.veil, grid.attenuation
+    veil, attenuation = grid.veil, grid.attenuation
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
-    grid_rows, cells, last = max(veil.shape[0], attenuation.shape[0]), grid.columns - 1, np.float32(nodes - 1)
-    profiles, node = np.zeros(grid.columns * int(nodes), np.float32), np.empty(columns, np.float32)
-    points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
-    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    bent, power = np.empty(columns, np.uint8), np.empty(columns, np.int32)
-    mean, channels = np.full(columns, attenuation[0, 0]), np.empty(3 * columns, np.float32)
-    no_response, n = np.zeros(3 * columns, np.float32), np.uint64(columns)
-    pixel, chosen, left, aside, first, even = _choice_rows(columns, cells, int(nodes))
-    few_scattered, few_light, scattered, light, veiled, shone = _light_rows(columns)
-    fill_channels(lamps.colour, channels)
-    if step == 1:
-        # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
-        chosen, scattered, light = length, few_scattered, few_light
+    grid_rows = max(veil.shape[0], attenuation.shape[0])
+    points, length = np.empty((3, columns), np.float32), np.empty(columns, np.float32)
+    mean = np.full(columns, attenuation[0, 0])
+    pieces, work, pixel, node = row_pieces(columns, step), _work_for(columns, grid), _places(columns), _places(columns)
+    few_scattered, few_light = values_of_row(columns), values_of_row(columns)
+    # Where every pixel is chosen, what is found for the chosen ones is every pixel's.
+    scattered = few_scattered if step == 1 else values_of_row(columns)
+    light = few_light if step == 1 else values_of_row(columns)
+    _column_places(np.uint64(columns), pieces.pixel, columns, grid, pixel)
     for v in range(top, bottom):
-        lit = surfaces and _any_lit(response[v])
+        # The sky returns no light.
+        lit = cut_lengths(distance[v], np.float32(ENDLESS), length) and surfaces
         if clear and not lit:
             continue
-        _cut_lengths(distance[v], length)
+        n = choose_pixels(length, pieces)
+        chosen = pieces.length
         if step > 1:
-            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            _column_places(n, pixel, columns, cells, int(nodes), left, aside)
-        _node_places(n, chosen, last, fold, node)
+            _column_places(n, pieces.pixel, columns, grid, pixel)
+        _node_places(n, chosen, grid, node)
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
+        share = place - np.float32(upper)
         if not clear:
-            interpolate_rows(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
-            _read_profiles(n, profiles, nodes, left, aside, node, few_scattered)
+            _read_profiles(n, veil[upper], veil[upper + 1], share, grid, pixel, node, work, few_scattered)
             if step > 1:
-                spread_over_row(few_scattered, step, first, even, scattered)
-            repeat_channels(scattered, veiled)
-        if lit:
-            if not uniform:
-                interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
-                _read_profiles(n, profiles, nodes, left, aside, node, mean)
-            row_points(n, ray_map, v, pixel, chosen, points)
-            _light_surfaces(n, points, chosen, mean, lamps, scratch, power, few_light)
-            if step > 1:
-                spread_over_row(few_light, step, first, even, light)
-            repeat_channels(light, shone)
-        _add_lamplight(channels, veiled, shone, response[v] if lit else no_response, out[v])
+                spread_over_row(few_scattered, pieces, scattered)
+        if not lit:
+            _add_veil(lamps.colour, scattered, out[v])
+            continue
+        if not uniform:
+            _read_profiles(n, attenuation[upper], attenuation[upper + 1], share, grid, pixel, node, work, mean)
+        row_points(n, ray_map, v, pieces.pixel, chosen, points)
+        _light_surfaces(n, points, chosen, mean, lamps, work, few_light)
+        if step > 1:
+            spread_over_row(few_light, pieces, light)
+        _add_lamplight(lamps.colour, scattered, light, response[v], out[v])
 
 
 def _add_to_band(
@@ -362,13 +367,16 @@ class OwnLamplight:
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
         returned = np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns)
         out, step = luminance.reshape(rows, 3 * columns), piece_length(camera.focal_length)
+        even = mean.size == 1
         for group in self._groups(camera, lamps):
             grid = VeilGrid(
                 columns=rays.shape[1],
                 nodes=np.uint32(INTERVALS + 1),
                 fold=np.float32(FOLD_DISTANCE),
-                veil=self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
-                attenuation=mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
+                ray_step=1 if even else INTERVALS + 1,
+                node_step=rays.shape[1] if even else 1,
+                veil=self._veil(group, rays.shape, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
+                attenuation=mean if even else mean.reshape(rays.shape[0], -1),
             )
             add = partial(_add_to_band, (distance, returned, ray_map, step, group.light, grid), out)
             self._bands.work(add, rows, columns)
@@ -378,7 +386,10 @@ class OwnLamplight:
         of_colour = [tuple(lamp for lamp in lamps if lamp.colour == colour) for colour in colours]
         return [_group(camera, together, self._droplets) for together in of_colour]
 
-    def _veil(self, group: _Group, mean: NDArray[np.float32], local: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _veil(
+        self, group: _Group, shape: tuple[int, int], mean: NDArray[np.float32], local: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """The veil on rays of a shape: ray by ray, but node by node in even fog, where it is remembered."""
         if mean.size > 1:
             return veil_along(group.air, local, mean)
         if mean[0, 0] == 0:
@@ -389,7 +400,8 @@ class OwnLamplight:
         if known is None or known[0] is not group:
             while len(self._veils) >= _REMEMBERED:
                 del self._veils[next(iter(self._veils))]
-            known = self._veils[key] = (group, veil_along(group.air, local, mean))
+            by_node = veil_along(group.air, local, mean).reshape(*shape, INTERVALS + 1).transpose(0, 2, 1)
+            known = self._veils[key] = (group, np.ascontiguousarray(by_node))
         return known[1]
 
 
@@ -411,7 +423,7 @@ def _group(camera: Camera, lamps: tuple[HeadLamp, ...], droplets: Droplets) -> _
     return _Group(
         light=LampGroup(
             places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
-            tables=np.stack([table[..., 0] for table in tables]),
+            tables=np.stack([table[..., 0].reshape(-1) for table in tables]),
             colour=np.array(lamps[0].colour, dtype=np.float32),
         ),
         air=lit_air(_rays(camera)[0], list(zip(places, tables, strict=True)), droplets),

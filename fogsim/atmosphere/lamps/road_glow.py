@@ -9,129 +9,9 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
-from fogsim.core.jit import kernel
 from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, LampLobes, LightSources
 from fogsim.values.light import RoadBeams
 from fogsim.values.luminous_intensity import luminous_intensity
-
-_ONE, _STEP, _EVEN = np.float32(1.0), np.uint64(1), np.uint8(0)
-_BEND = np.float32(0.002)  # relative change of slope of 1 / distance from pixel to pixel, above which nothing is plane
-_STEEPEST = np.float32(0.2)  # relative change of 1 / distance over a piece above which light is not linear
-
-
-def piece_length(focal_length: float) -> int:
-    """Pixels of a piece: 0.6°, over which beams and light change by little (`focal_length` [px])."""
-    return min(max(int(math.radians(0.6) * focal_length), 1), 8)
-
-
-@kernel
-def choose_pixels(
-    length: NDArray[np.float32],
-    step: int,
-    inverse: NDArray[np.float32],
-    bent: NDArray[np.uint8],
-    pixel: NDArray[np.float32],
-    chosen: NDArray[np.float32],
-    first: NDArray[np.uint64],
-    even: NDArray[np.bool_],
-) -> np.uint64:
-    """Choose a row's pixels to compute: each `step`-th and the last, and all between where the surface is not plane.
-
-    Over a plane 1 / distance is linear.
-
-    Returns how many were chosen. Takes `length` (cols,) [m], `inverse`, `bent` (cols,), `pixel`, `chosen` (cols,),
-    `first`, `even` (cols,) uint64.
-    """
-    # Unsigned, because indices that may be negative cost a comparison each.
-    columns, size = np.uint64(length.shape[0]), np.uint64(step)
-    if step == 1:
-        for u in range(columns):
-            pixel[u], chosen[u] = np.float32(np.int32(u)), length[u]
-        return columns
-    for u in range(columns):
-        inverse[u] = _ONE / length[u]
-    bent[0], bent[columns - _STEP] = _EVEN, _EVEN
-    for u in range(columns - _STEP - _STEP):
-        middle = inverse[u + _STEP]
-        curve = abs(inverse[u] + inverse[u + _STEP + _STEP] - middle - middle)
-        bent[u + _STEP] = np.uint8(curve > _BEND * middle)
-    count, pieces = np.uint64(0), (columns - _STEP - _STEP) // size + _STEP
-    for piece in range(pieces):
-        a = piece * size
-        b = min(a + size, columns - _STEP)
-        flags = bent[b]
-        for u in range(a, b):
-            flags |= bent[u]
-        whole = (flags == _EVEN) and (abs(inverse[b] - inverse[a]) < _STEEPEST * inverse[a])
-        even[piece], first[piece] = whole, count
-        pixel[count], chosen[count] = np.float32(np.int64(a)), length[a]
-        count += _STEP
-        if not whole:
-            for u in range(a + _STEP, b):
-                pixel[count], chosen[count] = np.float32(np.int64(u)), length[u]
-                count += _STEP
-    pixel[count], chosen[count] = np.float32(np.int64(columns - _STEP)), length[columns - _STEP]
-    return count + _STEP
-
-
-@kernel
-def row_points(
-    count: np.uint64,
-    ray_map: NDArray[np.float32],
-    v: int,
-    pixel: NDArray[np.float32],
-    length: NDArray[np.float32],
-    points: NDArray[np.float32],
-) -> None:
-    """Where the things are that chosen pixels of a row see.
-
-    Takes `ray_map` (3, 3), `pixel`, `length` (cols,) [m], `points` (3, cols) [m].
-    """
-    first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
-    first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
-    first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
-    to_x, to_y, to_z = points[0], points[1], points[2]
-    for n in range(count):
-        x = first_x + ray_map[0, 0] * pixel[n]
-        y = first_y + ray_map[1, 0] * pixel[n]
-        z = first_z + ray_map[2, 0] * pixel[n]
-        scale = length[n] / np.sqrt(x * x + y * y + z * z)
-        to_x[n], to_y[n], to_z[n] = x * scale, y * scale, z * scale
-
-
-@kernel
-def spread_over_row(
-    values: NDArray[np.float32],
-    step: int,
-    first: NDArray[np.uint64],
-    even: NDArray[np.bool_],
-    out: NDArray[np.float32],
-) -> None:
-    """Values of the chosen pixels, for every pixel of a row (`values` (cols,), `out` (cols,))."""
-    if step == 1:
-        for u in range(values.shape[0]):
-            out[u] = values[u]
-        return
-    columns, size = np.uint64(out.shape[0]), np.uint64(step)
-    pieces, n = (columns - _STEP - _STEP) // size + _STEP, np.uint64(0)
-    for piece in range(pieces):
-        a, n = piece * size, first[piece]
-        b = min(a + size, columns - _STEP)
-        value = values[n]
-        out[a] = value
-        if even[piece]:
-            n += _STEP
-            slope = (values[n] - value) / np.float32(np.int64(b - a))
-            for u in range(a + _STEP, b):
-                value += slope
-                out[u] = value
-        else:
-            for u in range(a + _STEP, b):
-                n += _STEP
-                out[u] = values[n]
-            n += _STEP
-    out[columns - _STEP] = values[n]
-
 
 ROAD_ALBEDO = 0.1
 """Share of the light on a road that it returns, alike in all directions in luminance: asphalt has 0.07 to 0.12 [-]."""
@@ -196,20 +76,22 @@ class RoadGlow:
 
 def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSources:
     """The lit road before other vehicles as sources of light, one a pair of lamps."""
-    eye = np.asarray(pose.position, dtype=np.float64)
-    chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:_MOST]
-    roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
-    dense = extinction(fog, beams.position[chosen])[:, None]
-    kept = np.exp(-LOSS_OF_SPREAD_LIGHT * dense * roads[0].range_)
-    flux = np.array([road.flux for road in roads]) * kept * beams.scale[chosen, None]
-    total = flux.sum(axis=1)
-    ahead = (flux * np.array([road.middle[:, 0] for road in roads])).sum(axis=1) / total
-    heading = beams.heading[chosen]
-    rise = ahead * np.tan(beams.grade[chosen]) - beams.height[chosen]
-    position = beams.position[chosen] + np.array((ahead * np.cos(heading), ahead * np.sin(heading), rise)).T
-    way = eye - position
-    slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)
-    return _shining_up(position, ROAD_ALBEDO * total / math.pi, slant, _LIT_AREA * slant)
+    eye, places = pose.position, beams.position.tolist()
+    away = [math.dist(place, eye) for place in places]
+    chosen = sorted(range(len(places)), key=away.__getitem__)[:_MOST]
+    found, dense = [], extinction(fog, beams.position[chosen]).tolist()
+    for i, lost in zip(chosen, dense, strict=True):
+        (x, y, z), height, heading = places[i], float(beams.height[i]), float(beams.heading[i])
+        road = _lit_road(beams.kinds[beams.kind[i]], round(height, 2))
+        flux = road.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * lost * road.range_) * beams.scale[i]
+        total = float(flux.sum())
+        ahead = float((flux * road.middle[:, 0]).sum()) / total
+        rise = ahead * math.tan(beams.grade[i]) - height
+        position = (x + ahead * math.cos(heading), y + ahead * math.sin(heading), z + rise)
+        found.append((*position, total, max((eye[2] - position[2]) / math.dist(eye, position), 0.01)))
+    table = np.array(found)
+    slant = table[:, 4]
+    return _shining_up(table[:, :3], ROAD_ALBEDO * table[:, 3] / math.pi, slant, _LIT_AREA * slant)
 
 
 def _shining_up(

@@ -6,7 +6,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.surfaces.streetlight import Beams, GroundLight, Reflection, lit_by_map
 from fogsim.values import Beam, Camera, CameraPose, FogField, View
@@ -21,6 +20,9 @@ _LOOKED_AHEAD = 60.0
 
 REACH, _HALF_WIDTH, STEP = 70.0, 20.0, 0.5
 """How far ahead and to either side a lamp lights the road, and the step of its pattern [m]."""
+
+_FADED = math.hypot(REACH, _HALF_WIDTH) + 2.0 * _CELL
+"""Distance from a lamp at which nothing is lit any more [m]."""
 
 _WHITEST = 0.95
 """Reflectance above which a surface must be a lamp [-]."""
@@ -63,23 +65,34 @@ def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
     origin = np.array(pose.position[:2]) + _LOOKED_AHEAD * ahead - 0.5 * (CELLS - 1) * _CELL
     each = list(zip(beams.kind.tolist(), beams.height.tolist(), strict=True))
     alike = sorted(set(each))
+    columns = (beams.position.tolist(), beams.heading.tolist(), beams.grade.tolist(), beams.scale.tolist())
+    lost, (x0, y0) = _extinction_before(fog, beams).tolist(), origin.tolist()
+    lamps = [
+        (
+            (x - x0) / _CELL,
+            (y - y0) / _CELL,
+            math.cos(heading) * _CELL / STEP,
+            math.sin(heading) * _CELL / STEP,
+            scale,
+            height**2,
+            -dense,
+            z,
+            math.tan(grade) * STEP,
+        )
+        for (x, y, z), heading, grade, scale, dense, (_, height) in zip(*columns, lost, each, strict=True)
+    ]
     order = sorted(range(len(each)), key=each.__getitem__)
-    lamps = np.empty((len(each), 9))
-    lamps[:, :2] = (beams.position[:, :2] - origin) / _CELL
-    lamps[:, 2] = [math.cos(heading) * _CELL / STEP for heading in beams.heading.tolist()]
-    lamps[:, 3] = [math.sin(heading) * _CELL / STEP for heading in beams.heading.tolist()]
-    lamps[:, 4], lamps[:, 5], lamps[:, 6] = beams.scale, beams.height**2, -_extinction_before(fog, beams)
-    lamps[:, 7], lamps[:, 8] = beams.position[:, 2], np.tan(beams.grade) * STEP
     patterns = _patterns(tuple((beams.kinds[kind], height) for kind, height in alike))
     which = np.array([alike.index(each[row]) for row in order])
     shape = (CELLS, CELLS)
-    on_map = Beams(lamps[order], which, patterns, STEP, np.zeros(CELLS * CELLS, np.uint8))
-    return GroundLight(origin, _CELL, np.empty(shape, np.float32), np.empty(shape, np.float32), on_map)
+    on_map = Beams(np.array([lamps[row] for row in order]), which, patterns, STEP, np.zeros(CELLS * CELLS, np.uint8))
+    farthest = max(math.dist(place, pose.position) for place in columns[0]) + _FADED
+    return GroundLight(
+        origin, _CELL, np.empty(shape, np.float32), np.empty(shape, np.float32), np.float32(farthest), on_map
+    )
 
 
 def _extinction_before(fog: FogField, beams: RoadBeams) -> NDArray[np.float64]:
-    if is_uniform_below(fog, float(beams.position[:, 2].max())):
-        return np.full(len(beams.kind), fog.extinction)
     ahead = np.stack((np.cos(beams.heading), np.sin(beams.heading), np.zeros(len(beams.kind))), axis=1)
     return extinction(fog, beams.position + _MIDDLE_OF_BEAM * ahead)
 

@@ -8,18 +8,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, fill_channels, repeat_channels
-from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
-from fogsim.atmosphere.lamps.road_glow import choose_pixels, piece_length, row_points, spread_over_row
+from fogsim.atmosphere.lamps.pieces import (
+    choose_pixels,
+    cut_lengths,
+    piece_length,
+    read_between,
+    row_pieces,
+    row_points,
+    spread_over_row,
+    values_of_row,
+)
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
+from fogsim.core.exponential import exponential
 from fogsim.core.jit import Bands, kernel
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
-_FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
 _LIT, _SURROUNDED = np.uint8(1), np.uint8(2)
+_OUTSIDE, _FIRST, _SECOND, _THREE = np.int32(-1), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 class Beams(NamedTuple):
@@ -49,6 +57,7 @@ class GroundLight(NamedTuple):
     # columns to the east
     illuminance: NDArray[np.float32]
     tops: NDArray[np.float32]
+    farthest: np.float32  # Distance from the eye beyond which nothing is lit [m]
     beams: Beams
 
 
@@ -107,48 +116,52 @@ def _add_lamp_illuminance(
 
 
 @kernel
-def _any_near(distance: NDArray[np.float32]) -> bool:
-    """Whether a row sees anything that a lamp of the map may light."""
-    near = False
-    for u in range(distance.shape[0]):
-        near |= distance[u] < _FARTHEST
-    return near
-
-
-@kernel
 def _places_on_map(
-    count: np.uint64, points: NDArray[np.float32], eye: EyeOnMap, ground: GroundLight, places: NDArray[np.float32]
+    count: np.uint64,
+    points: NDArray[np.float32],
+    eye: EyeOnMap,
+    ground: GroundLight,
+    cells: NDArray[np.int32],
+    shares: NDArray[np.float32],
 ) -> None:
-    """Columns and rows of a map (2, n) that chosen pixels see, at `points` (3, n) from the eye; -1 outside the map."""
+    """Cells of a map (n,) that chosen pixels see at `points` (3, n) from the eye, and how far on in them (2, n).
+
+    Outside the map the cell is −1.
+    """
     last_row, last_column = np.float32(ground.tops.shape[0] - 1.001), np.float32(ground.tops.shape[1] - 1.001)
-    east, north, per_metre, x, y = points[0], points[1], eye.cells_per_metre, places[0], places[1]
+    east, north, per_metre, down, aside = points[0], points[1], eye.cells_per_metre, shares[0], shares[1]
+    columns = np.int32(ground.tops.shape[1])
     for n in range(count):
-        column, row = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
-        is_inside = (column >= _ZERO) & (column < last_column) & (row >= _ZERO) & (row < last_row)
-        x[n], y[n] = column if is_inside else -_ONE, row
+        x, y = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
+        is_inside = (x >= _ZERO) & (x < last_column) & (y >= _ZERO) & (y < last_row)
+        x, y = x if is_inside else _ZERO, y if is_inside else _ZERO
+        column, row = np.int32(x), np.int32(y)
+        cells[n] = row * columns + column if is_inside else _OUTSIDE
+        down[n], aside[n] = y - np.float32(row), x - np.float32(column)
 
 
 @kernel
 def _cells_to_light(
-    count: np.uint64, places: NDArray[np.float32], columns: int, known: NDArray[np.uint8], cells: NDArray[np.uint32]
+    count: np.uint64, cells: NDArray[np.int32], columns: int, known: NDArray[np.uint8], unlit: NDArray[np.uint32]
 ) -> int:
-    """Find the cells about chosen pixels' places that are not lit yet (2, n); their count."""
-    x, y, found, width, before = places[0], places[1], np.uint64(0), np.uint32(columns), np.uint32(known.shape[0])
+    """Find the cells about those that chosen pixels see that are not lit yet (2, n); their count."""
+    found, width, before = np.uint64(0), np.uint32(columns), _OUTSIDE
     for n in range(count):
-        if x[n] < _ZERO:
+        seen = cells[n]
+        if seen == before:
             continue
-        column, row = np.uint32(x[n]), np.uint32(y[n])
-        first = np.uint32(row * width + column)
-        if first == before or known[first] & _SURROUNDED:
+        before = seen
+        if seen == _OUTSIDE:
             continue
-        before = first
+        first = np.uint32(seen)
+        if known[first] & _SURROUNDED:
+            continue
         known[first] |= _SURROUNDED
         for corner in range(4):
-            right, up = np.uint32(corner & 1), np.uint32(corner >> 1)
-            cell = first + right + up * width
+            cell = first + np.uint32(corner & 1) + np.uint32(corner >> 1) * width
             if not known[cell] & _LIT:
                 known[cell] |= _LIT
-                cells[0, found], cells[1, found] = column + right, row + up
+                unlit[0, found], unlit[1, found] = cell % width, cell // width
                 found += np.uint64(1)
     return int(found)
 
@@ -175,7 +188,7 @@ def _light_cells(cells: NDArray[np.uint32], count: int, beams: Beams, ground: Gr
             near = pattern[a, b] + (pattern[a, b + 1] - pattern[a, b]) * right
             far = pattern[a + 1, b] + (pattern[a + 1, b + 1] - pattern[a + 1, b]) * right
             way = math.sqrt(square + step**2 * (along**2 + (across - half) ** 2))
-            illuminance[row, column] += np.float32(lit * (near + (far - near) * down) * math.exp(loss * way))
+            illuminance[row, column] += np.float32(lit * (near + (far - near) * down) * exponential(loss * way))
             # Light fades from the height of the lamps to a metre above it.
             tops[row, column] = max(tops[row, column], np.float32(height + rise * along + 1.0))
 
@@ -183,37 +196,44 @@ def _light_cells(cells: NDArray[np.uint32], count: int, beams: Beams, ground: Gr
 @kernel
 def _read_map(
     count: np.uint64,
-    places: NDArray[np.float32],
+    cells: NDArray[np.int32],
+    shares: NDArray[np.float32],
     above: NDArray[np.float32],
     eye: EyeOnMap,
-    ground: GroundLight,
+    illuminance: NDArray[np.float32],
+    tops: NDArray[np.float32],
+    columns: int,
     light: NDArray[np.float32],
 ) -> bool:
-    """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any."""
-    illuminance, tops, eye_height, x, y = ground.illuminance, ground.tops, eye.height, places[0], places[1]
-    any_light = False
+    """Illuminance of what chosen pixels see, `above` the eye, none above the lamps; if there is any.
+
+    Takes `cells` (2, n), which `_places_on_map` sets the first row of, `shares` (2, n), and the map's arrays, flat.
+    """
+    seen, at, top, found = cells[0], cells[1], shares[0], np.int32(0)
     for n in range(count):
-        light[n] = _ZERO
-        if x[n] < _ZERO:
-            continue
-        value = bilinear(illuminance, y[n], x[n])
-        if value > _ZERO:
-            top = tops[np.uint32(y[n]), np.uint32(x[n])]
-            light[n] = value * min(max(top - (eye_height + above[n]), _ZERO), _ONE)
-            any_light = True
-    return any_light
+        at[n] = max(seen[n], np.int32(0))
+    read_between(count, illuminance, columns, at, shares[0], shares[1], light)
+    for n in range(count):
+        top[n] = tops[np.uint32(at[n])]
+    for n in range(count):
+        value = light[n] * min(max(top[n] - (eye.height + above[n]), _ZERO), _ONE)
+        is_lit = (seen[n] != _OUTSIDE) & (light[n] > _ZERO)
+        light[n] = value if is_lit else _ZERO
+        found |= np.int32(is_lit)
+    return bool(found != 0)
 
 
 @kernel
 def _light_row(
-    luminance: NDArray[np.float32],
-    light: NDArray[np.float32],
-    factor: NDArray[np.float32],
-    most: np.float32,
-    out: NDArray[np.float32],
+    luminance: NDArray[np.float32], light: NDArray[np.float32], reflection: Reflection, out: NDArray[np.float32]
 ) -> None:
-    for j in range(out.shape[0]):
-        out[j] = luminance[j] + min(luminance[j], most) * light[j] * factor[j]
+    """Add what surfaces return of the light on them to a row (`luminance`, `out` (3 · n,))."""
+    red, green, blue, most = reflection.factor[0], reflection.factor[1], reflection.factor[2], reflection.most
+    for u in range(np.uint64(out.shape[0]) // _THREE):
+        lit, at = light[u], _THREE * u
+        out[at] = luminance[at] + min(luminance[at], most) * lit * red
+        out[at + _FIRST] = luminance[at + _FIRST] + min(luminance[at + _FIRST], most) * lit * green
+        out[at + _SECOND] = luminance[at + _SECOND] + min(luminance[at + _SECOND], most) * lit * blue
 
 
 @kernel
@@ -234,34 +254,27 @@ def add_street_light(
     Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     columns = distance.shape[1]
-    points, light, few = (
-        np.empty((3, columns), np.float32),
-        np.empty(columns, np.float32),
-        np.empty(columns, np.float32),
-    )
-    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
-    lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    beams, places = ground.beams, np.empty((2, columns), np.float32)
-    cells = np.empty((2, 4 * columns), np.uint32)
-    fill_channels(reflection.factor, channels)
+    points, shares = np.empty((3, columns), np.float32), np.empty((2, columns), np.float32)
+    cells, unlit = np.empty((2, columns), np.int32), np.empty((2, 4 * columns), np.uint32)
+    length, pieces = np.empty(columns, np.float32), row_pieces(columns, step)
+    few, beams = values_of_row(columns), ground.beams
+    illuminance, tops = ground.illuminance.reshape(-1), ground.tops.reshape(-1)
+    light = few if step == 1 else values_of_row(columns)
     for v in range(top, bottom):
         any_light = False
-        if _any_near(distance[v]):
-            for u in range(columns):
-                length[u] = min(distance[v, u], _FARTHEST)
-            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            row_points(n, ray_map, v, pixel, chosen, points)
-            _places_on_map(n, points, eye, ground, places)
+        # The sky, and what no lamp of the map may light, are left out.
+        if cut_lengths(distance[v], ground.farthest, length):
+            n = choose_pixels(length, pieces)
+            row_points(n, ray_map, v, pieces.pixel, pieces.length, points)
+            _places_on_map(n, points, eye, ground, cells[0], shares)
             if len(beams.lamps):
-                found = _cells_to_light(n, places, ground.tops.shape[1], beams.known, cells)
-                _light_cells(cells, found, beams, ground)
-            any_light = _read_map(n, places, points[2], eye, ground, few)
+                found = _cells_to_light(n, cells[0], ground.tops.shape[1], beams.known, unlit)
+                _light_cells(unlit, found, beams, ground)
+            any_light = _read_map(n, cells, shares, points[2], eye, illuminance, tops, ground.tops.shape[1], few)
         if any_light:
-            spread_over_row(few, step, first, even, light)
-            repeat_channels(light, lit)
-            _light_row(luminance[v], lit, channels, reflection.most, out[v])
+            if step > 1:
+                spread_over_row(few, pieces, light)
+            _light_row(luminance[v], light, reflection, out[v])
         else:
             for j in range(3 * columns):
                 out[v, j] = luminance[v, j]
@@ -298,6 +311,7 @@ REACH = 48.0
 """Distance along the ground beyond which a lamp lights nothing [m]; there it gives less than 0.02 lx."""
 
 _CELLS = 320
+_FARTHEST = 500.0  # half the diagonal of the map, and more [m]
 _STAY = 64.0  # the map moves on when the camera has left its middle by so much [m]
 _CHANGED = 0.002  # change of extinction beyond which the map is made again [1/m]
 _WHITEST = 0.95  # reflectance above which a surface must be a lamp
@@ -351,16 +365,10 @@ class StreetLight:
         else:
             middle, known = eye, None
         near = lamps.position[np.abs(lamps.position[:, :2] - middle).max(axis=1) < 0.5 * _CELLS * _CELL + REACH]
-        dense = _extinction_at(fog, near - (0.0, 0.0, 0.5 * lamps.height))
+        dense = extinction(fog, near - (0.0, 0.0, 0.5 * lamps.height))
         if known is None or np.any(np.abs(dense - known.extinction) > _CHANGED):
             known = self._map = _map_of(lamps, middle, near, dense)
         return known
-
-
-def _extinction_at(fog: FogField, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    if len(places) and is_uniform_below(fog, float(places[:, 2].max())):
-        return np.full(len(places), fog.extinction)
-    return extinction(fog, places)
 
 
 def _map_of(
@@ -368,6 +376,8 @@ def _map_of(
 ) -> _Map:
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
-    light = GroundLight(middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops, Beams.none())
+    light = GroundLight(
+        middle - 0.5 * (_CELLS - 1) * _CELL, _CELL, illuminance, tops, np.float32(_FARTHEST), Beams.none()
+    )
     _add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
     return _Map(lamps, middle, dense, light)

@@ -93,15 +93,12 @@ def road_beams(
     away = np.hypot(*(state.position[:, :2] - np.asarray(eye, np.float64)[:2]).T)
     lit = np.flatnonzero(((state.lamps & shining) != 0) & (away < FARTHEST))
     nearest = [row for row in lit[np.argsort(away[lit], kind="stable")].tolist() if row != skip][:_MOST]
-    names, kinds = body_names(state), [(int(lamp), _FOG_HEIGHT if lamp is Lamp.FRONT_FOG else 1.0) for lamp in beams]
+    names, kinds = body_names(state), tuple(map(int, beams))
     found: list[tuple[int, float, int, float]] = []
     for row in nearest:
-        left, right = (burning(int(state.lamps[row]), side) for side in (Side.LEFT, Side.RIGHT))
-        for kind, (lamp, share) in enumerate(kinds):
-            count = bool(left & lamp) + bool(right & lamp)
-            if count:
-                height = _head_lamp_height(names[row]) * float(state.height[row]) * share
-                found.append((row, max(round(height / _HEIGHT_STEP), 1) * _HEIGHT_STEP, kind, float(count)))
+        for kind, share, count in _lit_kinds(int(state.lamps[row]), kinds):
+            height = _head_lamp_height(names[row]) * float(state.height[row]) * share
+            found.append((row, max(round(height / _HEIGHT_STEP), 1) * _HEIGHT_STEP, kind, count))
     if not found:
         return None
     rows, heights, numbers, scales = (np.array(column) for column in zip(*found, strict=True))
@@ -116,6 +113,18 @@ def road_beams(
         kind=numbers.astype(np.int64),
         scale=scales,
         sky_illuminance=sky_illuminance,
+    )
+
+
+@lru_cache(64)
+def _lit_kinds(lamps: int, kinds: tuple[int, ...]) -> tuple[tuple[int, float, float], ...]:
+    """Number of each lit kind of lamp, its height over that of the head lamps [-], and how many are lit."""
+    left, right = (burning(lamps, side) for side in (Side.LEFT, Side.RIGHT))
+    counts = [bool(left & lamp) + bool(right & lamp) for lamp in kinds]
+    return tuple(
+        (kind, _FOG_HEIGHT if kinds[kind] == int(Lamp.FRONT_FOG) else 1.0, float(count))
+        for kind, count in enumerate(counts)
+        if count
     )
 
 

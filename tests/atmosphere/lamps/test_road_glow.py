@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps import road_glow
@@ -85,46 +84,3 @@ def test_the_lit_road_glows_in_a_bank_as_in_even_fog() -> None:
     lit = Lights(LOW, LightSources.none(), beams=beams((60.0, 3.5)))
     one, other = (Air(field).radiance(empty_view(CAMERA), CAMERA, POSE, lit) for field in (even, banked))
     np.testing.assert_allclose(other, one, rtol=1e-3)
-
-
-PLANE = (1.0 / (0.02 + 0.00001 * np.arange(101))).astype(np.float32)
-
-
-def read(length: NDArray[np.float32], step: int, values: NDArray[np.float32]) -> tuple[int, NDArray[np.float32]]:
-    """How many pixels are chosen, and what a row's values become where only theirs are known."""
-    size = len(length)
-    inverse, bent = np.empty(size, np.float32), np.empty(size, np.uint8)
-    pixel, chosen = np.empty(size, np.float32), np.empty(size, np.float32)
-    first, even, out = np.empty(size, np.uint64), np.empty(size, np.bool_), np.empty(size, np.float32)
-    count = int(road_glow.choose_pixels(length, step, inverse, bent, pixel, chosen, first, even))
-    known = np.zeros(size, np.float32)
-    known[:count] = values[pixel[:count].astype(int)]
-    assert np.array_equal(chosen[:count], length[pixel[:count].astype(int)])
-    road_glow.spread_over_row(known, step, first, even, out)
-    return count, out
-
-
-def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_pixel() -> None:
-    values = np.linspace(3.0, 5.0, 101, dtype=np.float32)
-    count, out = read(PLANE, 8, values)
-    assert count == 14
-    assert out == pytest.approx(values, rel=1e-5)
-    length = PLANE.copy()
-    length[50:] *= np.float32(0.5)
-    values = np.where(np.arange(101) < 50, 3.0, 7.0).astype(np.float32)
-    count, out = read(length, 8, values)
-    assert 14 < count < 40
-    assert np.array_equal(out, values)
-    values = np.sin(np.arange(101)).astype(np.float32)
-    assert read(PLANE, 1, values)[0] == 101
-    assert np.array_equal(read(PLANE, 1, values)[1], values)
-    for focal_length, pixels in [(50.0, 1), (144.0, 1), (576.9, 6), (5000.0, 8)]:
-        assert road_glow.piece_length(focal_length) == pixels
-
-
-def test_points_lie_at_their_distance_along_the_ray() -> None:
-    ray_map = np.array([[0.01, 0.0, -0.5], [0.0, 0.01, -0.3], [0.0, 0.0, 1.0]], np.float32)
-    pixel, length, points = np.array([0, 100], np.float32), np.array([20, 30], np.float32), np.empty((3, 2), np.float32)
-    road_glow.row_points(np.uint64(2), ray_map, 30, pixel, length, points)
-    assert np.linalg.norm(points, axis=0) == pytest.approx(length, rel=1e-6)
-    assert points[:2] / points[2] == pytest.approx(np.array([[-0.5, 0.5], [0.0, 0.0]]), abs=1e-6)

@@ -13,7 +13,7 @@ from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.second_opinion import GLARES, SecondOpinion
-from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import (
@@ -202,7 +202,7 @@ class JointRoad:
         pixels = linear_pixels(level, self._camera)
         sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
         if sky is not None and sky.luminance < _MIN_AIRLIGHT:
-            return Estimate.invalid(self.method, "too dark above the horizon: this is a daytime method", **found)
+            return Estimate.invalid(self.method, TOO_DARK, **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
         horizon, course, lines = self._seen_course(pixels)

@@ -29,7 +29,8 @@ from fogsim.vision.lines.horizon import (
     why_no_road,
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
-from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
+from fogsim.vision.lines.road_lines import misplaced_horizon, seen_lines, vanishing_point_of
+from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road
@@ -205,7 +206,10 @@ class JointRoad:
             return Estimate.invalid(self.method, TOO_DARK, **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
-        horizon, course, lines = self._seen_course(pixels)
+        try:
+            horizon, course, lines = self._seen_course(pixels)
+        except CannotTellError as reason:
+            return Estimate.invalid(self.method, str(reason), **found)
         free = free_road(observation.lead)
         if sky is None:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
@@ -337,7 +341,7 @@ class JointRoad:
     def _seen_course(self, pixels: LinearPixels) -> tuple[Horizon, RoadCourse, int | None]:
         """Horizon and course of the road, and how many lines meet where it vanishes; None if it bends.
 
-        A straight road's horizon is weighed with the point in which its lines meet.
+        A straight road's horizon is weighed with the point in which its lines meet; CannotTellError if that is far.
         """
         seen = seen_lines(pixels, self._camera, self._horizon)
         if seen is None:
@@ -347,6 +351,8 @@ class JointRoad:
             return course.horizon, course, None
         point = vanishing_point_of(seen, self._camera, self._horizon)
         if point is None:
+            if why := misplaced_horizon(seen, self._camera, self._horizon):
+                raise CannotTellError(why)
             return self._horizon, course, 0
         return weighted_mean(self._horizon, point.horizon), course, point.lines
 

@@ -29,7 +29,7 @@ from fogsim.vision.lines.horizon import (
     why_no_road,
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
-from fogsim.vision.lines.road_lines import misplaced_horizon, seen_lines, vanishing_point_of
+from fogsim.vision.lines.road_lines import refuse_misplaced, seen_lines, vanishing_point_of
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
@@ -193,10 +193,8 @@ class JointRoad:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.kernel_image(observation)
-        found: dict[str, object] = {
-            "horizon_row": self._camera.horizon_row,
-            "told_horizon_row": self._camera.horizon_row,
-        }
+        rows = ("horizon_row", "told_horizon_row")
+        found: dict[str, object] = dict.fromkeys(rows, self._camera.horizon_row)
         if self._impossible:
             return Estimate.invalid(self.method, self._impossible, **found)
         level = levelled(image, self._camera)
@@ -351,8 +349,7 @@ class JointRoad:
             return course.horizon, course, None
         point = vanishing_point_of(seen, self._camera, self._horizon)
         if point is None:
-            if why := misplaced_horizon(seen, self._camera, self._horizon):
-                raise CannotTellError(why)
+            refuse_misplaced(seen, self._camera, self._horizon)
             return self._horizon, course, 0
         return weighted_mean(self._horizon, point.horizon), course, point.lines
 

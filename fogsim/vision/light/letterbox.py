@@ -1,6 +1,9 @@
 """Bands above the picture that a recorder adds: black, perhaps with a line of text."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
@@ -26,7 +29,8 @@ def without_letterbox(image: Pixels, camera: Camera) -> Pixels:
     By night there is no band, nor where it reaches down to the horizon; one below alone looks like a bonnet, which
     methods know. Takes `image` (rows, cols), which is not written to.
     """
-    pixels, level = image if image.ndim == 3 else image[:, :, None], 1 << (camera.bits - 8)
+    pixels: NDArray[Any] = image if image.ndim == 3 else image[:, :, None]
+    level = 1 << (camera.bits - 8)
     first = _first_row(pixels, level, _PICTURE)
     if not 0 < first < camera.horizon_row - _LEAST_SKY:
         return image
@@ -60,11 +64,11 @@ def _share(row: Pixels, value: Pixels, apart: int) -> float:
     """Share of pixels that are alike in all channels."""
     count = 0
     for col in range(row.shape[0]):
-        most = 0
+        is_alike = True
         for channel in range(row.shape[1]):
-            most = max(most, abs(np.int64(row[col, channel]) - np.int64(value[channel])))
-        count += most <= apart
-    return count / row.shape[0]
+            is_alike &= abs(int(row[col, channel]) - int(value[channel])) <= apart
+        count += is_alike
+    return float(count / row.shape[0])
 
 
 @kernel
@@ -73,4 +77,4 @@ def _bright_share(row: Pixels, least: int) -> float:
     count = 0
     for col in range(row.shape[0]):
         count += row[col].max() >= least
-    return count / row.shape[0]
+    return float(count / row.shape[0])

@@ -150,27 +150,27 @@ def seen_horizon(image: LinearPixels, camera: Camera, assumed: Horizon) -> tuple
     point = None if seen is None else vanishing_point_of(seen, camera, assumed)
     if point is not None:
         return weighted_mean(assumed, point.horizon), point
-    if seen is not None and (why := misplaced_horizon(seen, camera, assumed)):
-        raise CannotTellError(why)
+    if seen is not None:
+        refuse_misplaced(seen, camera, assumed)
     return assumed, None
 
 
-def misplaced_horizon(seen: SeenLines, camera: Camera, horizon: Horizon) -> str:
-    """Say where lines meet that do not near the assumed horizon; empty if they do nowhere."""
+def refuse_misplaced(seen: SeenLines, camera: Camera, horizon: Horizon) -> None:
+    """Refuse a horizon near which no lines meet, if they do elsewhere: CannotTellError says where."""
     offset, slope = seen.lines.offset, seen.lines.slope
     if slope.size < 2 * _EACH_SIDE:
-        return ""
+        return
     point = vanishing_point_of(seen, camera, Horizon(horizon.row, _MISPLACED * camera.focal_length / AGREES))
     if point is None:
-        return ""
+        return
     missed = offset + slope * (point.row - horizon.row) - (point.column - camera.principal_point[0])
     meeting = slope[np.abs(missed) <= _TOLERANCE]
     if min(int((meeting > 0.0).sum()), int((meeting < 0.0).sum())) < _EACH_SIDE:
-        return ""
+        return
     below = (camera.principal_point[1] - row for row in (point.row, camera.horizon_row))
     seen_pitch, told = (math.degrees(math.atan(rows / camera.focal_length)) for rows in below)
     met = f"the road's lines meet at a pitch of {seen_pitch:.1f}°, not of {told:.1f}°"
-    return f"{met}: correct it, or the road is not level"
+    raise CannotTellError(f"{met}: correct it, or the road is not level")
 
 
 def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> VanishingPoint | None:

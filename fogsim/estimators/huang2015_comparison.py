@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
 from fogsim.values.camera import Camera
+from fogsim.vision.light.daylight import TOO_DARK
 from fogsim.vision.light.luminance import clipping, darker_by, linear_luminance
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
@@ -146,7 +147,7 @@ def _sky_above(image: Pixels, camera: Camera, distance: float) -> SkyReading:
     luminance = linear_luminance(pixels, camera.response, camera.bits, camera.black_level)
     bright = float(np.percentile(luminance, 80, method="lower"))
     if bright < MIN_AIRLIGHT:
-        raise CannotTellError("too dark above the horizon: this is a daytime method")
+        raise CannotTellError(TOO_DARK)
     even = np.abs(luminance - bright) <= max(0.03 * bright, 4.0)
     across = np.abs(np.diff(luminance, axis=1))
     # Half of the neighbours are of one surface even where trees stand before the sky.

@@ -9,6 +9,7 @@ from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 from fogsim.values.image import Frame, for_kernels
 from fogsim.values.observation import Observation
+from fogsim.vision.light.letterbox import without_letterbox
 
 
 class ObservationCheck:
@@ -39,8 +40,8 @@ class ObservationCheck:
         return image
 
     def kernel_image(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """As `image_of`, for FogSim's own methods, whose kernels only read it."""
-        return for_kernels(self.image_of(observation))
+        """As `image_of`, for FogSim's own methods, whose kernels only read it, without a black band above it."""
+        return without_letterbox(for_kernels(self.image_of(observation)), self._camera)
 
 
 def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:

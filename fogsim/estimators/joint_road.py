@@ -13,7 +13,7 @@ from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.second_opinion import GLARES, SecondOpinion
-from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import (
@@ -29,7 +29,8 @@ from fogsim.vision.lines.horizon import (
     why_no_road,
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
-from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
+from fogsim.vision.lines.road_lines import refuse_misplaced, seen_lines, vanishing_point_of
+from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road
@@ -192,20 +193,21 @@ class JointRoad:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.kernel_image(observation)
-        found: dict[str, object] = {
-            "horizon_row": self._camera.horizon_row,
-            "told_horizon_row": self._camera.horizon_row,
-        }
+        rows = ("horizon_row", "told_horizon_row")
+        found: dict[str, object] = dict.fromkeys(rows, self._camera.horizon_row)
         if self._impossible:
             return Estimate.invalid(self.method, self._impossible, **found)
         level = levelled(image, self._camera)
         pixels = linear_pixels(level, self._camera)
         sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
         if sky is not None and sky.luminance < _MIN_AIRLIGHT:
-            return Estimate.invalid(self.method, "too dark above the horizon: this is a daytime method", **found)
+            return Estimate.invalid(self.method, TOO_DARK, **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
-        horizon, course, lines = self._seen_course(pixels)
+        try:
+            horizon, course, lines = self._seen_course(pixels)
+        except CannotTellError as reason:
+            return Estimate.invalid(self.method, str(reason), **found)
         free = free_road(observation.lead)
         if sky is None:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
@@ -337,7 +339,7 @@ class JointRoad:
     def _seen_course(self, pixels: LinearPixels) -> tuple[Horizon, RoadCourse, int | None]:
         """Horizon and course of the road, and how many lines meet where it vanishes; None if it bends.
 
-        A straight road's horizon is weighed with the point in which its lines meet.
+        A straight road's horizon is weighed with the point in which its lines meet; CannotTellError if that is far.
         """
         seen = seen_lines(pixels, self._camera, self._horizon)
         if seen is None:
@@ -347,6 +349,7 @@ class JointRoad:
             return course.horizon, course, None
         point = vanishing_point_of(seen, self._camera, self._horizon)
         if point is None:
+            refuse_misplaced(seen, self._camera, self._horizon)
             return self._horizon, course, 0
         return weighted_mean(self._horizon, point.horizon), course, point.lines
 

@@ -18,7 +18,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import SignLook
 from fogsim.values.image import for_kernels
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.strips.sky import Sky, sky_above
@@ -173,7 +173,7 @@ class SignWatch:
         level = levelled(image, self._camera)
         sky = sky_above(linear_pixels(level, self._camera), self._camera, self._margin)
         if sky is not None and sky.luminance < _MIN_AIRLIGHT:
-            return sky, "too dark above the horizon: this is a daytime method"
+            return sky, TOO_DARK
         return sky, lit_by_lamps(level, self._camera, lead)
 
     @property

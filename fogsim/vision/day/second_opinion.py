@@ -151,6 +151,8 @@ _LEAST_CONTRAST = 0.08
 _DARK = 6.0 / 255.0
 """Light of the brightest rows below which it is no day, over full scale [-]."""
 
+FAR_ROAD = "far road is hardly brighter: there is little fog, a road as bright as it, or something before the near road"
+CONTRAST = "contrast shows where the fog of the road's brightness would leave none, or something hangs before the road"
 DISAGREE = "how the road fades and how its image brightens disagree"
 
 
@@ -244,7 +246,7 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
         (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
-        (fit.contrast < _LEAST_CONTRAST, "far road is hardly brighter: there is little fog, or a road as bright as it"),
+        (fit.contrast < _LEAST_CONTRAST, FAR_ROAD),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
         (wet, "the road may be wet: it mirrors the sky as fog would veil it"),
@@ -335,7 +337,7 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if not own.valid:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
-        return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
+        return refused(own, CONTRAST)
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > _MOSTLY else own
     if verdict.is_sure:

@@ -12,7 +12,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median_among, quantile_among
-from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, pixel_luminance
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, even_column, pixel_luminance
 
 _BRIGHT_SHARE = 0.75
 """Share of the sky that is no brighter than what counts as its brightness: woods and glows may cover the rest [-]."""
@@ -41,6 +41,22 @@ _BEAM = 1.15
 _OVERHEAD = 0.08
 """Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
+TOO_DARK = "too dark above the horizon: it is night, or something hides the sky"
+BRIGHT_ROAD = "something hides the sky, or lamps or direct sun make the road brighter than the sky"
+
+_OPEN_ROWS, _OPEN_COLS, _LOWEST, _SKY_ALIKE = 24, 64, 0.02, 0.12
+"""Rows and columns that are searched for sky which something leaves open, the least angle of theirs above the horizon
+[rad], and by how much that sky's luminance varies [-]."""
+
+_LEAST_OPEN, _LEAST_SEEN, _LEAST_COLS = 0.3, 0.12, 0.5
+"""Least shares of that sky over the lane up to the lower of `_SKY_ELEVATIONS`, of all rows, and of columns that show
+it [-]. A tunnel leaves 0.2 over the lane, between its walls."""
+
+_BETWEEN, _HIDDEN, _DARKER_ROAD = 0.4, 0.6, 0.85
+"""Most pixels that are somewhat darker than that sky, over those of it, for glow fades upward and what hides the sky
+has an edge; luminances over the sky's below which something hides it, and up to which a road surely is darker [-].
+Chosen on pool 0 of `benchmarks/camera_kinds.py`, with mirrors, visors and bands, and on FogSim's nights [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class _View:
@@ -50,6 +66,8 @@ class _View:
     # (3, 2, rows of the road) int64: first and last column of the lane and of the strips to its left and right, the
     # last before the first where one is not seen
     strips: NDArray[np.int64]
+    low: NDArray[np.int64]  # Rows from the sky's highest down to the horizon
+    near: int  # Number of the first of these that is below the sky's rows
 
 
 def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = None) -> str:
@@ -69,33 +87,45 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
     hidden = first >= min(last, camera.width) or (lead is not None and lead.distance < _HIDES_ABOVE)
     pixels = linear_pixels(level, camera)
-    return _SHOWN[_lit(pixels, view.rows, view.strips, 0 if hidden else first, 0 if hidden else last)]
+    over = (0, 0) if hidden else (first, min(last, camera.width))
+    return _SHOWN[_lit(pixels, view.rows, view.strips, over, view.low, view.near)]
 
 
 _SHOWN = (
     "",
-    "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog",
+    BRIGHT_ROAD,
     "lamps or a low sun light the sky and the road: this is a method for an even daylight",
 )
 """What may show that lamps light the road."""
 
 
 @kernel
-def _lit(image: LinearPixels, rows: NDArray[np.int64], strips: NDArray[np.int64], first: int, last: int) -> int:
+def _lit(
+    image: LinearPixels,
+    rows: NDArray[np.int64],
+    strips: NDArray[np.int64],
+    over: tuple[int, int],
+    low: NDArray[np.int64],
+    near: int,
+) -> int:
     """Which of `_SHOWN` a view's rows (n,) show, with columns of what is overhead, if any."""
     cols, above_road, road = image.pixels.shape[1], rows[:-_ROAD_ROWS], rows[-_ROAD_ROWS:]
     lane = _row_medians(image, road, strips[0])
     sky = _pixels(image, above_road, 0, cols, _SKY_STEP)
     above = quantile_among(sky, _BRIGHT_SHARE)
-    if last > first:
-        overhead = _pixels(image, above_road, first, min(last, cols), 1)
+    if over[1] > over[0]:
+        overhead = _pixels(image, above_road, over[0], over[1], 1)
         above = min(above, quantile_among(overhead, _BRIGHT_SHARE))
     # The median of the rows: those that are not seen count as the brightest.
-    seen, dark = 0, 0
+    seen = 0
     for value in lane:
         seen += not np.isnan(value)
-        dark += value <= above
-    if dark <= lane.size // 2 < seen:
+    is_seen = seen > lane.size // 2
+    if (
+        is_seen
+        and not _is_darker(lane, above)
+        and not _is_darker(lane, _DARKER_ROAD * _open_sky(image, low, near, over))
+    ):
         return 1
     shining = 0
     for light in sky:
@@ -103,6 +133,41 @@ def _lit(image: LinearPixels, rows: NDArray[np.int64], strips: NDArray[np.int64]
     if shining < _LAMPS_SHARE * sky.size or quantile_among(sky, 0.5) >= _DARK_SKY:
         return 0
     return 2 if _has_beam(lane, _row_medians(image, road, strips[1]), _row_medians(image, road, strips[2])) else 0
+
+
+@kernel
+def _is_darker(lane: NDArray[np.float64], light: float) -> bool:
+    """Whether more than half of the lane's rows are no brighter than a luminance."""
+    dark = 0
+    for value in lane:
+        dark += value <= light
+    return dark > lane.size // 2
+
+
+@kernel
+def _open_sky(image: LinearPixels, rows: NDArray[np.int64], near: int, over: tuple[int, int]) -> float:
+    """Luminance of an even sky that shows over the lane below what hides it higher up; 0 if there is none.
+
+    Takes `rows` (n,) int64, those from number `near` on below `_SKY_ELEVATIONS`.
+    """
+    if over[1] <= over[0]:
+        return 0.0
+    lane = _pixels(image, rows[near:], over[0], over[1], 1)
+    light, alike = quantile_among(lane, _BRIGHT_SHARE), 0
+    for value in lane:
+        alike += abs(value - light) < _SKY_ALIKE * light
+    if light >= _LAMP or alike < _LEAST_OPEN * lane.size:
+        return 0.0
+    cols, seen, between, wide = image.pixels.shape[1], 0, 0, 0
+    for j in range(_OPEN_COLS):
+        col, before = even_column(j, _OPEN_COLS, -0.5, cols - 0.5), seen
+        for row in rows:
+            share = pixel_luminance(image, row, col) / light
+            seen += abs(share - 1.0) < _SKY_ALIKE
+            between += _HIDDEN < share <= 1.0 - _SKY_ALIKE
+        wide += seen > before + 1
+    is_wide = seen >= _LEAST_SEEN * rows.size * _OPEN_COLS and wide >= _LEAST_COLS * _OPEN_COLS
+    return light if is_wide and between <= _BETWEEN * seen else 0.0
 
 
 @kernel
@@ -127,7 +192,10 @@ def _view_of(camera: Camera) -> _View:
     rows = np.minimum(np.rint(camera.horizon_row + camera.row_distance / distance).astype(np.int64), last)
     sides = ((-_HALF_LANE, _HALF_LANE), (-_ASIDE[1], -_ASIDE[0]), _ASIDE)
     seen = np.concatenate((_sky_rows(camera), np.maximum(rows, 0)))
-    return _View(seen, np.array([_strip(distance, camera, *side) for side in sides]))
+    low, near, high = (camera.horizon_row - angle * camera.focal_length for angle in (_LOWEST, *_SKY_ELEVATIONS))
+    above = np.unique(np.linspace(max(high, 0.0), max(low, 0.0), _OPEN_ROWS).astype(np.int64))
+    strips = np.array([_strip(distance, camera, *side) for side in sides])
+    return _View(seen, strips, above, min(int(np.searchsorted(above, near)), above.size - 1))
 
 
 def _sky_rows(camera: Camera) -> NDArray[np.int64]:

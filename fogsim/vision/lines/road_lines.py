@@ -25,6 +25,7 @@ from fogsim.vision.lines.road_line_kernels import (
     row_points,
 )
 from fogsim.vision.lines.vanishing_point import VanishingPoint
+from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +56,11 @@ scaled and compressed [px]."""
 
 AGREES = 4.0
 """Standard deviations within which a vanishing point belongs to the assumed horizon [-]."""
+
+_MISPLACED, _EACH_SIDE = math.radians(2.5), 2
+"""How far from the assumed pitch lines are found to meet instead [rad], and how many must on either side of the way
+ahead, for edges of one vehicle or kerb meet anywhere: on pool 0 of `benchmarks/camera_kinds.py` and in FogSim's
+scenarios, whose pitches are right, so many meet nowhere else [-]."""
 
 
 class SeenLines(NamedTuple):
@@ -136,9 +142,35 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
 
 
 def seen_horizon(image: LinearPixels, camera: Camera, assumed: Horizon) -> tuple[Horizon, VanishingPoint | None]:
-    """The assumed horizon weighed with the point in which the road's lines meet, and that point; None without any."""
-    point = road_vanishing_point(image, camera, assumed)
-    return (assumed if point is None else weighted_mean(assumed, point.horizon)), point
+    """The assumed horizon weighed with the point in which the road's lines meet, and that point; None without any.
+
+    CannotTellError if they meet far from it.
+    """
+    seen = seen_lines(image, camera, assumed)
+    point = None if seen is None else vanishing_point_of(seen, camera, assumed)
+    if point is not None:
+        return weighted_mean(assumed, point.horizon), point
+    if seen is not None:
+        refuse_misplaced(seen, camera, assumed)
+    return assumed, None
+
+
+def refuse_misplaced(seen: SeenLines, camera: Camera, horizon: Horizon) -> None:
+    """Refuse a horizon near which no lines meet, if they do elsewhere: CannotTellError says where."""
+    offset, slope = seen.lines.offset, seen.lines.slope
+    if slope.size < 2 * _EACH_SIDE:
+        return
+    point = vanishing_point_of(seen, camera, Horizon(horizon.row, _MISPLACED * camera.focal_length / AGREES))
+    if point is None:
+        return
+    missed = offset + slope * (point.row - horizon.row) - (point.column - camera.principal_point[0])
+    meeting = slope[np.abs(missed) <= _TOLERANCE]
+    if min(int((meeting > 0.0).sum()), int((meeting < 0.0).sum())) < _EACH_SIDE:
+        return
+    below = (camera.principal_point[1] - row for row in (point.row, camera.horizon_row))
+    seen_pitch, told = (math.degrees(math.atan(rows / camera.focal_length)) for rows in below)
+    met = f"the road's lines meet at a pitch of {seen_pitch:.1f}°, not of {told:.1f}°"
+    raise CannotTellError(f"{met}: correct it, or the road is not level")
 
 
 def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> VanishingPoint | None:

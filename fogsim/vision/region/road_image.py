@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera, Response
-from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile
 from fogsim.vision.lines.horizon import Horizon, levelled
@@ -92,7 +92,7 @@ def road_image(
 
 def _checked(road: RoadImage) -> RoadImage:
     if road.airlight < MIN_AIRLIGHT:
-        raise CannotTellError("too dark above the horizon: this is a daytime method")
+        raise CannotTellError(TOO_DARK)
     if road.road >= SATURATED:
         raise CannotTellError("the road is saturated")
     if road.contrast < max(MIN_CONTRAST, 0.05 * road.airlight):

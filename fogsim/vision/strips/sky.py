@@ -321,10 +321,17 @@ _PATCHY, _SCATTERED, _BRIGHTER = 0.35, 0.004, 0.3
 the sky may be brighter then, as a deviation [-]."""
 
 
+_TEXTURE, _FINER = 0.02, 4.0
+"""Noise of single pixels relative to the luminance, and over that of the road, beyond which a wood, a hill or a wall
+stands before the sky [-]: a camera's noise, in light, is up to 3.2 times as much in the sky as on the road on pool 0 of
+`benchmarks/camera_kinds.py`."""
+
+
 def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     """Look at the sky in the middle two thirds of the image above the horizon.
 
-    Returns None if there are no such rows, or something high hides the sky all along them. Takes `margin` [px].
+    Returns None if there are no such rows, or something high or textured hides the sky all along them. Takes `margin`
+    [px].
     """
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
     top = max(0, math.floor(camera.horizon_row - _SKY_HEIGHT * camera.focal_length))
@@ -332,6 +339,10 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
         return None
     axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
     found = _read_sky(image, even_rows(top, bottom, _SKY_ROWS), axis, margin)
+    if found.noise > _TEXTURE * found.luminance:
+        below = even_rows(min(math.ceil(camera.horizon_row + margin), camera.height - 1), camera.height - 1, _SKY_ROWS)
+        if found.noise > _FINER * pixel_noise(image, below):
+            return None
     return None if math.isnan(found.luminance) else found
 
 

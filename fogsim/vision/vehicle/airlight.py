@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
+from fogsim.vision.light.daylight import BRIGHT_ROAD
 from fogsim.vision.light.medians import median, median_among
 from fogsim.vision.region.road_image import CannotTellError
 
@@ -60,7 +61,7 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
     Takes `road` (rows, cols).
     """
     if road.size and median(road) > _BRIGHT_ROAD * sky:
-        raise CannotTellError("the road is brighter than the sky: lamps or direct sun light it")
+        raise CannotTellError(BRIGHT_ROAD)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera, Response
+from fogsim.vision.light.daylight import TOO_DARK
 from fogsim.vision.light.luminance import Clipping, clipping, linear_pixels, linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
@@ -242,7 +243,7 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     """Sky by day, or the reason why this is none."""
     pixels, camera, margin, sky = day.pixels, day.camera, day.margin, day.sky
     if sky is None or sky.luminance < _MIN_AIRLIGHT:
-        raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
+        raise CannotTellError(TOO_DARK)
     if sky.saturated > 0.9:
         raise CannotTellError("the sky is saturated")
     rows = _rows_above(camera, margin)

@@ -99,3 +99,16 @@ def test_under_a_ceiling_that_is_darker_than_the_road_there_is_no_daylight() -> 
     assert not lit_by_lamps(open_air, CAMERA)
     truck[:120, 110:210] = 50
     assert not lit_by_lamps(truck, CAMERA, LeadMeasurement(6.0, 0.0))
+
+
+@pytest.mark.parametrize("left", [0, 110, 60])
+def test_a_mirror_or_visor_before_the_sky_is_no_ceiling(left: int) -> None:
+    """Sky shows below them, over the lane and to its sides; where they hide it all, the reason says so."""
+    road = Road(camera=CAMERA, visibility=100.0, asphalt=90.0)
+    image, clear = photograph(road, scan(road, 0, 2), 0).copy(), photograph(road, scan(road, 0, 2), 0)
+    image[:80, left : 320 - left] = 25
+    assert not lit_by_lamps(image, CAMERA)
+    found, expected = (make("joint_road", CAMERA).update(Observation(one)) for one in (image, clear))
+    assert found.visibility == pytest.approx(expected.visibility, rel=0.1)
+    image[:110, left : 320 - left] = 25
+    assert "something hides the sky" in lit_by_lamps(image, CAMERA)

@@ -5,11 +5,12 @@ import pytest
 from flat_road import Road, photograph, scan
 from stripes import CENTRE, ROW, road_lines
 
-from fogsim.values import Camera, Response
+from fogsim.estimators import make
+from fogsim.values import Camera, Observation, Response
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
 from fogsim.vision.lines.road_line_kernels import Points, RoadLines, fit_road_lines, hough_road_lines, refitted_lines
-from fogsim.vision.lines.road_lines import road_vanishing_point
+from fogsim.vision.lines.road_lines import road_vanishing_point, seen_horizon
 
 
 def found(image, guess=(325.0, 64.0), deviation=1.5):
@@ -31,6 +32,20 @@ def test_a_plain_image_one_faint_line_and_lines_far_from_the_supposed_horizon_ha
     assert found(np.full((300, 640), 90.0, np.float32)) is None
     assert found(road_lines(offsets=(1.75, 1.76), contrast=3.0)) is None
     assert found(road_lines(), guess=(325.0, 90.0), deviation=1.0) is None
+
+
+@pytest.mark.parametrize("method", ["joint_road", "zhu2015", "negru2013", "huang2015_rough"])
+def test_lines_that_meet_far_from_the_stated_horizon_say_what_the_pitch_is(method):
+    road = Road(visibility=150.0)
+    image = photograph(road, scan(road, 0, 2), 0)
+    for pitch in (1.0, 3.0):
+        told = replace(road.camera, pitch=np.radians(pitch))
+        reason = make(method, told).update(Observation(image)).diagnostics["reason"]
+        assert reason.startswith(f"the road's lines meet at a pitch of 2.0°, not of {pitch}°: correct it")
+    # Edges of a vehicle or a kerb, all to one side, meet anywhere.
+    pixels = np.clip(np.rint(road_lines((1.2, 1.35, 1.75, 1.9, 2.5, 2.65))), 0, 255).astype(np.uint8)
+    camera = Camera(640, 300, 600.0, (325.0, 64.0 - 10.0), 1.4)
+    assert seen_horizon(linear_pixels(pixels, camera), camera, Horizon(54.0, 1.0)) == (Horizon(54.0, 1.0), None)
 
 
 @pytest.mark.parametrize("offsets", [(-1.9, -1.75, 1.75, 1.9), (-5.4, -5.2, 1.7, 1.85), (-0.9, -0.75, 2.6, 2.75)])

@@ -40,6 +40,13 @@ def test_an_even_sky_is_as_bright_as_it_is_and_its_noise_that_of_the_pixels():
     assert seen.unevenness == pytest.approx(1.4826 * 0.04, rel=0.15)
 
 
+def test_a_wood_or_a_hill_that_fills_the_view_is_no_sky():
+    """In thin fog its leaves or stones still differ from pixel to pixel, more than a camera's noise does."""
+    wood = 150.0 + np.random.default_rng(1).normal(0.0, 8.0, ROWS.shape)
+    assert sky_above(photographed(wood), CAMERA, 3.0) is None
+    assert sky_above(photographed(np.full(ROWS.shape, 150.0), noise=8.0), CAMERA, 3.0) is not None
+
+
 @pytest.mark.parametrize("slope", [-0.3, 0.4])
 def test_a_sky_that_brightens_upward_counts_as_it_is_at_the_horizon(slope):
     height = (CAMERA.horizon_row - ROWS) / CAMERA.focal_length

@@ -7,7 +7,8 @@ from the old lane to the new one; all that SUMO computes with (gaps, speeds, col
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,15 +60,23 @@ class _Glide:
         return left, self.rate * rest * (1.0 - 3.0 * s) - 6.0 * self.offset / self.duration * s * rest
 
 
+class _Seen(NamedTuple):
+    """A state, and the positions [m] and headings [rad] that it came with."""
+
+    state: TrafficState
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+
 class LaneChangeSmoothing:
     """Lets vehicles that change lane glide to it: a cubic from their place and sideways speed to rest in the new lane.
 
     The new lane is SUMO's from the first step on, in `TrafficState.lane` too; the heading follows the sideways speed.
-    States in which no one has changed lane within the last 3 s are given back as they are.
+    States in which no one has changed lane within the last 3 s stay as they are.
     """
 
     def __init__(self) -> None:
-        self._last: TrafficState | None = None
+        self._last: _Seen | None = None
         self._glides: dict[str, _Glide] = {}
         self._wanted: dict[str, float] = {}
 
@@ -75,16 +84,18 @@ class LaneChangeSmoothing:
         """Let the next change of a vehicle take a time (`duration` [s])."""
         self._wanted[vehicle] = duration
 
-    def smoothed(self, state: TrafficState) -> TrafficState:
-        """The state as it is to be seen; the states of one run are to be given in their order."""
-        last, self._last = self._last, state
+    def smooth(self, state: TrafficState) -> None:
+        """Write to a state where vehicles are to be seen; the states of one run are to be given in their order."""
+        last, self._last = self._last, _Seen(state, state.position, state.heading)
         if last is not None:
-            changed = _lane_changed(last, state)
+            changed = _lane_changed(last.state, state)
             if changed:
                 self._begin(last, state, changed)
-        return self._glided(state) if self._glides else state
+        if self._glides:
+            self._last = _Seen(state, state.position.copy(), state.heading.copy())
+            self._glide(state)
 
-    def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
+    def _begin(self, last: _Seen, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
         for (_, row), jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
             if _LEAST_JUMP <= abs(jump) <= _LARGEST_JUMP:
@@ -96,8 +107,8 @@ class LaneChangeSmoothing:
                 duration = max(self._wanted.pop(vehicle, usual), _LEAST_DURATION)
                 self._glides[vehicle] = _Glide(state.time, duration, offset, rate)
 
-    def _glided(self, state: TrafficState) -> TrafficState:
-        position, heading = state.position.copy(), state.heading.copy()
+    def _glide(self, state: TrafficState) -> None:
+        position, heading = state.position, state.heading
         # Plain numbers: mostly one vehicle or two are on their way, for which arrays would cost ten times as much.
         for vehicle, glide in list(self._glides.items()):
             row = state.row(vehicle)
@@ -109,7 +120,6 @@ class LaneChangeSmoothing:
             position[row, 0] += left * math.sin(angle)
             position[row, 1] -= left * math.cos(angle)
             heading[row] = angle - math.atan2(rate, max(float(state.speed[row]), _LEAST_SPEED))
-        return replace(state, position=position, heading=heading) if self._glides else state
 
 
 def _lane_changed(last: TrafficState, state: TrafficState) -> list[tuple[int, int]]:
@@ -125,7 +135,7 @@ def _lane_changed(last: TrafficState, state: TrafficState) -> list[tuple[int, in
     return [(old, new) for new, (old, lane) in both if lane and lanes[old] not in ("", lane)]
 
 
-def _sideways_jumps(last: TrafficState, state: TrafficState, changed: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+def _sideways_jumps(last: _Seen, state: TrafficState, changed: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
     """How far vehicles have moved to their left (n,) [m]; ``inf`` for those who were not driven there."""
     old, new = np.array(changed).T
     moved = state.position[new, :2] - last.position[old, :2]
@@ -133,6 +143,6 @@ def _sideways_jumps(last: TrafficState, state: TrafficState, changed: Sequence[t
     turn = np.remainder(state.heading[new] - last.heading[old] + np.pi, 2.0 * np.pi) - np.pi
     middle = last.heading[old] + 0.5 * turn
     jump = moved[:, 1] * np.cos(middle) - moved[:, 0] * np.sin(middle)
-    reach = _TOP_SPEED * (state.time - last.time) + _LARGEST_JUMP
+    reach = _TOP_SPEED * (state.time - last.state.time) + _LARGEST_JUMP
     driven = (np.hypot(moved[:, 0], moved[:, 1]) <= reach) & (np.abs(turn) < _LARGEST_TURN)
     return np.where(driven, jump, np.inf)

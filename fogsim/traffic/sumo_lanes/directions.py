@@ -47,11 +47,14 @@ class LaneDirections:
 
     def against(self, vehicles: Sequence[str], lanes: Sequence[str]) -> list[int]:
         """Rows of those of some vehicles that drive against the direction of their lanes."""
+        two_way = {lane for lane in {*lanes} if self.is_two_way(lane)}
+        if not two_way:
+            return []
         both = enumerate(zip(lanes, map(self._known.get, vehicles, itertools.repeat(("", False))), strict=True))
         return [
             row
             for row, (lane, known) in both
-            if (known[1] if known[0] == lane else self.is_two_way(lane) and self.is_against(vehicles[row], lane))
+            if (known[1] if known[0] == lane else lane in two_way and self.is_against(vehicles[row], lane))
         ]
 
     def is_two_way(self, lane: str) -> bool:

@@ -117,6 +117,10 @@ class _OvertakingWishes:
 _CERTAIN_PERIOD = 1.0
 """Who has somebody in sight for certain ahead in the lane to the left, or no one, looks there again after this [s]."""
 
+_MANY = 1000
+"""From so many vehicles on the road on, asking for one on a lane costs less than letting SUMO find it there; not where
+a call is a message, and neighbours are subscribed to."""
+
 _STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
 
@@ -236,8 +240,7 @@ class LaneChanging:
         )
         self._due = DueVehicles(view.roster, float(api.simulation.getDeltaT()))
         self._certain_until: dict[str, float] = {}
-        # Where a call is a message, subscribed neighbours cost less than what else would be asked.
-        self._remembers, self._near_left = not view.remote, dict[str, str]()
+        self._remote, self._near_left = view.remote, dict[str, str]()
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Let those who are due look at the lanes next to them."""
@@ -270,6 +273,7 @@ class LaneChanging:
         """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         speed, certain_until = self._leaders.speed, self._certain_until
         soon, later = self._roster.time + 0.5 * _LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
+        remembers = not self._remote and len(self._roster.present) >= _MANY
         certain = map(certain_until.get, drivers, itertools.repeat(0.0))
         looking = [driver for driver, until in zip(drivers, certain, strict=True) if until <= soon]
         passing = [driver for driver in looking if driver in self._near_left and self._is_near_left(driver)]
@@ -281,7 +285,7 @@ class LaneChanging:
         for driver, (leader, gap) in zip(looking, self._neighbours.left_leaders(looking), strict=True):
             if not self._certainly_seen < gap <= REACH:
                 certain_until[driver] = later
-                if gap <= REACH and self._remembers:
+                if gap <= REACH and remembers:
                     self._near_left[driver] = leader
             elif speed(leader) <= speed(driver) + _MUCH_FASTER:
                 if gap > self._certainly_hidden:

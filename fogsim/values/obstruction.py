@@ -62,7 +62,8 @@ def _add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) 
 def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
     """Find for each pair of eyes whether boxes hide all points of its target.
 
-    Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10), `bounds` (m, 4) [m], `hidden` (n,) bool.
+    Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10) from west to east, their `bounds` (5, m), least
+    and most of x and of y that each has, and most of x of those up to it [m], and `hidden` (n,) bool.
     """
     near = np.empty(len(boxes), np.int64)
     for one in range(len(eyes)):
@@ -88,9 +89,11 @@ def _boxes_near(eyes: _Array, points: _Array, bounds: _Array, near: NDArray[np.i
         west, east = min(west, point[0]), max(east, point[0])
         south, north = min(south, point[1]), max(north, point[1])
     count = 0
-    for number in range(len(bounds)):
-        box = bounds[number]
-        if box[0] <= east and box[1] >= west and box[2] <= north and box[3] >= south:
+    # No box before this one comes as far as the westernmost point.
+    for number in range(np.searchsorted(bounds[4], west), bounds.shape[1]):
+        if bounds[0, number] > east:
+            break
+        if bounds[1, number] >= west and bounds[2, number] <= north and bounds[3, number] >= south:
             near[count] = number
             count += 1
     return count
@@ -108,7 +111,10 @@ class Obstructions:
 
     def __init__(self, boxes: NDArray[np.float64]) -> None:
         self._boxes = boxes
-        self._bounds = _bounds(boxes)
+        bounds = _bounds(boxes)
+        order = bounds[:, 0].argsort(kind="stable")
+        self._from_west, bounds = boxes[order], bounds[order]
+        self._bounds = np.stack([*bounds.T, np.maximum.accumulate(bounds[:, 1])])
 
     def __len__(self) -> int:
         """Number of boxes."""
@@ -124,7 +130,7 @@ class Obstructions:
         hidden = np.zeros(starts.shape[0], np.bool_)
         if self._boxes.size and hidden.size:
             points = np.ascontiguousarray(targets, np.float64).reshape(hidden.size, -1, 3)
-            _find_hidden(starts, points, self._boxes, self._bounds, hidden)
+            _find_hidden(starts, points, self._from_west, self._bounds, hidden)
         return hidden
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:

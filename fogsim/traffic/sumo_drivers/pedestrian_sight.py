@@ -49,7 +49,9 @@ class PedestrianSight:
         self._obstructions = view.obstructions
         self._position, self._angle = (vehicle_getter(view.api, name) for name in ("getPosition3D", "getAngle"))
         self._person_position = getter(view.api, "person", "getPosition3D")
-        self._person_count = getter(view.api, "person", "getIDCount")
+        self._person_count, self._persons = (getter(view.api, "person", name) for name in ("getIDCount", "getIDList"))
+        self._person_road, self._next_edge = (getter(view.api, "person", name) for name in ("getRoadID", "getNextEdge"))
+        self._on_edge = getter(view.api, "edge", "getLastStepVehicleIDs")
         self._unseen = UnseenFoes(view.api, f"{view.session} {_OWN_PART}", view.sight.reaction_time)
         self._seen_through_fog = view.sight.seen_distance(view.fog.maximum_extinction, _CONTRAST, head_lamps=0.0)
         self._certainly_seen = 0.0 if view.obstructions else self._seen_through_fog
@@ -84,22 +86,22 @@ class PedestrianSight:
     def _pairs_near(self) -> Iterator[tuple[str, str]]:
         """Drivers on a junction or the roads to it, and persons on foot there."""
         persons: dict[str, list[str]] = {}
-        for person in self._api.person.getIDList():
+        for person in self._persons():
             junction = self._junction(person)
             if junction:
                 persons.setdefault(junction, []).append(person)
         for junction, on_foot in persons.items():
             there = {person: self._person_position(person) for person in on_foot}
             for road in self._roads_to(junction):
-                for driver in self._api.edge.getLastStepVehicleIDs(road):
+                for driver in self._on_edge(road):
                     if driver in self._roster.present:
                         yield from ((driver, person) for person in self._near(driver, there))
 
     def _junction(self, person: str) -> str:
         """Where a person crosses, or is about to; empty if nowhere."""
-        place = self._api.person.getRoadID(person)
+        place = self._person_road(person)
         if not place.startswith(":"):
-            place = self._api.person.getNextEdge(person)
+            place = self._next_edge(person)
         junction, _, part = place.rpartition("_")
         return junction[1:] if junction.startswith(":") and part.startswith(_PLACES_ON_FOOT) else ""
 

@@ -81,6 +81,18 @@ def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, h
 
 
 @kernel
+def _find_near(eyes: _Array, targets: _Array, reaches: _Array, bounds: _Array, found: NDArray[np.bool_]) -> None:
+    """Find for each pair of eyes whether boxes may be between them and what reaches so far about a target.
+
+    Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m], `bounds` (5, m) [m], `found` (n,) bool.
+    """
+    near, ends = np.empty(bounds.shape[1], np.int64), np.empty((2, 3))
+    for one in range(len(eyes)):
+        ends[0], ends[1] = targets[one] - reaches[one], targets[one] + reaches[one]
+        found[one] = _boxes_near(eyes[one], ends, bounds, near) > 0
+
+
+@kernel
 def _boxes_near(eyes: _Array, points: _Array, bounds: _Array, near: NDArray[np.int64]) -> int:
     """Write the numbers of those boxes that may be between eyes and points; returns how many."""
     west = east = eyes[0]
@@ -132,6 +144,15 @@ class Obstructions:
             points = np.ascontiguousarray(targets, np.float64).reshape(hidden.size, -1, 3)
             _find_hidden(starts, points, self._from_west, self._bounds, hidden)
         return hidden
+
+    def are_near(self, eyes: _Array, targets: _Array, reaches: _Array) -> NDArray[np.bool_]:
+        """Whether anything may be between eyes and what reaches so far about a target: if not, it is not hidden (n,).
+
+        Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m].
+        """
+        found = np.empty(len(eyes), np.bool_)
+        _find_near(eyes, targets, reaches, self._bounds, found)
+        return found
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
         """How much of straight lines lies inside [m].

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -149,6 +149,17 @@ class _HiddenVehicles:
             return []
         # Mostly who leads one follows another.
         places = {vehicle: self._position(vehicle) for pair in pairs for vehicle in pair}
+        ends, sizes = np.array([(places[a], places[b]) for a, b in pairs]), [self._vehicles.body(b) for _, b in pairs]
+        reaches = np.array([body.length + body.width for body in sizes])
+        near = self._obstructions.are_near(ends[:, 0], ends[:, 1], reaches).tolist()
+        hidden = dict.fromkeys(pairs, False)
+        if any(near):
+            those = list(itertools.compress(pairs, near))
+            hidden.update(zip(those, self._are_hidden(those, places), strict=True))
+        return list(map(hidden.__getitem__, pairs))
+
+    def _are_hidden(self, pairs: Sequence[tuple[str, str]], places: Mapping[str, _Point]) -> list[bool]:
+        """Whether all corners of each target are hidden, by where vehicles are [m]."""
         angles = {target: math.radians(90.0 - self._angle(target)) for _, target in pairs}
         bodies = [self._vehicles.body(target) for _, target in pairs]
         parts = [

@@ -386,8 +386,9 @@ class SumoTraffic:
 
     def _shown(self, run: _Run, state: TrafficState) -> TrafficState:
         """The traffic as it is to be seen, and what has collided in it."""
-        smooth = run.lane_changes.smoothed(run.courses.add(state))
-        shown = run.bodies.add(run.script.lamps.shown(smooth, self._elapsed(run)))
+        state = run.courses.add(state)
+        run.lane_changes.smooth(state)
+        shown = run.bodies.add(run.script.lamps.shown(state, self._elapsed(run)))
         run.collisions.add(rail_collisions(shown))
         return shown
 

@@ -62,7 +62,8 @@ def _add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) 
 def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
     """Find for each pair of eyes whether boxes hide all points of its target.
 
-    Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10), `bounds` (m, 4) [m], `hidden` (n,) bool.
+    Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10) from west to east, their `bounds` (5, m), least
+    and most of x and of y that each has, and most of x of those up to it [m], and `hidden` (n,) bool.
     """
     near = np.empty(len(boxes), np.int64)
     for one in range(len(eyes)):
@@ -80,6 +81,18 @@ def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, h
 
 
 @kernel
+def _find_near(eyes: _Array, targets: _Array, reaches: _Array, bounds: _Array, found: NDArray[np.bool_]) -> None:
+    """Find for each pair of eyes whether boxes may be between them and what reaches so far about a target.
+
+    Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m], `bounds` (5, m) [m], `found` (n,) bool.
+    """
+    near, ends = np.empty(bounds.shape[1], np.int64), np.empty((2, 3))
+    for one in range(len(eyes)):
+        ends[0], ends[1] = targets[one] - reaches[one], targets[one] + reaches[one]
+        found[one] = _boxes_near(eyes[one], ends, bounds, near) > 0
+
+
+@kernel
 def _boxes_near(eyes: _Array, points: _Array, bounds: _Array, near: NDArray[np.int64]) -> int:
     """Write the numbers of those boxes that may be between eyes and points; returns how many."""
     west = east = eyes[0]
@@ -88,9 +101,11 @@ def _boxes_near(eyes: _Array, points: _Array, bounds: _Array, near: NDArray[np.i
         west, east = min(west, point[0]), max(east, point[0])
         south, north = min(south, point[1]), max(north, point[1])
     count = 0
-    for number in range(len(bounds)):
-        box = bounds[number]
-        if box[0] <= east and box[1] >= west and box[2] <= north and box[3] >= south:
+    # No box before this one comes as far as the westernmost point.
+    for number in range(np.searchsorted(bounds[4], west), bounds.shape[1]):
+        if bounds[0, number] > east:
+            break
+        if bounds[1, number] >= west and bounds[2, number] <= north and bounds[3, number] >= south:
             near[count] = number
             count += 1
     return count
@@ -108,7 +123,10 @@ class Obstructions:
 
     def __init__(self, boxes: NDArray[np.float64]) -> None:
         self._boxes = boxes
-        self._bounds = _bounds(boxes)
+        bounds = _bounds(boxes)
+        order = bounds[:, 0].argsort(kind="stable")
+        self._from_west, bounds = boxes[order], bounds[order]
+        self._bounds = np.stack([*bounds.T, np.maximum.accumulate(bounds[:, 1])])
 
     def __len__(self) -> int:
         """Number of boxes."""
@@ -124,8 +142,17 @@ class Obstructions:
         hidden = np.zeros(starts.shape[0], np.bool_)
         if self._boxes.size and hidden.size:
             points = np.ascontiguousarray(targets, np.float64).reshape(hidden.size, -1, 3)
-            _find_hidden(starts, points, self._boxes, self._bounds, hidden)
+            _find_hidden(starts, points, self._from_west, self._bounds, hidden)
         return hidden
+
+    def are_near(self, eyes: _Array, targets: _Array, reaches: _Array) -> NDArray[np.bool_]:
+        """Whether anything may be between eyes and what reaches so far about a target: if not, it is not hidden (n,).
+
+        Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m].
+        """
+        found = np.empty(len(eyes), np.bool_)
+        _find_near(eyes, targets, reaches, self._bounds, found)
+        return found
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
         """How much of straight lines lies inside [m].

@@ -50,6 +50,9 @@ def test_sight_is_the_same_from_either_end_to_the_bit() -> None:
     assert np.array_equal(obstructions.way_through(one, other), obstructions.way_through(other, one))
     assert 0.02 < there.mean() < 0.98
     assert np.array_equal(there, obstructions.way_through(one, other) > 0.0)
+    near = obstructions.are_near(one, other, np.full(len(one), 5.0))
+    assert near[obstructions.hide(one, other[:, None] + (3.0, -4.0, 0.0))].all()
+    assert 0.5 < near.mean() < 0.98
 
 
 def test_it_rises_with_its_line_and_nobody_looks_between_its_pieces() -> None:

@@ -64,10 +64,11 @@ def fog_truth(
     on_way = None if way is None or place is None else _way_places(way, place)
     way_places = _NO_PLACES if on_way is None else on_way[1]
     drivers = _NO_PLACES if traffic is None else traffic.position
-    places = np.empty((1 + len(drivers) + len(way_places), 3))
+    first = 1 + len(drivers)
+    places = np.empty((first + len(way_places), 3))
     places[0] = eye
-    np.add(drivers, _EYES, out=places[1 : 1 + len(drivers)])
-    np.add(way_places, _EYES, out=places[1 + len(drivers) :])
+    np.add(drivers, _EYES, out=places[1:first])
+    np.add(way_places, _EYES, out=places[first:])
     found = extinction(fog, places)
     return Truth(
         extinction=float(found[0]),
@@ -80,8 +81,8 @@ def fog_truth(
         route=None if way is None else way.route,
         carriageways={} if way is None else way.carriageways,
         faults=faults,
-        vehicle_extinctions=None if traffic is None else found[1 : 1 + len(drivers)],
-        profile=None if on_way is None else _profile(on_way[0], found[1 + len(drivers) :]),
+        vehicle_extinctions=None if traffic is None else found[1:first],
+        profile=None if on_way is None else _profile(on_way[0], found[first:]),
         illuminance=illuminance,
     )
 

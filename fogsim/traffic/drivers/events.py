@@ -145,7 +145,7 @@ class Script:
         begun = self._begin(situation) if self._waiting else []
         return _ScriptedActions(
             orders=self._orders(situation) if self._braking else {},
-            lane_changes=self._lane_changes(begun, situation),
+            lane_changes=self._lane_changes(begun, situation) if begun else (),
         )
 
     def unplayed(self, seen: Collection[str], present: Collection[str], others: Iterable[str] = ()) -> Unplayed:

@@ -28,6 +28,7 @@ from fogsim.traffic.drivers.sight_kernels import (
     depth_limit,
     depth_limits,
     judge_leaders,
+    judge_lines,
     seen_distance,
 )
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, extinction_from_visibility, luminance_of
@@ -140,6 +141,13 @@ class DriverSight:
         eyes, threshold, reach = self._eyes(0.0)
         judge_leaders(eyes, threshold, reach, self._adapted(most_glare), facing, horizon, judged)
         return judged[0], judged[1]
+
+    def judge_lines(self, lines: NDArray[np.float64], sure: float, extinction: float | None) -> None:
+        """Judge whether targets are seen without any lamps or glare; see `sight_kernels.judge_lines`.
+
+        Takes `lines` (n, 13), `sure` [m], and `extinction` in even fog [1/m].
+        """
+        judge_lines(*self._eyes(0.0), sure, -1.0 if extinction is None else extinction, lines)
 
     def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
         """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].

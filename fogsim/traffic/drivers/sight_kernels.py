@@ -34,16 +34,26 @@ HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
 
 
+IN_DOUBT = 2.0
+"""A vehicle in another lane or road is seen at most by its lamps, or in the driver's head lamps."""
+
 _X, _Y, _Z = range(3)
-_MINIMUM_GAP, _BODY_CONTRAST, _EYE_HEIGHT = range(3)
+_MINIMUM_GAP, _BODY_CONTRAST, _EYE_HEIGHT, _LENGTH, _WIDTH = range(5)
 """Columns of traits of vehicles: the driver's minimum gap [m], the body's contrast [-], the driver's eyes above the
-road [m]."""
+road [m], length and width [m]."""
 
+_PART_HEADING, _PART_BEHIND, _PART_LENGTH = 3, 4, 5
+"""Columns of parts of bodies, after where their front ends are [m]: headings [rad], how far behind the front bumper
+they begin and how long they are [m]."""
 
-EYES, END, LINE, BEARING, AHEAD, ASIDE = 0, 3, 6, 7, 8, 9
+EYES, END, LINE, BEARING, AHEAD, ASIDE, TARGET_CONTRAST, LINE_DEPTH, JUDGED = 0, 3, 6, 7, 8, 9, 10, 11, 12
 """Columns of lines of sight: where one begins, at the driver's eyes, and where it ends, at the nearest part of another
 vehicle [m], its length [m], its horizontal angle from straight ahead [rad], and where the eyes are, from the middle of
-the other's front bumper: ahead of it and to its left [m]."""
+the other's front bumper: ahead of it and to its left [m]; the other's inherent contrast [-]; the optical depth along
+the line [-], and what `judge_lines` finds."""
+
+FARTHEST_SIGHT = 2000.0
+"""No one is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
 
 
 class Closing(NamedTuple):
@@ -190,34 +200,74 @@ def judge_leaders(
 
 @kernel
 def draw_lines_of_sight(
-    observers: NDArray[np.float64], parts: NDArray[np.float64], ends: NDArray[np.int64], lines: NDArray[np.float64]
+    traits: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    read: NDArray[np.float64],
+    parts: NDArray[np.float64],
+    ends: NDArray[np.int64],
+    lines: NDArray[np.float64],
 ) -> None:
-    """Write to `lines` (n, 11) the straight lines from observers' eyes to the nearest part of what they look at.
+    """Write to `lines` (n, 13) the straight lines from observers' eyes to the nearest part of what they look at.
 
-    Takes `observers` (n, 7), where front bumpers are [m], headings [rad] and heights of eyes [m], and all straight
-    `parts` (m, 7) of bodies, of whom each observer's end before `ends` (n,): where their front ends are [m], headings
-    [rad], how far behind the front bumper they begin, lengths and widths [m].
+    Takes `traits` (m, 5 or more), the `rows` (2 n,) of observers and then of targets in it, what is `read` of them, all
+    front bumpers [m] and then all of SUMO's angles [°], and straight `parts` (m, 6) of bodies that bend, each target's
+    before its end in `ends` (n,).
     """
-    first = 0
-    for n in range(ends.size):
-        x, y, height = observers[n, _X], observers[n, _Y], observers[n, 4]
-        nearest = math.inf
-        for i in range(first, ends[n]):
-            front_x, front_y, half = parts[i, _X], parts[i, _Y], 0.5 * parts[i, 6]
-            east, north = math.cos(parts[i, 3]), math.sin(parts[i, 3])
+    count, first = ends.size, 0
+    for n in range(count):
+        other = count + n
+        x, y, height = read[3 * n], read[3 * n + 1], traits[rows[n], _EYE_HEIGHT]
+        half, nearest = 0.5 * traits[rows[other], _WIDTH], math.inf
+        for i in range(first, max(ends[n], first + 1)):
+            if i < ends[n]:
+                front_x, front_y, front_z = parts[i, _X], parts[i, _Y], parts[i, _Z]
+                heading, behind, length = parts[i, _PART_HEADING], parts[i, _PART_BEHIND], parts[i, _PART_LENGTH]
+            else:
+                front_x, front_y, front_z = read[3 * other], read[3 * other + 1], read[3 * other + 2]
+                heading, behind, length = _heading(read[6 * count + other]), 0.0, traits[rows[other], _LENGTH]
+            east, north = math.cos(heading), math.sin(heading)
             ahead = (x - front_x) * east + (y - front_y) * north
             aside = (y - front_y) * east - (x - front_x) * north
-            along, across = min(max(ahead, -parts[i, 5]), 0.0), min(max(aside, -half), half)
+            along, across = min(max(ahead, -length), 0.0), min(max(aside, -half), half)
             end_x, end_y = front_x + along * east - across * north, front_y + along * north + across * east
             distance = math.hypot(end_x - x, end_y - y)
             if distance < nearest:
                 nearest = distance
                 lines[n, END], lines[n, END + 1] = end_x, end_y
-                lines[n, END + 2] = parts[i, _Z] + min(height, BODY_MIDDLE)
-                lines[n, AHEAD], lines[n, ASIDE] = ahead - parts[i, 4], aside
+                lines[n, END + 2] = front_z + min(height, BODY_MIDDLE)
+                lines[n, AHEAD], lines[n, ASIDE] = ahead - behind, aside
         first = ends[n]
-        lines[n, EYES], lines[n, EYES + 1], lines[n, EYES + 2] = x, y, observers[n, _Z] + height
+        lines[n, EYES], lines[n, EYES + 1], lines[n, EYES + 2] = x, y, read[3 * n + 2] + height
         up = lines[n, END + 2] - lines[n, EYES + 2]
         lines[n, LINE] = max(math.sqrt(nearest * nearest + up * up), NEAREST)
-        bearing = math.atan2(lines[n, END + 1] - y, lines[n, END] - x) - observers[n, 3]
+        bearing = math.atan2(lines[n, END + 1] - y, lines[n, END] - x) - _heading(read[6 * count + n])
         lines[n, BEARING] = bearing - 2.0 * math.pi * np.rint(bearing / (2.0 * math.pi))
+        lines[n, TARGET_CONTRAST] = traits[rows[other], _BODY_CONTRAST]
+
+
+@kernel
+def _heading(angle: float) -> float:
+    """Counterclockwise from east [rad] (`angle` clockwise from north [°])."""
+    return (90.0 - angle) * (math.pi / 180.0)
+
+
+@kernel
+def judge_lines(
+    eyes: Adaptation, threshold: float, reach: float, sure: float, even: float, lines: NDArray[np.float64]
+) -> None:
+    """Write to lines of sight whether what they end at is seen, and in even fog their optical depths.
+
+    Takes `reach` [m], `sure`, the distance up to which every body is seen [m], and `even`, the extinction coefficient
+    of fog that is the same everywhere [1/m], negative for other fog.
+    """
+    for n in range(len(lines)):
+        line, distance = lines[n], lines[n, LINE]
+        if even >= 0.0:
+            line[LINE_DEPTH] = even * distance
+        if distance <= sure:
+            line[JUDGED] = SEEN
+        elif distance > FARTHEST_SIGHT:
+            line[JUDGED] = HIDDEN
+        else:
+            limit = depth_limit(eyes, threshold, reach, distance, line[TARGET_CONTRAST], 0.0, 0.0)
+            line[JUDGED] = SEEN if line[LINE_DEPTH] <= limit else IN_DOUBT

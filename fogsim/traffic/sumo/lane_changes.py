@@ -7,7 +7,7 @@ from the old lane to the new one; all that SUMO computes with (gaps, speeds, col
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -74,7 +74,7 @@ class LaneChangeSmoothing:
     """Lets vehicles that change lane glide to it: a cubic from their place and sideways speed to rest in the new lane.
 
     The new lane is SUMO's from the first step on, in `TrafficState.lane` too; the heading follows the sideways speed.
-    States in which no one has changed lane within the last 3 s are given back as they are.
+    States in which no one has changed lane within the last 3 s stay as they are.
     """
 
     def __init__(self) -> None:
@@ -86,15 +86,16 @@ class LaneChangeSmoothing:
         """Let the next change of a vehicle take a time (`duration` [s])."""
         self._wanted[vehicle] = duration
 
-    def smoothed(self, state: TrafficState) -> TrafficState:
-        """The state as it is to be seen; the states of one run are to be given in their order."""
+    def smooth(self, state: TrafficState) -> None:
+        """Write to a state where vehicles are to be seen; the states of one run are to be given in their order."""
         last = self._last
         self._last = _Before(state.time, state.ids, state.lane, state.position.copy(), state.heading.copy())
         if last is not None:
             changed = _lane_changed(last, state)
             if changed:
                 self._begin(last, state, changed)
-        return self._glided(state) if self._glides else state
+        if self._glides:
+            self._glide(state)
 
     def _begin(self, last: _Before, state: TrafficState, changed: Sequence[tuple[int, int]]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
@@ -108,8 +109,8 @@ class LaneChangeSmoothing:
                 duration = max(self._wanted.pop(vehicle, usual), _LEAST_DURATION)
                 self._glides[vehicle] = _Glide(state.time, duration, offset, rate)
 
-    def _glided(self, state: TrafficState) -> TrafficState:
-        position, heading = state.position.copy(), state.heading.copy()
+    def _glide(self, state: TrafficState) -> None:
+        position, heading = state.position, state.heading
         # Plain numbers: mostly one vehicle or two are on their way, for which arrays would cost ten times as much.
         for vehicle, glide in list(self._glides.items()):
             row = state.row(vehicle)
@@ -121,7 +122,6 @@ class LaneChangeSmoothing:
             position[row, 0] += left * math.sin(angle)
             position[row, 1] -= left * math.cos(angle)
             heading[row] = angle - math.atan2(rate, max(float(state.speed[row]), _LEAST_SPEED))
-        return replace(state, position=position, heading=heading) if self._glides else state
 
 
 def _lane_changed(last: _Before, state: TrafficState) -> list[tuple[int, int]]:

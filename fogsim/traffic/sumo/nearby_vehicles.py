@@ -98,11 +98,12 @@ class NearbyVehicles:
 
     def _schedule_far(self, vehicles: Sequence[str], distances: Sequence[float]) -> list[str]:
         """Those near; the others wait until they could have come near."""
-        rate, radius = self._highest_rate(), self._radius
-        far = {v: (away - radius) / rate for v, away in zip(vehicles, distances, strict=True) if away > radius}
-        waits = {v: wait if wait < _MAX_WAIT else _MAX_WAIT for v, wait in far.items()}
-        self._far.add_each(tuple(waits), tuple(waits.values()), self._roster.time)
-        return [v for v in vehicles if v not in waits]
+        rate, radius, now = self._highest_rate(), self._radius, self._roster.time
+        both, farthest = list(zip(vehicles, distances, strict=True)), radius + rate * _MAX_WAIT
+        self._far.add([v for v, away in both if away >= farthest], now + _MAX_WAIT)
+        waits = {v: (away - radius) / rate for v, away in both if radius < away < farthest}
+        self._far.add_each(waits, waits.values(), now)
+        return [v for v, away in both if away <= radius]
 
     def _highest_rate(self) -> float:
         """How fast a distance from the ego changes at most, within the longest wait [m/s]."""

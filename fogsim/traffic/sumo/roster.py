@@ -2,7 +2,7 @@
 
 import itertools
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 from fogsim.traffic.sumo.claims import LoadMark
@@ -170,14 +170,14 @@ class UpdateSchedule:
         """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
         self._due_at(time).extend(vehicles)
 
-    def add_each(self, vehicles: Sequence[str], pauses: Sequence[float], now: float) -> None:
+    def add_each(self, vehicles: Iterable[str], pauses: Iterable[float], now: float) -> None:
         """Schedule vehicles as `add` does, each for a pause of its own (`pauses`, `now` [s])."""
-        due, step, following, batch = self._due, self._step, self._current + 1, self._batch
+        waiting: dict[float, list[str]] = {}
         for vehicle, pause in zip(vehicles, pauses, strict=True):
-            # As `_due_at` does, without a call for each.
-            number = ((now + pause) / step + _ROUNDING) // 1.0
-            number = number if number > following else following
-            due[number - number % batch if number - following >= batch - 1 else number].append(vehicle)
+            # Most have pauses of a few kinds.
+            if pause not in waiting:
+                waiting[pause] = self._due_at(now + pause)
+            waiting[pause].append(vehicle)
 
     def _due_at(self, time: float) -> list[str]:
         """Those who wait with who waits until a time."""

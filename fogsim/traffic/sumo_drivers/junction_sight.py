@@ -38,6 +38,12 @@ class JunctionFoes:
         self._vehicles, self._places = api.vehicle, RoutePlaces(api)
 
     @functools.cached_property
+    def are_there(self) -> bool:
+        """Whether ways cross or merge at any junction; on a motorway without ramps none do."""
+        lanes = self._api.lane
+        return any(lanes.getInternalFoes(lane) for lane in lanes.getIDList() if lane.startswith(":"))
+
+    @functools.cached_property
     def _unregulated(self) -> frozenset[str]:
         # Only in fog need the file be read.
         return unregulated_junctions(self._net or Path(self._api.simulation.getOption("net-file")))
@@ -139,7 +145,7 @@ class JunctionSight:
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Make SUMO's drivers ignore foes at junctions that they do not see."""
-        if self._certainly_seen >= _FARTHEST_FOE:
+        if self._certainly_seen >= _FARTHEST_FOE or not self._foes.are_there:
             return
         due = self._due.take()
         if due.gone:

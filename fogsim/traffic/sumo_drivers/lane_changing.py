@@ -117,6 +117,10 @@ class _OvertakingWishes:
 _CERTAIN_PERIOD = 1.0
 """Who has somebody in sight for certain ahead in the lane to the left, or no one, looks there again after this [s]."""
 
+_MANY = 1000
+"""From so many vehicles on the road on, asking for one on a lane costs less than letting SUMO find it there; not where
+a call is a message, and neighbours are subscribed to."""
+
 _STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
 
@@ -236,6 +240,7 @@ class LaneChanging:
         )
         self._due = DueVehicles(view.roster, float(api.simulation.getDeltaT()))
         self._certain_until: dict[str, float] = {}
+        self._remote, self._near_left = view.remote, dict[str, str]()
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Let those who are due look at the lanes next to them."""
@@ -258,6 +263,7 @@ class LaneChanging:
         if drivers:
             for driver in drivers:
                 self._certain_until.pop(driver, None)
+                self._near_left.pop(driver, None)
             self._standing.restart(drivers, self._roster.present)
             self._requests.restart(drivers, self._roster.present)
             for switch in (self._overtake_right, *self._unhelpful):
@@ -267,13 +273,20 @@ class LaneChanging:
         """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         speed, certain_until = self._leaders.speed, self._certain_until
         soon, later = self._roster.time + 0.5 * _LOOK_PERIOD, self._roster.time + _CERTAIN_PERIOD
+        remembers = not self._remote and len(self._roster.present) >= _MANY
         certain = map(certain_until.get, drivers, itertools.repeat(0.0))
         looking = [driver for driver, until in zip(drivers, certain, strict=True) if until <= soon]
+        passing = [driver for driver in looking if driver in self._near_left and self._is_near_left(driver)]
+        if passing:
+            certain_until.update(dict.fromkeys(passing, later))
+            looking = [driver for driver in looking if certain_until.get(driver) != later]
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         for driver, (leader, gap) in zip(looking, self._neighbours.left_leaders(looking), strict=True):
             if not self._certainly_seen < gap <= REACH:
                 certain_until[driver] = later
+                if gap <= REACH and remembers:
+                    self._near_left[driver] = leader
             elif speed(leader) <= speed(driver) + _MUCH_FASTER:
                 if gap > self._certainly_hidden:
                     unseen[driver] = None
@@ -281,6 +294,14 @@ class LaneChanging:
                     doubtful.append((driver, leader))
         perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
         return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}
+
+    def _is_near_left(self, driver: str) -> bool:
+        """Whether who was last found near a driver in the lane to the left is still there."""
+        other, ahead = self._near_left[driver], self._neighbours.is_ahead_on_the_left
+        if other in self._roster.present and ahead(driver, other, self._certainly_seen):
+            return True
+        del self._near_left[driver]
+        return False
 
     def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
         """Let those change lanes who are blocked by no one whom they perceive, and whom no one helps whom they see."""

@@ -1,5 +1,6 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
+import functools
 import math
 import operator
 from collections.abc import Callable, Iterable, Sequence
@@ -67,6 +68,8 @@ class Neighbours:
         (self._left_leaders,) = vehicle_getters(
             view.api, view.remote, ("getNeighbors",), {"getNeighbors": ("b", _LEFT_LEADERS)}
         )
+        self._station = vehicle_getter(view.api, "getLanePosition")
+        self._left_lane = functools.cache(_next_lane)
         self._neighbours = vehicle_getter(view.api, "getNeighbors")
         self._state = vehicle_getter(view.api, "getLaneChangeState")
 
@@ -76,6 +79,15 @@ class Neighbours:
         # SUMO breaks down when it is asked for those of a vehicle that has never been on a lane.
         found = [ask(vehicle, _LEFT_LEADERS) if lane else () for vehicle, lane in both]
         return [(_nearest(those) if those[1:] else those[0]) if those else _NO_ONE for those in found]
+
+    def is_ahead_on_the_left(self, vehicle: str, other: str, reach: float) -> bool:
+        """Whether another one is ahead in the lane to the left, front to front no farther than `reach` [m].
+
+        So is then its next vehicle there. SUMO passes all vehicles of a lane to find that one.
+        """
+        if self._lane(other) != self._left_lane(self._lane(vehicle)):
+            return False
+        return bool(0.0 < self._station(other) - self._station(vehicle) <= reach)
 
     def wanted_changes(
         self, vehicles: Sequence[str], wishing: Iterable[str], is_held_back: Callable[[str, _Others], bool]
@@ -114,6 +126,12 @@ class Neighbours:
         """Next vehicle ahead in the other lane, in the way or not."""
         found = self._neighbours(change.driver, change.side.neighbours | _LEADERS)
         return str(_nearest(found)[0]) if found else None
+
+
+def _next_lane(lane: str) -> str:
+    """Lane to the left of one of the same edge, whether there is one or not."""
+    edge, _, number = lane.rpartition("_")
+    return f"{edge}_{int(number) + 1}" if edge else "no lane"
 
 
 def _nearest(neighbours: Iterable[tuple[str, float]]) -> tuple[str, float]:

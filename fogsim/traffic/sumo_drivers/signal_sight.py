@@ -53,14 +53,15 @@ class SignalSight:
         api = self._api = view.api
         self._fog, self._sight, self._roster, self._obstructions = view.fog, view.sight, view.roster, view.obstructions
         self._lights = LightsAhead(api)
-        self._speed = vehicle_getter(api, "getSpeed")
+        self._speed, self._position = vehicle_getter(api, "getSpeed"), vehicle_getter(api, "getPosition3D")
         self._deceleration = vehicle_getter(api, "getEmergencyDecel")
         self._modes = Claims(api, SPEED_MODE, view.session)
         self._step = float(api.simulation.getDeltaT())
         self._due = DueVehicles(view.roster, self._step)
-        self._certainly_seen = self._certainly_hidden = math.inf
+        self._certainly_seen = self._certainly_hidden = self._seen_through_fog = math.inf
         if api.trafficlight.getIDCount():
-            self._certainly_seen = 0.0 if view.obstructions else self._seen_distance(view.fog.maximum_extinction)
+            self._seen_through_fog = self._seen_distance(view.fog.maximum_extinction)
+            self._certainly_seen = 0.0 if view.obstructions else self._seen_through_fog
             self._certainly_hidden = self._seen_distance(view.fog.minimum_extinction)
         self._unseen: dict[str, float] = {}
         self._braking_late: dict[str, str] = {}
@@ -141,10 +142,12 @@ class SignalSight:
             return True
         if way > self._certainly_hidden:
             return False
-        x, y, z = self._api.vehicle.getPosition3D(driver)
+        x, y, z = self._position(driver)
         end_x, end_y = self._stop_line(light[0], light[1])
         if self._obstructions.hide([(x, y, z + _EYE_HEIGHT)], [[(end_x, end_y, z + _HEAD_HEIGHT)]])[0]:
             return False
+        if way <= self._seen_through_fog:
+            return True
         straight = max(math.hypot(end_x - x, end_y - y), 0.1)
         # The light is as far as the way to it is long, as leaders are.
         along = np.array([end_x - x, end_y - y, 0.0]) * (way / straight)

@@ -42,7 +42,7 @@ class LaneChangeSwitch:
         """Turn it on for some of those for whom it is decided again, and off for the others."""
         for vehicle in self._turned.intersection(vehicles).difference(on) if self._turned else ():
             self.turn_off(vehicle)
-        for vehicle in on:
+        for vehicle in [v for v in on if v not in self._turned]:
             self.turn_on(vehicle)
 
     def restart(self, vehicles: Iterable[str], present: Collection[str]) -> None:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,22 @@ from fogsim.traffic.drivers.lamp_intensity import (
     uses_high_beam,
 )
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
-from fogsim.traffic.drivers.sight_kernels import AHEAD, ASIDE, BEARING, END, EYES, LINE, draw_lines_of_sight
+from fogsim.traffic.drivers.sight_kernels import (
+    AHEAD,
+    ASIDE,
+    BEARING,
+    END,
+    EYES,
+    FARTHEST_SIGHT,
+    HIDDEN,
+    IN_DOUBT,
+    JUDGED,
+    LINE,
+    LINE_DEPTH,
+    SEEN,
+    TARGET_CONTRAST,
+    draw_lines_of_sight,
+)
 from fogsim.traffic.sumo.claims import SOLE_SESSION
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter, vehicle_getters
 from fogsim.traffic.sumo.roster import Roster
@@ -50,11 +65,8 @@ class _SeenBody(NamedTuple):
     missing: int  # Bits of sides on which there is no lamp
 
 
-_CONTRAST, _EYES_TO_WIDTH = 1, slice(2, 5)
-"""Columns of bodies in an array."""
-
-_OF_TARGET = 10
-"""Column of lines of sight, after those that kernels draw: the target's contrast."""
+_LINE_WIDTH = JUDGED + 1
+_NO_PARTS = np.empty((0, 6))
 
 
 class _SeenVehicles:
@@ -70,12 +82,15 @@ class _SeenVehicles:
         self.traits = np.empty((64, len(_SeenBody._fields)))
         """A row for each body, in the order of the fields of `_SeenBody`; another array once it has grown."""
         self._count = 0
+        self.long: set[str] = set()
+        """Vehicles whose bodies may bend."""
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._bodies.pop(vehicle, None)
             self._rows.pop(vehicle, None)
+            self.long.discard(vehicle)
 
     def body(self, vehicle: str) -> _SeenBody:
         """Body of a vehicle."""
@@ -102,6 +117,8 @@ class _SeenVehicles:
         if row == len(self.traits):
             self.traits = np.concatenate((self.traits, np.empty_like(self.traits)))
         self.traits[row] = self._bodies[vehicle] = body
+        if length > LONGEST_RIGID:
+            self.long.add(vehicle)
         return body
 
     def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
@@ -132,6 +149,17 @@ class _HiddenVehicles:
             return []
         # Mostly who leads one follows another.
         places = {vehicle: self._position(vehicle) for pair in pairs for vehicle in pair}
+        ends, sizes = np.array([(places[a], places[b]) for a, b in pairs]), [self._vehicles.body(b) for _, b in pairs]
+        reaches = np.array([body.length + body.width for body in sizes])
+        near = self._obstructions.are_near(ends[:, 0], ends[:, 1], reaches).tolist()
+        hidden = dict.fromkeys(pairs, False)
+        if any(near):
+            those = list(itertools.compress(pairs, near))
+            hidden.update(zip(those, self._are_hidden(those, places), strict=True))
+        return list(map(hidden.__getitem__, pairs))
+
+    def _are_hidden(self, pairs: Sequence[tuple[str, str]], places: Mapping[str, _Point]) -> list[bool]:
+        """Whether all corners of each target are hidden, by where vehicles are [m]."""
         angles = {target: math.radians(90.0 - self._angle(target)) for _, target in pairs}
         bodies = [self._vehicles.body(target) for _, target in pairs]
         parts = [
@@ -190,9 +218,6 @@ class DriversView:
         return vehicle_getters(self.api, self.remote, names)
 
 
-_FARTHEST = 2000.0
-"""No one is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
-
 _Pairs = Sequence[tuple[str, str]]
 
 
@@ -219,75 +244,71 @@ class VehicleSight:
         if not pairs:
             return []
         lines = self.lines_of_sight(pairs)
-        distance = lines[:, LINE]
-        seen = distance <= self._seen_through_fog
-        doubtful = (~seen & (distance <= _FARTHEST)).nonzero()[0]
+        if self._extinction is None and (in_fog := self._is_in_fog(lines)).any():
+            lines[in_fog, LINE_DEPTH] = self._fog.optical_depth(lines[in_fog, EYES:END], lines[in_fog, END:LINE])
+        self._sight.judge_lines(lines, self._seen_through_fog, self._extinction)
+        judged = lines[:, JUDGED]
+        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)} if own_lamps else ()
+        if dazzling:
+            judged[self._is_in_fog(lines) & [observer in dazzling for observer, _ in pairs]] = IN_DOUBT
+        # Mostly the body is seen, whatever lamps are lit.
+        doubtful = (judged == IN_DOUBT).nonzero()[0]
         if len(doubtful):
-            seen[doubtful] = self._are_seen([pairs[i] for i in doubtful.tolist()], lines[doubtful], own_lamps)
+            those = [pairs[i] for i in doubtful.tolist()]
+            judged[doubtful] = self._are_seen(those, lines[doubtful], own_lamps, dazzling)
+        seen = judged == SEEN
         if self._hidden_vehicles is not None:
             seen &= ~np.array(self._hidden_vehicles.are_hidden(pairs))
         answer: list[bool] = seen.tolist()
         return answer
 
+    def _is_in_fog(self, lines: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether fog may hide what lines of sight end at (n,)."""
+        distance = lines[:, LINE]
+        return np.asarray((distance > self._seen_through_fog) & (distance <= FARTHEST_SIGHT))
+
     def lines_of_sight(self, pairs: _Pairs) -> NDArray[np.float64]:
-        """Straight lines (n, 11) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
+        """Straight lines (n, 13) from observers' eyes to targets; see `sight_kernels.draw_lines_of_sight`."""
         observers, targets = zip(*pairs, strict=True)
         both, count = observers + targets, len(pairs)
-        read, lines, rows = np.empty((2 * count, 7)), np.empty((count, _OF_TARGET + 1)), self._vehicles.rows(both)
-        traits = self._vehicles.traits[rows]
-        flat = itertools.chain.from_iterable(map(self._position, both))
-        read[:, :3] = np.fromiter(flat, np.float64, 6 * count).reshape(-1, 3)
-        read[:, 3] = np.radians(90.0 - np.fromiter(map(self._angle, both), np.float64, 2 * count))
-        read[:, 4:], lines[:, _OF_TARGET] = traits[:, _EYES_TO_WIDTH], traits[count:, _CONTRAST]
-        bodies, ends = read[count:], np.arange(1, count + 1)
-        bodies[:, 4] = 0.0
-        if (bodies[:, 5] > LONGEST_RIGID).any():
-            bodies, ends = self._bend(targets, bodies)
-        draw_lines_of_sight(read[:count], bodies, ends, lines)
+        flat = itertools.chain(itertools.chain.from_iterable(map(self._position, both)), map(self._angle, both))
+        read, rows = np.fromiter(flat, np.float64, 8 * count), self._vehicles.rows(both)
+        bent, lines = self._bend(targets, read), np.empty((count, _LINE_WIDTH))
+        draw_lines_of_sight(self._vehicles.traits, rows, read, *bent, lines)
         return lines
 
-    def _bend(
-        self, targets: Sequence[str], bodies: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Straight parts (m, 7) of bodies, and where those of each end (n,)."""
-        counts, bent = np.ones(len(targets), np.int64), dict[int, list[Part]]()
-        for n in np.flatnonzero(bodies[:, 5] > LONGEST_RIGID).tolist():
-            x, y, z, heading, _, length, _ = bodies[n].tolist()
-            bent[n] = self._bodies.parts(targets[n], length, (x, y, z), heading)
-            counts[n] = len(bent[n])
-        parts, ends = bodies.repeat(counts, axis=0), counts.cumsum()
-        for n, own in bent.items():
-            first = ends[n] - counts[n]
-            parts[first : ends[n], :6] = [(*one.front, one.heading, one.behind, one.length) for one in own]
-        return parts, ends
+    def _bend(self, targets: Sequence[str], read: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Straight parts (m, 6) of those bodies that bend, and where those of each target end (n,)."""
+        counts, parts, vehicles = np.zeros(len(targets), np.int64), list[Part](), self._vehicles
+        if vehicles.long.isdisjoint(targets):
+            return _NO_PARTS, counts
+        places, angles = read[: 6 * len(targets)].reshape(-1, 3), read[6 * len(targets) :]
+        for n, target in enumerate(targets, len(targets)):
+            if target in vehicles.long:
+                x, y, z = places[n].tolist()
+                own = self._bodies.parts(target, self.length(target), (x, y, z), math.radians(90.0 - angles[n]))
+                counts[n - len(targets)], parts = len(own), parts + own
+        return np.array([(*one.front, one.heading, one.behind, one.length) for one in parts]), counts.cumsum()
 
     def length(self, vehicle: str) -> float:
         """Length of a vehicle [m]; no part of it is farther from its front."""
         return self._vehicles.body(vehicle).length
 
-    def _are_seen(self, pairs: _Pairs, lines: NDArray[np.float64], own_lamps: OwnLamps) -> NDArray[np.bool_]:
-        """Whether targets are seen through the fog (n,)."""
-        eyes, looks, known = lines[:, EYES:END], np.zeros((4, len(pairs))), self._extinction
-        looks[0], looks[1] = lines[:, LINE], lines[:, _OF_TARGET]
-        depths = self._fog.optical_depth(eyes, lines[:, END:LINE]) if known is None else known * looks[0]
-        # Mostly the body is seen, whatever lamps are lit.
-        seen = np.asarray(depths <= self._sight.depth_limits(looks))
-        dazzling = {vehicle for vehicle, lit in own_lamps.items() if uses_high_beam(lit)} if own_lamps else ()
-        if dazzling:
-            seen &= [observer not in dazzling for observer, _ in pairs]
-        doubtful = (~seen).nonzero()[0]
-        if len(doubtful):
-            looks, vehicles, rows = np.take(looks, doubtful, axis=1), self._vehicles, doubtful.tolist()
-            for n, (row, line) in enumerate(zip(rows, lines[doubtful].tolist(), strict=True)):
-                (observer, target), toward = pairs[row], (line[AHEAD], line[ASIDE])
-                lit = vehicles.lamps(target, own_lamps)
-                looks[2, n] = intensity_toward(lit, vehicles.body(target).length, *toward)
-                looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
-            limits = self._sight.depth_limits(looks)
-            for n, row in enumerate(rows) if dazzling else ():
-                if pairs[row][0] in dazzling:
-                    glare = high_beam_veil(float(self._fog.extinction(eyes[row])) if known is None else known)
-                    distance, contrast, intensity, own = looks[:, n].tolist()
-                    limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, glare)
-            seen[doubtful] = depths[doubtful] <= limits
-        return seen
+    def _are_seen(
+        self, pairs: _Pairs, lines: NDArray[np.float64], own_lamps: OwnLamps, dazzling: Collection[str]
+    ) -> NDArray[np.float64]:
+        """Judge by the lamps whether targets are seen through the fog (n,)."""
+        looks, vehicles = np.empty((4, len(pairs))), self._vehicles
+        looks[0], looks[1] = lines[:, LINE], lines[:, TARGET_CONTRAST]
+        for n, ((observer, target), line) in enumerate(zip(pairs, lines.tolist(), strict=True)):
+            lit = vehicles.lamps(target, own_lamps)
+            looks[2, n] = intensity_toward(lit, vehicles.body(target).length, line[AHEAD], line[ASIDE])
+            looks[3, n] = vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line[BEARING])
+        limits = self._sight.depth_limits(looks)
+        for n, (observer, _) in enumerate(pairs) if dazzling else ():
+            if observer in dazzling:
+                known = self._extinction
+                here = float(self._fog.extinction(lines[n, EYES:END])) if known is None else known
+                distance, contrast, intensity, own = looks[:, n].tolist()
+                limits[n] = self._sight.depth_limit(distance, contrast, intensity, own, high_beam_veil(here))
+        return np.where(lines[:, LINE_DEPTH] <= limits, SEEN, HIDDEN)

@@ -1,5 +1,6 @@
 """Which vehicles drive on the oncoming lane, where SUMO counts their position from the far end."""
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -37,6 +38,8 @@ class LaneDirections:
         self._lane, self._station = vehicle_getter(api, "getLaneID"), vehicle_getter(api, "getLanePosition")
         self._opposite = OppositeEdges(api)
         self._known: dict[str, tuple[str, bool]] = {}
+        self.is_two_way = functools.cache(self._is_two_way)
+        """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so."""
 
     def is_against(self, vehicle: str, lane: str) -> bool:
         """Whether a vehicle drives against the direction of its lane; read again only where the lane is another."""
@@ -54,8 +57,7 @@ class LaneDirections:
             if (known[1] if known[0] == lane else self.is_two_way(lane) and self.is_against(vehicles[row], lane))
         ]
 
-    def is_two_way(self, lane: str) -> bool:
-        """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so."""
+    def _is_two_way(self, lane: str) -> bool:
         edge = lane.rpartition("_")[0]
         return edge.startswith(":") or bool(self._opposite.of(edge))
 

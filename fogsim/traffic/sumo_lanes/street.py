@@ -33,14 +33,13 @@ class LightsAhead:
 
     def next_of(self, vehicle: str) -> Light | None:
         """The next light of a vehicle; None without one."""
-        if not self._has_lights:
-            return None
-        lights = self._lights(vehicle)
-        light: Light | None = next((one for one in lights if one[1] >= 0 and one[3] in SIGNAL_COLOURS), None)
-        if light is None or not self._directions.is_against(vehicle, lane := self._lane(vehicle)):
-            return light
-        name, link, way, letter = light
-        return name, link, way + 2.0 * float(self._station(vehicle)) - float(self._length(lane)), letter
+        for name, link, left, letter in self._lights(vehicle) if self._has_lights else ():
+            if link >= 0 and letter in SIGNAL_COLOURS:
+                way, lane = float(left), self._lane(vehicle)
+                if self._directions.is_against(vehicle, lane):
+                    way = way + 2.0 * float(self._station(vehicle)) - float(self._length(lane))
+                return name, link, way, letter
+        return None
 
     def shown_to(self, vehicle: str) -> SignalAhead | None:
         """The next light of a vehicle as what it shows; None without one."""

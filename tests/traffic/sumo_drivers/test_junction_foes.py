@@ -10,6 +10,7 @@ import sumo
 
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_drivers.junction_sight import JunctionFoes, unregulated_junctions
+from tests.traffic.common import NET, QUIET
 
 CROSSING_WAYS = (("A1B1", "B1C1"), ("B0B1", "B1B2"), ("C1B1", "B1A1"))
 
@@ -40,7 +41,15 @@ def test_foes_are_sumos_own_and_none_where_nobody_has_the_right_of_way(tmp_path:
     assert unregulated_junctions(tmp_path / "elsewhere.net.xml") == frozenset()
     with crossing(tmp_path, "priority") as libsumo:
         assert not unregulated_junctions(tmp_path / "cross.net.xml")
+        assert JunctionFoes(libsumo).are_there
         assert foes_met(libsumo) == {first for first, _ in CROSSING_WAYS}
     with crossing(tmp_path, "unregulated") as libsumo:
         assert "B1" in unregulated_junctions(tmp_path / "cross.net.xml")
         assert foes_met(libsumo) == set()
+
+
+def test_on_a_motorway_without_ramps_there_are_none() -> None:
+    with contextlib.closing(load_libsumo()) as libsumo:
+        libsumo.start(["sumo", "-n", str(NET), *QUIET])
+        assert any(lane.startswith(":") for lane in libsumo.lane.getIDList())
+        assert not JunctionFoes(libsumo).are_there

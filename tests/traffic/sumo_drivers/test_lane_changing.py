@@ -16,7 +16,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging, _RequestedChanges
-from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
+from fogsim.traffic.sumo_drivers.neighbour_sight import Neighbours, NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.unseen import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView, OwnLamps, VehicleSight
@@ -316,3 +316,24 @@ def test_who_comes_back_from_a_teleport_changes_lanes_as_before(link: LibsumoLin
     for part in (switch, requests):
         part.restart([driver], {driver})
     assert changing() == usual
+
+
+@pytest.mark.parametrize("options", [(), ("--lateral-resolution", "0.8")])
+def test_who_is_near_in_the_lane_to_the_left_need_not_be_looked_for(road: Road, options: Sequence[str]) -> None:
+    """SUMO names that vehicle, or a nearer one, in a lane of either edge and next to who changes lanes."""
+    road.options = options
+    names = [f"v{number}" for number in range(45)]
+    crowd = "".join(
+        vehicle(name, 900.0 - 7.0 * number, 15.0 + number % 7, number % 3, top=33.0)
+        for number, name in enumerate(names)
+    )
+    api = road.enter(crowd, CLEAR, free=names)
+    neighbours, reach, found = Neighbours(DriversView(api, fog_of(0.05), SeesFrom(CLEAR), road.roster)), 40.0, 0
+    for _ in range(150):
+        road.link.step()
+        present = api.vehicle.getIDList()
+        left = dict(zip(present, neighbours.left_leaders(present), strict=True))
+        near = [v for v in present for o in present if neighbours.is_ahead_on_the_left(v, o, reach)]
+        assert all(left[v][1] <= reach for v in near)
+        found += len(near)
+    assert found > 1000

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import Compliance, DriverSetup, DriverSight, LampFailureEvent, TrafficSetup, Trigger
-from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
+from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, JUDGED, LINE, SEEN
 from fogsim.traffic.drivers.speed_choice import unaffected, within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo.roster import Roster
@@ -73,6 +73,9 @@ class SeesFrom:
     def judge_leaders(self, facing: NDArray[np.float64], *_: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """To be looked at again in the next step."""
         return np.where(facing[DISTANCE] <= self.distance, SEEN, HIDDEN), np.zeros(facing.shape[1])
+
+    def judge_lines(self, lines: NDArray[np.float64], *_: float) -> None:
+        lines[:, JUDGED] = np.where(lines[:, LINE] <= self.distance, SEEN, HIDDEN)
 
 
 @pytest.fixture

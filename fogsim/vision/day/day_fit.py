@@ -95,10 +95,9 @@ class DayFit:
         """Mean of ln k under all responses over that under the stated one; 0 unless that is unlikely [-]."""
         return float((self.responses * self.log_means).sum()) if self.responses[0] < _UNLIKELY_STATED else 0.0
 
-    @property
-    def response_deviation(self) -> float:
-        """Deviation of ln k under other responses from that under the stated one, or from their mean [-]."""
-        return math.sqrt(float((self.responses * (self.log_means - self.response_shift) ** 2).sum()))
+    def response_deviation(self, shift: float) -> float:
+        """Deviation of ln k under all responses from what is so far from that under the stated one [-]."""
+        return math.sqrt(float((self.responses * (self.log_means - shift) ** 2).sum()))
 
     def quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a probability [m]."""

@@ -170,11 +170,11 @@ class DayVerdict:
     # Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where the
     # road is not sure [-]
     outside: float
-    # doubt, response_deviation, response_shift: see `DayFit`
+    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven
     doubt: float
     response_deviation: float
     response_shift: float = 0.0
-    is_stated: bool = True  # Whether the response may be the stated one
+    is_stated: bool = True  # Whether the response may be the stated one, or the road is uneven
     airlight_deviation: float = 0.0  # Relative deviation of k where the sky is clipped, and the airlight not known [-]
     is_road: bool = True  # Whether a road is likelier than none
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
@@ -223,7 +223,9 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane
     is_sure = is_sure and is_sky and low > _DENSEST
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
-    is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY and is_stated
+    is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
+    # What crosses an uneven road, as a wiper does, is no tone curve.
+    shift = fit.response_shift if is_fog and is_even else 0.0
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=half,
@@ -232,12 +234,12 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         reason="" if answers and is_road else _reason(fit, is_road, sky),
         shows_fog=shows and is_road,
         is_sure=is_sure,
-        is_even=is_even,
-        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even else 0.0,
+        is_even=is_even and is_stated,
+        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even and is_stated else 0.0,
         doubt=fit.doubt,
-        response_deviation=fit.response_deviation if is_fog else 0.0,
-        response_shift=fit.response_shift if is_fog else 0.0,
-        is_stated=is_stated,
+        response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
+        response_shift=shift,
+        is_stated=is_stated or not is_even,
         airlight_deviation=2.0 * half / (dense + thin) if is_road and fit.clipped > _MOSTLY else 0.0,
         is_road=is_road,
         free=fit.free,

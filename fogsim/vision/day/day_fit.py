@@ -260,7 +260,7 @@ _HARDLY, _LIKELY = 0.03, 2
 """Probability below which a surface is not tried in every later image of a drive [-], and how many responses are, in
 addition to the stated one: an image hardly separates them, and a camera keeps its own."""
 
-_UNLIKELY_STATED = 0.2
+_UNLIKELY_STATED = 0.1
 """Probability of the stated response below which the mean over all counts; chosen on pool 0 of
 `benchmarks/camera_kinds.py` [-]."""
 

@@ -170,11 +170,11 @@ class DayVerdict:
     # Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where the
     # road is not sure [-]
     outside: float
-    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven
+    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven, or the stated one is out
     doubt: float
     response_deviation: float
     response_shift: float = 0.0
-    is_stated: bool = True  # Whether the response may be the stated one, or the road is uneven
+    is_stated: bool = True  # Whether the response may be the stated one; also where the road is not sure, or uneven
     airlight_deviation: float = 0.0  # Relative deviation of k where the sky is clipped, and the airlight not known [-]
     is_road: bool = True  # Whether a road is likelier than none
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
@@ -225,7 +225,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
     # What crosses an uneven road, as a wiper does, is no tone curve.
-    shift = fit.response_shift if is_fog and is_even else 0.0
+    shift = fit.response_shift if is_fog and is_even and is_stated else 0.0
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=half,
@@ -239,7 +239,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         doubt=fit.doubt,
         response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
         response_shift=shift,
-        is_stated=is_stated or not is_even,
+        is_stated=is_stated or not (is_sure and is_even),
         airlight_deviation=2.0 * half / (dense + thin) if is_road and fit.clipped > _MOSTLY else 0.0,
         is_road=is_road,
         free=fit.free,
@@ -335,7 +335,8 @@ class SecondOpinion:
         return verdict
 
     def _weighed(self, own: Estimate, verdict: DayVerdict, free: float, lines: int | None) -> Estimate:
-        if own.valid and math.isfinite(min(free, verdict.free)) and verdict.doubt <= MOST_DOUBT:
+        is_short = verdict.is_stated and math.isfinite(min(free, verdict.free))
+        if own.valid and is_short and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less, but too little of a road that may be wet for either.
             return own if verdict.outside <= _SUSPECTED else _of_day(own, verdict)
         if own.valid and lines is None:
@@ -354,13 +355,15 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
         return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
-    if verdict.is_sure and not verdict.is_stated:
-        return _of_day(own, verdict)
+    agreed = agree(own.visibility_interval, verdict.interval)
+    if not verdict.is_stated:
+        spanning = _spanning(own, verdict.extinction, verdict) if agreed and not verdict.reason else None
+        return spanning or _of_day(own, verdict)
     if verdict.reason and verdict.outside > _MOSTLY:
         return _of_day(own, verdict)
     if verdict.is_sure and not verdict.reason:
         return _weighed(own, verdict)
-    return own if agree(own.visibility_interval, verdict.interval) else refused(own, DISAGREE)
+    return own if agreed or (verdict.reason and own.visibility_interval[1] > _FOG) else refused(own, DISAGREE)
 
 
 def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:

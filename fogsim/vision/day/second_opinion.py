@@ -170,7 +170,7 @@ class DayVerdict:
     # Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where the
     # road is not sure [-]
     outside: float
-    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven, or the stated one is out
+    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven
     doubt: float
     response_deviation: float
     response_shift: float = 0.0

@@ -274,7 +274,7 @@ _SUITS = 5.0
 _ALL = np.arange(LIGHTS.sky.size)
 """All lights."""
 
-_CLIPPED_AIRLIGHT = 0.9
+_CLIPPED_AIRLIGHT = 0.7
 """Deviation of the airlight before an image is seen, over the usual one, where the sky is clipped [-]: exposure meters
 seldom let it be twice as bright; chosen on pool 0 of `benchmarks/camera_kinds.py`."""
 

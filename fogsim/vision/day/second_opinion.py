@@ -202,8 +202,8 @@ class DayVerdict:
         return min(middle, self.farthest)
 
 
-def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdict:
-    """Judge a posterior, of an image in which so many lines meet where a straight road vanishes."""
+def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> DayVerdict:
+    """Judge a posterior, of an image in which so many lines meet where the road vanishes; None if it bends or sags."""
     low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
     calibration = NORMAL_90_PERCENT * scale_deviation
     low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
@@ -216,7 +216,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     shows = is_fog and fit.contrast > _LEAST_CONTRAST
     answers = is_clear or (shows and high < WIDEST * low)
     is_stated = fit.responses[0] > _HARDLY_STATED
-    is_lane = lines >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
+    is_lane = (lines or 0) >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
     is_road = fit.fog_over_none > _A_ROAD or is_lane
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sky = sky > _MOSTLY or fit.clipped > 0.0
@@ -224,8 +224,9 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     is_sure = is_sure and is_sky and low > _DENSEST
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
-    # What crosses an uneven road, as a wiper does, is no tone curve.
-    shift = fit.response_shift if is_fog and is_even and is_stated else 0.0
+    # What crosses an uneven road, as a wiper does, is no tone curve, nor is the course of one that sags.
+    shows_response = is_even and is_sure and lines is not None
+    shift = fit.response_shift if is_fog and shows_response and is_stated else 0.0
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=half,
@@ -239,7 +240,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
         doubt=fit.doubt,
         response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
         response_shift=shift,
-        is_stated=is_stated or not (is_sure and is_even),
+        is_stated=is_stated or not shows_response,
         airlight_deviation=2.0 * half / (dense + thin) if is_road and fit.clipped > _MOSTLY else 0.0,
         is_road=is_road,
         free=fit.free,
@@ -301,7 +302,7 @@ class SecondOpinion:
         bends.
         """
         is_recent = self._agreed < time < self._agreed + PERIOD
-        shifted = _shifted(own, self._shift)
+        shifted = _shifted(own, self._shift) if self._shift else own
         if own.valid and is_recent and (self._clear is None or agree(shifted.visibility_interval, self._clear)):
             return self._kept(shifted)
         verdict = self._verdict(own, level, horizon, free, time, lines)
@@ -327,16 +328,15 @@ class SecondOpinion:
         earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
         self._fit, self._looked = fit, time
-        verdict, self._clear = verdict_of(fit, self._scale, lines or 0), None
-        self._shift = verdict.response_shift if own.valid and verdict.is_sure else 0.0
+        verdict, self._clear = verdict_of(fit, self._scale, lines), None
+        self._shift = verdict.response_shift if own.valid else 0.0
         # Before what stands in the lane too little road is seen for faint doubts of the response.
         is_seen = verdict.is_sure and (self._shift != 0.0 or math.isinf(min(free, verdict.free)))
         self._response = max(verdict.response_deviation if is_seen else 0.0, verdict.airlight_deviation)
         return verdict
 
     def _weighed(self, own: Estimate, verdict: DayVerdict, free: float, lines: int | None) -> Estimate:
-        is_short = verdict.is_stated and math.isfinite(min(free, verdict.free))
-        if own.valid and is_short and verdict.doubt <= MOST_DOUBT:
+        if own.valid and verdict.is_stated and verdict.doubt <= MOST_DOUBT and math.isfinite(min(free, verdict.free)):
             # Before what stands in the lane it sees less, but too little of a road that may be wet for either.
             return own if verdict.outside <= _SUSPECTED else _of_day(own, verdict)
         if own.valid and lines is None:

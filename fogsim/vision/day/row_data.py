@@ -50,8 +50,8 @@ _STRETCHED = 0.3
 """Chance that levels were stretched, where some pixels are black: so may dark things be [-]."""
 
 _BLACK, _SPREAD, _LEAST_BLACK = 1.0 / 255.0, 8, 0.001
-"""Signal up to which a pixel counts as black [-], rows and columns of which one is looked at [px], and least share of
-black pixels where levels were stretched, which clips about 0.5 % of them [-]."""
+"""Signal up to which a pixel counts as black [-], distance of the pixels that are read [px], and least share of black
+ones where levels were stretched: that usually clips 0.5 % [-]."""
 
 
 class Curves(NamedTuple):

@@ -242,7 +242,7 @@ class JointRoad:
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
         changing = self._change(observation.time, fit.fit.extinction)
         veiled = _VEILED * fit.fit.extinction if sky.has_sun else 0.0
-        own = self._estimate(fit, front, found, math.hypot(unsure, veiled), changing)
+        own = self._estimate(fit, front, found, math.hypot(unsure, veiled, fit.fit.bright_deviation), changing)
         return own, min(free, _obstacle(fit.fit, self._geometry))
 
     def _fitted(

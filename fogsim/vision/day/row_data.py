@@ -43,12 +43,24 @@ _OTHER_LINEAR = 0.02
 """The same for light itself [-]."""
 
 
+_BLACK_POINTS = (0.2, 0.35, 0.5)
+"""Signals that were stretched to black, over those stretched to white: of clear air, and of thin and dense fog [-]."""
+
+_STRETCHED = 0.3
+"""Chance that levels were stretched, where some pixels are black: so may dark things be [-]."""
+
+_BLACK, _SPREAD, _LEAST_BLACK = 1.0 / 255.0, 8, 0.001
+"""Signal up to which a pixel counts as black [-], distance of the pixels that are read [px], and least share of black
+ones where levels were stretched: that usually clips 0.5 % [-]."""
+
+
 class Curves(NamedTuple):
-    """Inverse response curves."""
+    """Inverse response curves, those of stretched levels last."""
 
     light: Floats  # Light behind evenly spaced signals, relative to full scale
     slope: Floats  # Its derivative by the signal
-    chance: Floats  # (curves,): How likely each is; their sum is 1
+    chance: Floats  # (curves,): How likely each is, 0 for those of stretched levels; their sum is 1
+    stretched: Floats  # (curves,): The same where levels may be stretched
 
 
 @lru_cache(maxsize=8)
@@ -62,9 +74,22 @@ def curves_of(camera: Camera) -> Curves:
         others["linear"] = _OTHER_LINEAR
     light = [exposure_of(signal, camera.response, camera.black_level)]
     light += [_inverse(name, signal) for name in others]
-    weights = np.array(list(others.values()))
+    light += [exposure_of(black + (1.0 - black) * signal, Response.SRGB) for black in _BLACK_POINTS]
+    weights, none = np.array(list(others.values())), np.zeros(len(_BLACK_POINTS))
     slope = np.clip(np.gradient(np.array(light), signal, axis=1), 1.0 / MOST_SLOPE, MOST_SLOPE)
-    return Curves(np.array(light), slope, np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum()]))
+    chance = np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum(), none])
+    stretched = (1.0 - _STRETCHED) * chance
+    stretched[-none.size :] = _STRETCHED / none.size
+    return Curves(np.array(light), slope, chance, stretched)
+
+
+def chances_of(image: NDArray[Any], camera: Camera) -> Floats:
+    """(curves,) float64: how likely each of a camera's curves is; without black pixels, no levels were stretched.
+
+    Takes `image` (rows, cols, channels).
+    """
+    curves, black = curves_of(camera), image[::_SPREAD, ::_SPREAD] <= _BLACK * (2**camera.bits - 1)
+    return curves.stretched if black.mean() > _LEAST_BLACK else curves.chance
 
 
 _WHITE, BRIGHT = 7.3, 0.95

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
+from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, OpticalDepths
 from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.light.luminance import linear_pixels
@@ -172,9 +172,12 @@ class DayVerdict:
     # Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where the
     # road is not sure [-]
     outside: float
-    # doubt, response_deviation: see `DayFit`
+    # doubt, response_deviation, response_shift: see `DayFit`; no shift where the road is uneven
     doubt: float
     response_deviation: float
+    response_shift: float = 0.0
+    is_stated: bool = True  # Whether the response may be the stated one; also where the road is not sure, or uneven
+    airlight_deviation: float = 0.0  # Relative deviation of k where the sky is clipped, and the airlight not known [-]
     is_road: bool = True  # Whether a road is likelier than none
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
     farthest: float = math.inf  # Depth of the farthest rows that were read [m]
@@ -201,8 +204,8 @@ class DayVerdict:
         return min(middle, self.farthest)
 
 
-def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdict:
-    """Judge a posterior, of an image in which so many lines meet where a straight road vanishes."""
+def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> DayVerdict:
+    """Judge a posterior, of an image in which so many lines meet where the road vanishes; None if it bends or sags."""
     low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
     calibration = NORMAL_90_PERCENT * scale_deviation
     low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
@@ -211,28 +214,36 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int = 0) -> DayVerdic
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
     by_light = fit.lights
     usual = float(fit.surfaces[:_USUAL_SURFACES].sum())
-    shows = fit.below(_FOG) > _LEAST_FOG and fit.contrast > _LEAST_CONTRAST
+    is_fog = fit.below(_FOG) > _LEAST_FOG
+    shows = is_fog and fit.contrast > _LEAST_CONTRAST
     answers = is_clear or (shows and high < WIDEST * low)
     is_stated = fit.responses[0] > _HARDLY_STATED
-    is_lane = lines >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
+    is_lane = (lines or 0) >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
     is_road = fit.fog_over_none > _A_ROAD or is_lane
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sky = sky > _MOSTLY or fit.clipped > 0.0
     is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane
     is_sure = is_sure and is_sky and low > _DENSEST
-    is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY and is_stated
+    half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
+    is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
+    # What crosses an uneven road, as a wiper does, is no tone curve, nor is the course of one that sags.
+    shows_response = is_even and is_sure and lines is not None
+    shift = fit.response_shift if is_fog and shows_response and is_stated else 0.0
     return DayVerdict(
         extinction=0.5 * (dense + thin),
-        deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
+        deviation=half,
         median=extinction_from_visibility(middle),
         interval=(low, math.inf if is_clear else high),
         reason="" if answers and is_road else _reason(fit, is_road, sky),
         shows_fog=shows and is_road,
         is_sure=is_sure,
-        is_even=is_even,
-        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even else 0.0,
+        is_even=is_even and is_stated,
+        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even and is_stated else 0.0,
         doubt=fit.doubt,
-        response_deviation=fit.response_deviation if fit.below(_FOG) > _LEAST_FOG else 0.0,
+        response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
+        response_shift=shift,
+        is_stated=is_stated or not shows_response,
+        airlight_deviation=2.0 * half / (dense + thin) if is_road and is_fog and fit.clipped > _MOSTLY else 0.0,
         is_road=is_road,
         free=fit.free,
         farthest=fit.farthest,
@@ -280,7 +291,7 @@ class SecondOpinion:
 
     def reset(self) -> None:
         """Forget all earlier frames."""
-        self._agreed, self._looked, self._response = -math.inf, -math.inf, 0.0
+        self._agreed, self._looked, self._response, self._shift = -math.inf, -math.inf, 0.0, 0.0
         self._fit: DayFit | None = None
         self._clear: tuple[float, float] | None = None
 
@@ -293,10 +304,12 @@ class SecondOpinion:
         bends.
         """
         is_recent = self._agreed < time < self._agreed + PERIOD
-        if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
-            return self._kept(own)
-        self._response, self._clear = 0.0, None
-        chosen = self._with_day_model(own, level, horizon, free, time, lines)
+        shifted = _shifted(own, self._shift) if self._shift else own
+        if own.valid and is_recent and (self._clear is None or agree(shifted.visibility_interval, self._clear)):
+            return self._kept(shifted)
+        verdict = self._verdict(own, level, horizon, free, time, lines)
+        own = _shifted(own, self._shift)
+        chosen = self._weighed(own, verdict, free, lines)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         if chosen is not own or not own.valid:
@@ -311,17 +324,23 @@ class SecondOpinion:
             own = replace(own, standard_deviation=max(own.standard_deviation, own.extinction / NORMAL_90_PERCENT))
         return _with_calibration(own, self._scale, self._response)
 
-    def _with_day_model(
+    def _verdict(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, lines: int | None
-    ) -> Estimate:
+    ) -> DayVerdict:
         earlier = self._fit if self._looked < time < self._looked + 2.0 * PERIOD else None
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), earlier)
         self._fit, self._looked = fit, time
-        verdict = verdict_of(fit, self._scale, lines or 0)
-        if own.valid and math.isfinite(min(free, verdict.free)) and verdict.doubt <= MOST_DOUBT:
+        verdict, self._clear = verdict_of(fit, self._scale, lines), None
+        self._shift = verdict.response_shift if own.valid else 0.0
+        # Before what stands in the lane too little road is seen for faint doubts of the response.
+        is_seen = verdict.is_sure and (self._shift != 0.0 or math.isinf(min(free, verdict.free)))
+        self._response = max(verdict.response_deviation if is_seen else 0.0, verdict.airlight_deviation)
+        return verdict
+
+    def _weighed(self, own: Estimate, verdict: DayVerdict, free: float, lines: int | None) -> Estimate:
+        if own.valid and verdict.is_stated and verdict.doubt <= MOST_DOUBT and math.isfinite(min(free, verdict.free)):
             # Before what stands in the lane it sees less, but too little of a road that may be wet for either.
             return own if verdict.outside <= _SUSPECTED else _of_day(own, verdict)
-        self._response = verdict.response_deviation if verdict.is_sure else 0.0
         if own.valid and lines is None:
             # It follows no bend: there it shows what responses change, not how dense the fog is.
             return own
@@ -338,11 +357,15 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
         return refused(own, CONTRAST)
-    if verdict.reason:
-        return _of_day(own, verdict) if verdict.outside > _MOSTLY else own
-    if verdict.is_sure:
+    agreed = agree(own.visibility_interval, verdict.interval)
+    if not verdict.is_stated:
+        spanning = _spanning(own, verdict.extinction, verdict) if agreed and not verdict.reason else None
+        return spanning or _of_day(own, verdict)
+    if verdict.reason and verdict.outside > _MOSTLY:
+        return _of_day(own, verdict)
+    if verdict.is_sure and not verdict.reason:
         return _weighed(own, verdict)
-    return own if agree(own.visibility_interval, verdict.interval) else refused(own, DISAGREE)
+    return own if agreed or (verdict.reason and own.visibility_interval[1] > _FOG) else refused(own, DISAGREE)
 
 
 def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
@@ -398,6 +421,23 @@ def refused(own: Estimate, reason: str) -> Estimate:
 
 def _found(own: Estimate) -> dict[str, object]:
     return {name: value for name, value in own.diagnostics.items() if name != "reason"}
+
+
+def _shifted(own: Estimate, shift: float) -> Estimate:
+    """Return an estimate with all extinctions changed by a factor's logarithm; one that is not changed itself."""
+    if shift == 0.0 or not own.valid:
+        return own
+    factor, depths, denser = math.exp(shift), own.optical_depths, own.denser
+    if depths is not None:
+        curves = ((factor * value for value in part) for part in (depths.depth, depths.standard_deviation))
+        depths = OpticalDepths(depths.distance, *map(tuple, curves))
+    return replace(
+        own,
+        extinction=factor * own.extinction,
+        standard_deviation=factor * own.standard_deviation,
+        optical_depths=depths,
+        denser=None if denser is None else replace(denser, extinction=factor * denser.extinction),
+    )
 
 
 def _with_calibration(own: Estimate, scale: float, response: float) -> Estimate:

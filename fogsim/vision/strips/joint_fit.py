@@ -84,6 +84,11 @@ something stands in that lane, is itself more easily wrong than they."""
 _OVERCONFIDENCE = 1.0
 """How much farther than its deviation says such an answer may be off [-]."""
 
+_BRIGHTEST_ASPHALT, _GROWTH = 0.3, 0.5
+"""Light of a road over the airlight up to which the sheen of `ALBEDOS` is all by which it brightens toward the horizon,
+and the relative deviation by which the light beyond does so too [-]: CIE's surfaces R1 to R4 reflect 1.35 to 2.1 times
+as much at 1° as from above (CIE 144:2001); chosen on pool 0 of `benchmarks/camera_kinds.py`."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointFit:
@@ -103,6 +108,12 @@ class JointFit:
     # where it was not tried
     droplets: tuple[float, ...] = ()
     albedos: tuple[int, ...] = EVERY  # Those of `ALBEDOS` that are not negligible
+
+    @property
+    def bright_deviation(self) -> float:
+        """Standard deviation of k by a bright road that itself brightens toward the horizon as fog does [1/m]."""
+        beyond = self.road - _BRIGHTEST_ASPHALT * self.airlight
+        return _GROWTH * abs(self.extinction) * beyond / (self.airlight - self.road) if beyond > 0.0 else 0.0
 
 
 Priors = tuple[JointPrior, ...]

@@ -135,6 +135,11 @@ def with_horizon(prior: JointPrior, shift: float, deviation: float) -> JointPrio
     )
 
 
+_MOST_GAIN = 100.0
+"""Greatest exponent of a transmittance [-]: of a k below 0, which is none of nature's, those next to the horizon would
+overflow."""
+
+
 @kernel
 def mean_transmittance(below: float, half: float, path: float, k: float) -> tuple[float, float, float]:
     """Mean transmittance over a bin's height, with its derivatives by extinction and by the horizon's row.
@@ -158,7 +163,7 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
         if rows <= 0.0:
             continue
         distance = path / rows
-        part = (4.0 if j == 1 else 1.0) / 6.0 * math.exp(-k * distance)
+        part = (4.0 if j == 1 else 1.0) / 6.0 * math.exp(min(-k * distance, _MOST_GAIN))
         value += part
         by_k -= distance * part
         by_shift -= k * distance / rows * part

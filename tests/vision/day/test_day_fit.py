@@ -9,8 +9,9 @@ import pytest
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera import Response
+from fogsim.values.camera_response import exposure_of, respond
 from fogsim.vision.day.day_fit import fit_day
-from fogsim.vision.day.row_data import MOST_SLOPE, STATED, curves_of, free_depth, row_bins
+from fogsim.vision.day.row_data import MOST_SLOPE, STATED, chances_of, curves_of, free_depth, row_bins
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
 
 
@@ -85,6 +86,25 @@ def test_the_stated_curve_comes_first_and_all_rise_from_dark_to_full(response, b
     assert np.all(np.diff(curves.light, axis=1) >= 0.0)
     assert curves.light[:, -1] == pytest.approx(1.0, abs=0.01)
     assert np.all((curves.slope >= 1.0 / MOST_SLOPE) & (curves.slope <= MOST_SLOPE))
+
+
+def stretched(visibility: float) -> np.ndarray:
+    """A road in fog, in sRGB, its levels stretched to the full range."""
+    light = exposure_of(picture(visibility) / 255.0, Response.LINEAR)
+    signal = respond(light, Response.SRGB)
+    black, white = np.quantile(signal, [0.005, 0.995])
+    return np.rint(255.0 * np.clip((signal - black) / (white - black), 0.0, 1.0)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("visibility", [60.0, 120.0])
+def test_levels_that_were_stretched_to_black_are_seen_as_such(visibility):
+    image, camera = stretched(visibility), replace(CAMERA, response=Response.SRGB)
+    curves = curves_of(camera)
+    assert chances_of(image[:, :, None], camera).sum() == pytest.approx(1.0)
+    assert np.array_equal(chances_of(np.maximum(image, 4)[:, :, None], camera), curves.chance)
+    fit = fit_day(image, camera, HORIZON)
+    assert fit.responses[curves.chance == 0.0].sum() > 0.9
+    assert fit.quantile(0.5) == pytest.approx(visibility, rel=0.15)
 
 
 def test_no_curve_is_there_twice():

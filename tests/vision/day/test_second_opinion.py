@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera, Estimate
+from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.day import second_opinion
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
@@ -81,6 +82,28 @@ def test_what_the_joint_fit_does_not_know_ends_its_estimate_and_proves_no_other(
     assert said(OWN, replace(SILENT, outside=0.4))[0].valid
     assert said(OWN, replace(AGREES, doubt=MOST_DOUBT - 1.0))[0].valid
     assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
+
+
+def test_an_unlikely_response_is_given_up_for_the_mean_over_others_and_an_impossible_one_for_their_answer(said):
+    own = replace(OWN, optical_depths=OpticalDepths((50.0,), (1.5,), (0.1,)))
+    thinner = replace(AGREES, extinction=0.025, interval=(100.0, 140.0), response_shift=-0.2, response_deviation=0.1)
+    times = (0.0, 0.1)
+    found, _ = said(own, thinner, times)
+    assert found.extinction == pytest.approx(0.03 * math.exp(-0.2))
+    assert found.optical_depths.depth[0] == pytest.approx(1.5 * math.exp(-0.2))
+    assert said(own, replace(thinner, free=20.0), times)[0] == found
+    other, _ = said(own, replace(DENSER, is_stated=False, is_even=False))
+    assert other.visibility_interval == pytest.approx((46.0, 54.0), rel=0.02)
+
+
+def test_where_the_sky_is_clipped_an_estimate_is_as_unsure_as_the_day_model(said):
+    found, _ = said(OWN, replace(AGREES, airlight_deviation=0.3))
+    assert found.standard_deviation == pytest.approx(0.03 * math.hypot(0.05, SCALE, 0.3))
+
+
+def test_an_answer_that_the_day_model_excludes_is_given_up_though_it_has_none(said):
+    assert not said(OWN, replace(FAR, reason="too little road"))[0].valid
+    assert said(OWN, SILENT)[0].valid
 
 
 def test_before_what_stands_in_the_lane_the_joint_fit_answers_unless_the_road_may_be_wet(said):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.vision.strips.joint_fit import agree, fit_jointly, fit_own
+from fogsim.vision.strips.joint_fit import JointFit, agree, fit_jointly, fit_own
 from fogsim.vision.strips.joint_kernels import mean_transmittance
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves, fit_lanes
 
@@ -113,3 +113,15 @@ def test_transmittance_has_its_limits():
     assert mean_transmittance(10.0, 0.5, 800.0, 0.0)[0] == 1.0
     assert mean_transmittance(10.0, 0.5, 800.0, 10.0)[0] == pytest.approx(0.0, abs=1e-9)
     assert mean_transmittance(-5.0, 0.5, 800.0, 0.03) == (0.0, 0.0, 0.0)
+
+
+def test_a_fit_that_tries_less_than_no_fog_keeps_numbers_at_the_horizon():
+    found = np.array(mean_transmittance(0.5 + 1e-9, 0.5, 800.0, -1e-3))
+    assert np.isfinite(found**2).all()
+
+
+def test_only_a_road_brighter_than_asphalt_is_unsure_by_its_own_brightening():
+    fit = JointFit(0.03, 0.001, 200.0, 0.0, 60.0, 1.0, np.ones((1, 8), bool), np.zeros(8, bool))
+    assert fit.bright_deviation == 0.0
+    pale, concrete = (replace(fit, road=road).bright_deviation for road in (70.0, 120.0))
+    assert 0.0 < pale < 0.1 * fit.extinction < concrete

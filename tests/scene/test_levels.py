@@ -111,3 +111,13 @@ def test_levels_of_trees_cover_the_same_area_with_the_same_light_by_fewer_triang
     counts = [len(TREES[f"{kind}_0{level}"].faces) for level in ("", *LEVELS_OF_DETAIL)]
     assert all(one > other for one, other in pairwise(counts))
     assert counts[-1] <= 8
+
+
+def test_trees_that_come_again_with_a_seed_are_the_same_objects_and_are_not_written_to() -> None:
+    rng, other = np.random.default_rng(3), np.random.default_rng(3)
+    again = tree_shapes(rng)
+    assert all(again[name] is tree for name, tree in TREES.items())
+    tree_shapes(other)
+    assert rng.random() == other.random()
+    with pytest.raises(ValueError, match="read-only"):
+        TREES["conifer_0"].positions[0] = 0.0

@@ -42,6 +42,17 @@ def test_a_plane_is_known_by_the_ends_of_its_pieces_and_about_an_edge_by_every_p
         assert pieces.piece_length(focal_length) == pixels
 
 
+@pytest.mark.parametrize("step", range(2, 9))
+def test_an_edge_anywhere_is_seen_whatever_the_length_of_pieces(step: int) -> None:
+    for edge in range(1, 101):
+        nearer = np.arange(101) >= edge
+        length = np.where(nearer, np.float32(0.5) * PLANE, PLANE)
+        values = np.where(nearer, 7.0, 3.0).astype(np.float32)
+        count, out = read(length, step, values)
+        assert count < 101 // step + 3 * step + 2
+        assert np.array_equal(out, values)
+
+
 def test_points_lie_at_their_distance_along_the_ray() -> None:
     ray_map = np.array([[0.01, 0.0, -0.5], [0.0, 0.01, -0.3], [0.0, 0.0, 1.0]], np.float32)
     pixel, length, points = np.array([0, 100], np.float32), np.array([20, 30], np.float32), np.empty((3, 2), np.float32)

@@ -9,7 +9,7 @@ from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 from fogsim.values.image import Frame, for_kernels
 from fogsim.values.observation import Observation
-from fogsim.vision.light.letterbox import without_letterbox
+from fogsim.vision.lines.letterbox import without_letterbox
 
 
 class ObservationCheck:

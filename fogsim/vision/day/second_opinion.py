@@ -405,13 +405,7 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     if verdict.reason or not verdict.is_sure:
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
         return refused(own, reason)
-    return Estimate(
-        own.method,
-        verdict.extinction,
-        verdict.deviation,
-        diagnostics=_found(own),
-        reach=verdict.reach,
-    )
+    return Estimate(own.method, verdict.extinction, verdict.deviation, diagnostics=_found(own), reach=verdict.reach)
 
 
 def refused(own: Estimate, reason: str) -> Estimate:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.estimators import make
 from fogsim.values import Camera, Observation
-from fogsim.vision.light.letterbox import without_letterbox
+from fogsim.vision.lines.letterbox import without_letterbox
 
 CAMERA = Camera(320, 240, 288.0, (159.5, 119.5), 1.38, np.radians(2.0))
 ROAD = Road(camera=CAMERA, visibility=120.0)

@@ -13,7 +13,7 @@ from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.second_opinion import GLARES, SecondOpinion
-from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
+from fogsim.vision.light.daylight import TOO_DARK, CannotTellError, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import (
@@ -30,7 +30,6 @@ from fogsim.vision.lines.horizon import (
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import refuse_misplaced, seen_lines, vanishing_point_of
-from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road

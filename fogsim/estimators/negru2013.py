@@ -18,6 +18,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import Confirmation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.light.daylight import CannotTellError
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import CannyDeriche, Edges
@@ -39,7 +40,7 @@ from fogsim.vision.region.inflection import (
 )
 from fogsim.vision.region.law import block_signs, check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.profile import RoadCurve, band_profile
-from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_image import MIN_ROWS, RoadImage, road_image
 from fogsim.vision.region.road_region import GrowthLimits, constant_limits
 from fogsim.vision.strips.strip_curves import lowest_road_row
 

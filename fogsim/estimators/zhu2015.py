@@ -19,6 +19,7 @@ from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation
 from fogsim.vision.day.confirmation import Confirmation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.light.daylight import CannotTellError
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
@@ -26,7 +27,6 @@ from fogsim.vision.lines.horizon import (
     ScaleDeviation,
     calibrated_horizon,
 )
-from fogsim.vision.region.road_image import CannotTellError
 
 FRAMES = 3
 """Frames whose inflections are averaged, and equal classes that make a state."""

@@ -13,6 +13,7 @@ from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.light.daylight import CannotTellError
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
@@ -29,7 +30,7 @@ from fogsim.vision.region.law import (
     transmittance,
 )
 from fogsim.vision.region.profile import RoadCurve, corridor_curve, hide_vehicle
-from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, RoadImage, road_image
 from fogsim.vision.region.road_region import GrowthLimits, constant_limits, grow_region, region_tops
 
 Floats = NDArray[np.float64]

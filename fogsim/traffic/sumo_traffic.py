@@ -386,8 +386,7 @@ class SumoTraffic:
 
     def _shown(self, run: _Run, state: TrafficState) -> TrafficState:
         """The traffic as it is to be seen, and what has collided in it."""
-        state = run.courses.add(state)
-        run.lane_changes.smooth(state)
+        run.lane_changes.smooth(state := run.courses.add(state))
         shown = run.bodies.add(run.script.lamps.shown(state, self._elapsed(run)))
         run.collisions.add(rail_collisions(shown))
         return shown

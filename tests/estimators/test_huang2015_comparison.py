@@ -16,8 +16,8 @@ from fogsim.estimators.huang2015_comparison import (
     shrink_broad,
 )
 from fogsim.values import Camera, Response
+from fogsim.vision.light.daylight import CannotTellError
 from fogsim.vision.light.luminance import Clipping
-from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.rear_localisation import RearBox
 from fogsim.vision.vehicle.vehicle_crop import SkyReading, vehicle_crop
 

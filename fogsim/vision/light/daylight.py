@@ -41,6 +41,11 @@ _BEAM = 1.15
 _OVERHEAD = 0.08
 """Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
+
+class CannotTellError(Exception):
+    """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
+
+
 TOO_DARK = "too dark above the horizon: it is night, or something hides the sky"
 BRIGHT_ROAD = "something hides the sky, or lamps or direct sun make the road brighter than the sky"
 

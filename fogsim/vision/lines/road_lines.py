@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
+from fogsim.vision.light.daylight import CannotTellError
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon, weighted_mean
 from fogsim.vision.lines.road_line_kernels import (
@@ -25,7 +26,6 @@ from fogsim.vision.lines.road_line_kernels import (
     row_points,
 )
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float64]
 

@@ -32,6 +32,7 @@ from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
+    CannotTellError,
     PitchDeviation,
     ScaleDeviation,
     calibrated_horizon,
@@ -45,7 +46,7 @@ from fogsim.vision.region.law import (
     seen_up_to,
 )
 from fogsim.vision.region.profile import RoadCurve
-from fogsim.vision.region.road_image import CannotTellError, road_image
+from fogsim.vision.region.road_image import road_image
 
 __all__ = ["BELOW_INFLECTION", "ROWS_APART", "Huang2015Repair", "Huang2015Rough"]
 

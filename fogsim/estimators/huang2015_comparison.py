@@ -13,8 +13,8 @@ from fogsim.values.camera import Camera
 from fogsim.vision.light.daylight import TOO_DARK
 from fogsim.vision.light.luminance import clipping, darker_by, linear_luminance
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
-from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, CannotTellError, levelled
+from fogsim.vision.region.road_image import MIN_AIRLIGHT
 from fogsim.vision.vehicle.airlight import hidden_at_side, neighbouring_airlight
 from fogsim.vision.vehicle.contrast_ratio import LOST, TOP, MeanLuminances, mean_luminances
 from fogsim.vision.vehicle.patch import Patch, Placement, pixel_shares, rescale_position, shrink

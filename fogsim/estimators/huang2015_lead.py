@@ -38,8 +38,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import without_far_objects
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, CannotTellError, PitchDeviation, calibrated_horizon
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear
 from fogsim.vision.vehicle.vehicle_crop import CameraRange, VehicleCrop, registered_deviation

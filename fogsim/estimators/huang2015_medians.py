@@ -14,12 +14,12 @@ from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
-from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.horizon import CannotTellError, Horizon
 from fogsim.vision.lines.road_lines import seen_horizon
 from fogsim.vision.lines.vanishing_point import hough_lines, published_vanishing_point
 from fogsim.vision.region.law import slants, transmittance
 from fogsim.vision.region.profile import RoadCurve, corridor_curve, hide_vehicle
-from fogsim.vision.region.road_image import CannotTellError, RoadImage
+from fogsim.vision.region.road_image import RoadImage
 from fogsim.vision.region.road_region import constant_limits, grow_region, region_medians
 
 Floats = NDArray[np.float64]

@@ -20,6 +20,7 @@ from fogsim.vision.lines.horizon import (
     MIN_ROWS,
     PITCH_DEVIATION,
     SCALE_DEVIATION,
+    CannotTellError,
     Horizon,
     PitchDeviation,
     ScaleDeviation,
@@ -30,7 +31,6 @@ from fogsim.vision.lines.horizon import (
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import refuse_misplaced, seen_lines, vanishing_point_of
-from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import DropletMemory, darkening_priors, joint_prior
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road

@@ -20,8 +20,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.confirmation import without_far_objects
 from fogsim.vision.light.medians import median
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, CannotTellError, PitchDeviation, calibrated_horizon
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from fogsim.estimators.tracked_vehicle import SmoothedRanges, TrackedVehicle
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError
 from fogsim.vision.vehicle.contrast_ratio import ContrastRatio, RearPicture, contrast_ratio
 from fogsim.vision.vehicle.rear_localisation import RearBox
 from fogsim.vision.vehicle.registration import RoadBehind, register_rear

@@ -24,6 +24,7 @@ from fogsim.vision.lines.edges import CannyDeriche, Edges
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
+    CannotTellError,
     Horizon,
     PitchDeviation,
     ScaleDeviation,
@@ -39,7 +40,7 @@ from fogsim.vision.region.inflection import (
 )
 from fogsim.vision.region.law import block_signs, check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.profile import RoadCurve, band_profile
-from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_image import MIN_ROWS, RoadImage, road_image
 from fogsim.vision.region.road_region import GrowthLimits, constant_limits
 from fogsim.vision.strips.strip_curves import lowest_road_row
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.lines.edges import Edges, smoothed
-from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.horizon import CannotTellError, Horizon
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.profile import RoadCurve, corridor_curve, hide_vehicle, path_lengths
-from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
+from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, RoadImage
 from fogsim.vision.region.road_region import Band, GrowthLimits, crossing_band, cumulative_limits, grow_region
 
 _SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34

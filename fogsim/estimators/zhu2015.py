@@ -22,11 +22,11 @@ from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.lines.horizon import (
     PITCH_DEVIATION,
     SCALE_DEVIATION,
+    CannotTellError,
     PitchDeviation,
     ScaleDeviation,
     calibrated_horizon,
 )
-from fogsim.vision.region.road_image import CannotTellError
 
 FRAMES = 3
 """Frames whose inflections are averaged, and equal classes that make a state."""

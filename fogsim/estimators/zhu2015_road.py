@@ -15,7 +15,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
-from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
+from fogsim.vision.lines.horizon import CannotTellError, Horizon, calibrated_horizon
 from fogsim.vision.lines.road_lines import seen_horizon
 from fogsim.vision.lines.vanishing_point import LaneLine, hough_lines, longest_pair, published_vanishing_point
 from fogsim.vision.region.law import (
@@ -29,7 +29,7 @@ from fogsim.vision.region.law import (
     transmittance,
 )
 from fogsim.vision.region.profile import RoadCurve, corridor_curve, hide_vehicle
-from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, RoadImage, road_image
 from fogsim.vision.region.road_region import GrowthLimits, constant_limits, grow_region, region_tops
 
 Floats = NDArray[np.float64]

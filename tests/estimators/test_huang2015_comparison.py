@@ -17,7 +17,7 @@ from fogsim.estimators.huang2015_comparison import (
 )
 from fogsim.values import Camera, Response
 from fogsim.vision.light.luminance import Clipping
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError
 from fogsim.vision.vehicle.rear_localisation import RearBox
 from fogsim.vision.vehicle.vehicle_crop import SkyReading, vehicle_crop
 

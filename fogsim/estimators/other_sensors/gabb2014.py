@@ -15,8 +15,7 @@ from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_luminance
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, levelled
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, CannotTellError, PitchDeviation, levelled
 from fogsim.vision.vehicle.rear_localisation import ASIDE, BODY, WIDTHS, search_window, upright_steps
 from fogsim.vision.vehicle.vehicle_crop import VehicleCrop, daytime_crop
 

@@ -27,6 +27,10 @@ ScaleDeviation = Annotated[float, Range(0.0, 1.0)]
 """Relative standard deviation of focal length × mount height, with which distances on the road go [-]."""
 
 
+class CannotTellError(Exception):
+    """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
+
+
 @dataclass(frozen=True, slots=True)
 class Horizon:
     """The horizon as a straight line in the image."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.horizon import Horizon, weighted_mean
+from fogsim.vision.lines.horizon import CannotTellError, Horizon, weighted_mean
 from fogsim.vision.lines.road_line_kernels import (
     LEAST_POINTS,
     LEAST_TURN,
@@ -25,7 +25,6 @@ from fogsim.vision.lines.road_line_kernels import (
     row_points,
 )
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.lines.horizon import CannotTellError
 from fogsim.vision.region.profile import RoadCurve
-from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage
+from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, RoadImage
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.daylight import TOO_DARK, lit_by_lamps
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile
-from fogsim.vision.lines.horizon import Horizon, levelled
+from fogsim.vision.lines.horizon import CannotTellError, Horizon, levelled
 
 _MIN_COLS, MIN_ROWS = 32, 16
 """[px] A road narrower than this, or lower below its horizon, shows no curve."""
@@ -29,10 +29,6 @@ _SKY_SHARE = 0.05
 
 _SKY_HEIGHT = 0.12
 """How far above the horizon the airlight is looked for [rad]: over a wood that stands along the horizon."""
-
-
-class CannotTellError(Exception):
-    """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
 
 
 @dataclass(frozen=True, slots=True)

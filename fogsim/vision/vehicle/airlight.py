@@ -12,7 +12,7 @@ from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.daylight import BRIGHT_ROAD
 from fogsim.vision.light.medians import median, median_among
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError
 
 Floats = NDArray[np.float32]
 

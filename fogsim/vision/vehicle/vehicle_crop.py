@@ -15,8 +15,7 @@ from fogsim.vision.light.daylight import TOO_DARK
 from fogsim.vision.light.luminance import Clipping, clipping, linear_pixels, linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
-from fogsim.vision.lines.horizon import calibrated_horizon, levelled
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError, calibrated_horizon, levelled
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.airlight import (

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera, Response
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError
 from fogsim.vision.vehicle.airlight import check_road, hidden_at_side, neighbouring_airlight, road_before, road_fall
 
 NOISE = 2.0

@@ -3,7 +3,7 @@ import pytest
 
 from fogsim.values import Camera, Response
 from fogsim.vision.light.luminance import Clipping
-from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.lines.horizon import CannotTellError
 from fogsim.vision.vehicle.vehicle_crop import SkyReading, daytime_crop, noise_gain, vehicle_crop
 
 CAMERA = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, np.radians(2.0), response=Response.LINEAR)

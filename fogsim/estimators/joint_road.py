@@ -192,8 +192,8 @@ class JointRoad:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.kernel_image(observation)
-        rows = ("horizon_row", "told_horizon_row")
-        found: dict[str, object] = dict.fromkeys(rows, self._camera.horizon_row)
+        row = self._camera.horizon_row
+        found: dict[str, object] = {"horizon_row": row, "told_horizon_row": row}
         if self._impossible:
             return Estimate.invalid(self.method, self._impossible, **found)
         level = levelled(image, self._camera)

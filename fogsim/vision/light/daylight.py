@@ -91,9 +91,9 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     view = _view_of(camera)
     middle, aside = camera.principal_point[0], _OVERHEAD * camera.focal_length
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
-    hidden = first >= min(last, camera.width) or (lead is not None and lead.distance < _HIDES_ABOVE)
+    hidden = first >= last or first >= camera.width or (lead is not None and lead.distance < _HIDES_ABOVE)
     pixels = linear_pixels(level, camera)
-    over = (0, 0) if hidden else (first, min(last, camera.width))
+    over = (0, 0) if hidden else (first, last)
     return _SHOWN[_lit(pixels, view.rows, view.strips, over, view.low, view.near)]
 
 
@@ -116,6 +116,7 @@ def _lit(
 ) -> int:
     """Which of `_SHOWN` a view's rows (n,) show, with columns of what is overhead, if any."""
     cols, above_road, road = image.pixels.shape[1], rows[:-_ROAD_ROWS], rows[-_ROAD_ROWS:]
+    over = over[0], min(over[1], cols)
     lane = _row_medians(image, road, strips[0])
     sky = _pixels(image, above_road, 0, cols, _SKY_STEP)
     above = quantile_among(sky, _BRIGHT_SHARE)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import MIN_ROWS
 
 _BLACK, _ALIKE, _PICTURE = 32, 4, 56
 """Most value of a band's pixels, by how much they differ, and least value of a sky's by day [levels of 8 bits]."""
@@ -19,8 +18,8 @@ _BAND_SHARE, _PICTURE_SHARE = 0.6, 0.5
 _BLURRED = 9
 """Rows within which the picture begins [px]: compression blurs the edge of a band over a block of 8."""
 
-_LEAST_SKY = 4.0
-"""Least rows between a band and the horizon for sky to show [px]."""
+_LEAST_SKY, _LEAST_ROAD = 4.0, 16.0
+"""Least rows between the upper and the lower band and the horizon for sky and road to show [px]."""
 
 
 def without_letterbox(image: Pixels, camera: Camera) -> Pixels:
@@ -37,7 +36,7 @@ def without_letterbox(image: Pixels, camera: Camera) -> Pixels:
     filled = image.copy()
     filled[:first] = image[first]
     last = camera.height - 1 - _first_row(np.ascontiguousarray(pixels[::-1]), level, _BLACK)
-    if camera.horizon_row + MIN_ROWS < last < camera.height - 1:
+    if camera.horizon_row + _LEAST_ROAD < last < camera.height - 1:
         # What is to one side of the lane stays there: toward the camera, columns move away from the way ahead.
         below, axis = np.arange(last + 1, camera.height)[:, None] - camera.horizon_row, camera.principal_point[0]
         aside = (np.arange(camera.width) - axis) * ((last - camera.horizon_row) / below)

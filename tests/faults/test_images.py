@@ -84,7 +84,7 @@ def test_broken_images_in_a_folder_are_listed_at_the_end(command: Command, folde
         records = [json.loads(line) for line in out.splitlines()]
         assert len(records) == len(BROKEN) + 2
         assert [record["frame"] for record in records if "method" in record] == ["drive/0.png", "drive/z.png"]
-        assert all({*record} == {"frame", "error"} for record in records if "method" not in record)
+        assert all({*record} == {"frame", "time_s", "error"} for record in records if "method" not in record)
         assert "passed over: drive/text.png: this is no image" in err
 
 

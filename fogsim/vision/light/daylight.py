@@ -46,7 +46,7 @@ class CannotTellError(Exception):
     """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
 
 
-TOO_DARK = "too dark above the horizon: it is night, or something hides the sky"
+TOO_DARK = "too dark above the horizon for a daytime method: it is night, or something hides the sky"
 BRIGHT_ROAD = "something hides the sky, or lamps or direct sun make the road brighter than the sky"
 
 _OPEN_ROWS, _OPEN_COLS, _LOWEST, _SKY_ALIKE = 24, 64, 0.02, 0.12

@@ -18,7 +18,6 @@ from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.perception import LeaderSight
 from fogsim.traffic.sumo_drivers.vehicle_sight import DriversView
 from fogsim.values import Collision, Command, FogBank, FogField
-from fogsim.values.fog import AIRLIGHT_SHARE
 from tests.traffic.common import NET, driven, hits_of, running, seen, setup_of
 
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
@@ -47,13 +46,12 @@ def fog_of(k: float) -> FieldAccess:
 
 
 @dataclass(frozen=True)
-class SeesFrom:
+class SeesFrom(DriverSight):
     """Eyes that see everything from a fixed distance on, whatever the fog."""
 
-    distance: float
-    reaction_time: float = 0.0
     illuminance: float = 0.0
-    airlight_share: float = AIRLIGHT_SHARE
+    reaction_time: float = 0.0
+    distance: float = 50.0
 
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0
@@ -96,7 +94,7 @@ def test_who_sees_too_late_hits_at_the_speed_that_physics_gives(
     setup: TrafficSetup, sight: float, reaction: float
 ) -> None:
     """v² = v₀² − 2 a (d − v₀ t), with SUMO's emergency deceleration."""
-    ((hit,), last_speed) = collisions(replace(setup, sight=SeesFrom(sight, reaction)))
+    ((hit,), last_speed) = collisions(replace(setup, sight=SeesFrom(distance=sight, reaction_time=reaction)))
     assert last_speed == pytest.approx(0.0, abs=0.01)
     expected = np.sqrt(33.8**2 - 2 * EMERGENCY_DECELERATION * (sight - 33.8 * reaction))
     assert hit.impact_speed == pytest.approx(expected, abs=1.0)
@@ -169,9 +167,9 @@ def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, m
 def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> None:
     """SUMO's lane changing sees a slow leader through fog by itself."""
     assert leaves_its_lane(setup, None)
-    assert leaves_its_lane(setup, SeesFrom(400.0))
-    assert not leaves_its_lane(setup, SeesFrom(40.0))
-    assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")  # which cannot be told
+    assert leaves_its_lane(setup, SeesFrom(distance=400.0))
+    assert not leaves_its_lane(setup, SeesFrom(distance=40.0))
+    assert leaves_its_lane(setup, SeesFrom(distance=40.0), model="DK2008")  # which cannot be told
 
 
 def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(setup: TrafficSetup) -> None:

@@ -168,8 +168,8 @@ def refuse_misplaced(seen: SeenLines, camera: Camera, horizon: Horizon) -> None:
     if min(int((meeting > 0.0).sum()), int((meeting < 0.0).sum())) < _EACH_SIDE:
         return
     below = (camera.principal_point[1] - row for row in (point.row, camera.horizon_row))
-    seen_pitch, told = (math.degrees(math.atan(rows / camera.focal_length)) for rows in below)
-    met = f"the road's lines meet at a pitch of {seen_pitch:.1f}°, not of {told:.1f}°"
+    seen_pitch, stated = (math.degrees(math.atan(rows / camera.focal_length)) for rows in below)
+    met = f"the road's lines meet at a pitch of {seen_pitch:.1f}°, not of {stated:.1f}°"
     raise CannotTellError(f"{met}: correct it, or the road is not level")
 
 

@@ -358,9 +358,8 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if verdict.doubt > MOST_DOUBT:
         return refused(own, CONTRAST)
     agreed = agree(own.visibility_interval, verdict.interval)
-    if not verdict.is_stated:
-        spanning = _spanning(own, verdict.extinction, verdict) if agreed and not verdict.reason else None
-        return spanning or _of_day(own, verdict)
+    if not verdict.is_stated and not (agreed and verdict.reason):
+        return (_spanning(own, verdict.extinction, verdict) if agreed else None) or _of_day(own, verdict)
     if verdict.reason and verdict.outside > _MOSTLY:
         return _of_day(own, verdict)
     if verdict.is_sure and not verdict.reason:

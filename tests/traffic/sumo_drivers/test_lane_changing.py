@@ -73,7 +73,7 @@ class Road:
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
         self.roster = Roster(api)
-        view = DriversView(api, fog_of(0.05), (NeverSure if blind else SeesFrom)(reach), self.roster)
+        view = DriversView(api, fog_of(0.05), (NeverSure if blind else SeesFrom)(distance=reach), self.roster)
         leaders = Perception(view)
         self.parts = [leaders, LaneChanging(view, leaders, SeesNobody(view, blind))]
         return api
@@ -328,7 +328,11 @@ def test_who_is_near_in_the_lane_to_the_left_need_not_be_looked_for(road: Road, 
         for number, name in enumerate(names)
     )
     api = road.enter(crowd, CLEAR, free=names)
-    neighbours, reach, found = Neighbours(DriversView(api, fog_of(0.05), SeesFrom(CLEAR), road.roster)), 40.0, 0
+    neighbours, reach, found = (
+        Neighbours(DriversView(api, fog_of(0.05), SeesFrom(distance=CLEAR), road.roster)),
+        40.0,
+        0,
+    )
     for _ in range(150):
         road.link.step()
         present = api.vehicle.getIDList()

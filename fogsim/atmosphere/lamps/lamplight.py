@@ -68,7 +68,7 @@ class VeilGrid(NamedTuple):
     columns: int  # Columns of the grid
     nodes: np.uint32  # Nodes of a ray, which lie evenly over r / (r + fold)
     fold: np.float32  # See `nodes` [m]
-    # ray_step, node_step: from a value to that of the next ray, and to that of the next node, one of which is 1
+    # ray_step, node_step: from a value to that of the next ray, and to that of the next node; one of the two is 1
     ray_step: int
     node_step: int
     # (rows, columns · nodes): Veil from the eye to each node [cd/m²]; without rows in clear air

@@ -169,7 +169,7 @@ def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> 
     assert leaves_its_lane(setup, None)
     assert leaves_its_lane(setup, SeesFrom(distance=400.0))
     assert not leaves_its_lane(setup, SeesFrom(distance=40.0))
-    assert leaves_its_lane(setup, SeesFrom(distance=40.0), model="DK2008")  # which cannot be told
+    assert leaves_its_lane(setup, SeesFrom(distance=40.0), model="DK2008")  # which takes no such orders
 
 
 def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(setup: TrafficSetup) -> None:

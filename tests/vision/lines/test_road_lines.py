@@ -39,8 +39,8 @@ def test_lines_that_meet_far_from_the_stated_horizon_say_what_the_pitch_is(metho
     road = Road(visibility=150.0)
     image = photograph(road, scan(road, 0, 2), 0)
     for pitch in (1.0, 3.0):
-        told = replace(road.camera, pitch=np.radians(pitch))
-        reason = make(method, told).update(Observation(image)).diagnostics["reason"]
+        stated = replace(road.camera, pitch=np.radians(pitch))
+        reason = make(method, stated).update(Observation(image)).diagnostics["reason"]
         assert reason.startswith(f"the road's lines meet at a pitch of 2.0°, not of {pitch}°: correct it")
     # Edges of a vehicle or a kerb, all to one side, meet anywhere.
     pixels = np.clip(np.rint(road_lines((1.2, 1.35, 1.75, 1.9, 2.5, 2.65))), 0, 255).astype(np.uint8)

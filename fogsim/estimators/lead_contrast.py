@@ -137,7 +137,7 @@ _SMOOTHED = 0.008
 _LARGE_SHAPE = 0.025
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
 
-_OWN_CONTRAST, _DISAGREEMENT = (math.log(0.7), 0.35), 2.5
+_OWN_CONTRAST, _DISAGREEMENT = (math.log(0.7), 0.35), 2.0
 """Logarithm of a vehicle's contrast without fog, by its dark parts, with its standard deviation [-]; and deviations of
 k's difference beyond which that contrast and its decrease with range exclude each other."""
 
@@ -303,16 +303,20 @@ class LeadContrast:
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
-        likely, spread = self._by_own_contrast()
-        reason = _rejection_reason(fit, road)
-        if not reason and abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
-            reason = "the vehicle's contrast and its decrease with range disagree: the fog may be uneven"
+        reason = _rejection_reason(fit)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
+        likely, spread = self._by_own_contrast()
         weight = spread**2 / (spread**2 + fit.deviation**2)
-        extinction = max(likely + weight * (fit.extinction - likely), 0.0)
+        extinction, deviation = likely + weight * (fit.extinction - likely), math.sqrt(weight) * fit.deviation
+        if abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
+            reason = "the vehicle's contrast and its decrease with range disagree: the fog may be uneven"
+        elif road is not None and road.is_lit(extinction, deviation):
+            reason = "lamps light the road: this is a daytime method"
+        if reason:
+            return Estimate.invalid(self.method, reason, **found)
         reach = float(distance.max()) + self._setback
-        return Estimate(self.method, extinction, math.sqrt(weight) * fit.deviation, diagnostics=found, reach=reach)
+        return Estimate(self.method, max(extinction, 0.0), deviation, diagnostics=found, reach=reach)
 
     def _by_own_contrast(self) -> tuple[float, float]:
         """Extinction before the vehicle by its contrast alone, and its standard deviation [1/m]."""
@@ -370,13 +374,11 @@ def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     return math.sqrt(12.0 * float((weight * (distance - mean) ** 2).sum() / weight.sum()))
 
 
-def _rejection_reason(fit: DecayFit, road: RoadFall | None) -> str:
+def _rejection_reason(fit: DecayFit) -> str:
     if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
         return "the contrast does not fall with the range as Duntley's law has it"
     if fit.deviation > _WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > _CLEAR:
         return "the range has not changed enough yet"
-    if road is not None and road.is_lit(fit.extinction, fit.deviation):
-        return "lamps light the road: this is a daytime method"
     return ""
 
 

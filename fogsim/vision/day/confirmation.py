@@ -11,6 +11,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
+from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import (
     CLEAR,
     DISAGREE,
@@ -57,6 +58,7 @@ class _Outcome:
     # relative, absolute: what the day model leaves open besides: of k over k [-], and of k where the air is clear [1/m]
     relative: float = 0.0
     absolute: float = 0.0
+    reach: float = math.inf  # Distance up to which clear air was seen [m]
 
 
 class Confirmation:
@@ -91,7 +93,8 @@ class Confirmation:
         if last.reason:
             return refused(own, last.reason)
         deviation = math.hypot(own.standard_deviation, last.relative * own.extinction, last.absolute)
-        return replace(own, standard_deviation=deviation, common_deviation=math.hypot(common, last.relative))
+        common, reach = math.hypot(common, last.relative), min(own.reach, last.reach)
+        return replace(own, standard_deviation=deviation, common_deviation=common, reach=reach)
 
     def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:
         fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
@@ -100,7 +103,10 @@ class Confirmation:
         reason = self._rejection_reason(own, level, day, is_open=is_open)
         more = _added_deviation(own, day, is_open=is_open, is_behind=math.isfinite(min(free, day.free)))
         relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
-        return _Outcome(time, own.visibility_interval, reason, relative, absolute)
+        # A bank of fog farther away would only raise the horizon by less than the doubt of it.
+        doubtful = near_horizon(self._horizon.standard_deviation)
+        reach = self._camera.row_distance / doubtful if is_open else math.inf
+        return _Outcome(time, own.visibility_interval, reason, relative, absolute, reach)
 
     def _rejection_reason(self, own: Estimate, level: NDArray[Any], day: DayVerdict, *, is_open: bool) -> str:
         """Say why an estimate does not count; empty if it does."""

@@ -9,6 +9,7 @@ import pytest
 from fogsim.values import Camera, Estimate, LeadMeasurement
 from fogsim.vision.day import confirmation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import DISAGREE, STANDS_OUT, DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
@@ -50,6 +51,11 @@ def test_fog_that_shows_in_both_counts_with_what_camera_and_models_leave_open(lo
     low, high = once(looked, OWN, denser).visibility_interval
     assert low < 75.0
     assert high > 110.0
+
+
+def test_clear_air_is_claimed_only_as_far_as_rows_are_surely_below_the_horizon(looked):
+    assert once(looked, NO_FOG, CLEAR, far=True).reach == pytest.approx(60.0 * 1.3 / near_horizon(1.0))
+    assert once(looked, OWN, FOG).reach == math.inf
 
 
 @pytest.mark.parametrize("own", [OWN, NO_FOG])

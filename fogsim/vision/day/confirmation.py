@@ -11,6 +11,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
+from fogsim.vision.day.recent_change import RecentChange
 from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import (
     CLEAR,
@@ -34,6 +35,9 @@ PERIOD, SOON = 10.0, 1.0
 MODEL_DEVIATION = 0.15
 """Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
 are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
+
+_MOST_CHANGE = 0.3
+"""Largest relative deviation of k by how it changed over the last images: these methods take fog for even [-]."""
 
 _CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
@@ -71,10 +75,12 @@ class Confirmation:
 
     def __init__(self, camera: Camera, horizon: Horizon, scale_deviation: float) -> None:
         self._camera, self._horizon, self._scale = camera, horizon, scale_deviation
+        self._change = RecentChange(_MOST_CHANGE)
         self._last = _Outcome()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
+        self._change.reset()
         self._last = _Outcome()
 
     def of(self, own: Estimate, image: NDArray[Any], free: float, time: float) -> Estimate:
@@ -92,8 +98,9 @@ class Confirmation:
             last = self._last = self._compared(own, levelled(image, self._camera), free, time)
         if last.reason:
             return refused(own, last.reason)
-        deviation = math.hypot(own.standard_deviation, last.relative * own.extinction, last.absolute)
-        common, reach = math.hypot(common, last.relative), min(own.reach, last.reach)
+        relative = math.hypot(last.relative, self._change.of(time, own.extinction))
+        deviation = math.hypot(own.standard_deviation, relative * own.extinction, last.absolute)
+        common, reach = math.hypot(common, relative), min(own.reach, last.reach)
         return replace(own, standard_deviation=deviation, common_deviation=common, reach=reach)
 
     def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:

@@ -93,6 +93,20 @@ def test_in_a_drive_it_looks_from_time_to_time_and_where_the_estimate_changes(lo
     assert len(looks) == 2
 
 
+def test_fog_that_changes_along_the_way_widens_the_interval_for_some_seconds(looked):
+    confirms, _ = looked(FOG)
+
+    def relative(time, extinction):
+        found = confirms.of(replace(OWN, extinction=extinction), IMAGE, math.inf, time)
+        return found.standard_deviation / found.extinction
+
+    even, changed = relative(0.0, 0.03), relative(1.0, 0.034)
+    assert changed > 1.05 * even
+    assert relative(12.0, 0.034) < changed
+    confirms.reset()
+    assert relative(0.0, 0.03) == even
+
+
 def test_a_refusal_of_the_method_stays(looked):
     refusal = Estimate.invalid("zhu2015", "no road is seen")
     confirms, looks = looked(FOG)

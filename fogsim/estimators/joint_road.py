@@ -12,6 +12,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.day.recent_change import RecentChange
 from fogsim.vision.day.second_opinion import GLARES, SecondOpinion
 from fogsim.vision.light.daylight import TOO_DARK, CannotTellError, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
@@ -65,9 +66,8 @@ _HARDLY_UNEVEN, _UNEVEN_DEVIATION = 0.05, 0.13
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 
-_MEMORY, _CHANGING, _MOST_CHANGE = 10.0, 1.5, 0.15
-"""Time over which recent extinctions measure how uneven the fog is [s], the factor on a single one's relative
-deviation, and its upper limit [-]: fog that has varied along the road will vary further."""
+_MOST_CHANGE = 0.15
+"""Largest relative deviation by how the extinction changed over the last images [-]."""
 
 _VEILED = 0.25
 """Relative deviation of the extinction by the veil of glass in which the sun shines [-]."""
@@ -158,7 +158,7 @@ class JointRoad:
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
         self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
-        self._before: deque[tuple[float, float]] = deque()
+        self._change = RecentChange(_MOST_CHANGE)
         self._droplets, self._left = DropletMemory(), Left()
         self._second = SecondOpinion(camera, scale_deviation)
 
@@ -166,7 +166,7 @@ class JointRoad:
         """Forget all earlier frames."""
         self._check.reset()
         self._earlier.clear()
-        self._before.clear()
+        self._change.reset()
         self._droplets, self._left = DropletMemory(), Left()
         self._second.reset()
 
@@ -239,7 +239,7 @@ class JointRoad:
         self._droplets.learn(fit.fit.droplets, observation.time, observation.speed)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
-        changing = self._change(observation.time, fit.fit.extinction)
+        changing = self._change.of(observation.time, fit.fit.extinction)
         veiled = _VEILED * fit.fit.extinction if sky.has_sun else 0.0
         own = self._estimate(fit, front, found, math.hypot(unsure, veiled, fit.fit.bright_deviation), changing)
         return own, min(free, _obstacle(fit.fit, self._geometry))
@@ -351,13 +351,6 @@ class JointRoad:
             refuse_misplaced(seen, self._camera, self._horizon)
             return self._horizon, course, 0
         return weighted_mean(self._horizon, point.horizon), course, point.lines
-
-    def _change(self, time: float, extinction: float) -> float:
-        """Relative deviation of the extinction by how it changed over the last pictures [-]; 0 without their times."""
-        while self._before and not time - _MEMORY <= self._before[0][0] < time:
-            self._before.popleft()
-        self._before.append((time, math.log(max(extinction, _LEAST_DEVIATION))))
-        return min(_CHANGING * float(np.std([logarithm for _, logarithm in self._before])), _MOST_CHANGE)
 
     def _rejection_reason(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, tracked: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""

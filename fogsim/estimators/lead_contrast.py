@@ -127,15 +127,19 @@ _MIN_ALIKE = 3
 _REGISTRATION = 0.005
 """Relative deviation of a contrast by what is not noise: place, shading [-]."""
 
-_SHAPE, _BRIGHT_SHAPE = 0.005, 0.03
+_SHAPE, _BRIGHT_SHAPE = 0.022, 0.03
 """Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
 _SMOOTHED = 0.008
 """Relative deviation of k by what neighbouring detections share: errors of smoothed ranges, places in noise [-]."""
 
-_LARGE_SHAPE = 0.018
+_LARGE_SHAPE = 0.025
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
+
+_OWN_CONTRAST, _DISAGREEMENT = (math.log(0.7), 0.35), 2.0
+"""Logarithm of a vehicle's contrast without fog, by its dark parts, with its standard deviation [-]; and deviations of
+k's difference beyond which that contrast and its decrease with range exclude each other."""
 
 _AIRLIGHT_DEVIATION = 0.002
 """Relative deviation of the airlight behind the vehicle from the sky above it [-]."""
@@ -299,11 +303,27 @@ class LeadContrast:
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
-        reason = _rejection_reason(fit, road)
+        reason = _rejection_reason(fit)
+        if reason:
+            return Estimate.invalid(self.method, reason, **found)
+        likely, spread = self._by_own_contrast()
+        weight = spread**2 / (spread**2 + fit.deviation**2)
+        extinction, deviation = likely + weight * (fit.extinction - likely), math.sqrt(weight) * fit.deviation
+        if abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
+            reason = "the vehicle's contrast and its decrease with range disagree: the fog may be uneven"
+        elif road is not None and road.is_lit(extinction, deviation):
+            reason = "lamps light the road: this is a daytime method"
         if reason:
             return Estimate.invalid(self.method, reason, **found)
         reach = float(distance.max()) + self._setback
-        return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
+        return Estimate(self.method, max(extinction, 0.0), deviation, diagnostics=found, reach=reach)
+
+    def _by_own_contrast(self) -> tuple[float, float]:
+        """Extinction before the vehicle by its contrast alone, and its standard deviation [1/m]."""
+        nearest = min(self._track.detections, key=lambda one: one.depth)
+        # The lever is the inverse of the contrast of the picture that all are compared with.
+        depth = (self._track.reference or nearest).depth
+        return (math.log(max(nearest.contrast.lever, 1e-9)) + _OWN_CONTRAST[0]) / depth, _OWN_CONTRAST[1] / depth
 
     def _fit(self, distance: Floats) -> DecayFit | None:
         """Fit to the track; most frames leave it as it was when the frame came."""
@@ -354,13 +374,11 @@ def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     return math.sqrt(12.0 * float((weight * (distance - mean) ** 2).sum() / weight.sum()))
 
 
-def _rejection_reason(fit: DecayFit, road: RoadFall | None) -> str:
+def _rejection_reason(fit: DecayFit) -> str:
     if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
         return "the contrast does not fall with the range as Duntley's law has it"
     if fit.deviation > _WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > _CLEAR:
         return "the range has not changed enough yet"
-    if road is not None and road.is_lit(fit.extinction, fit.deviation):
-        return "lamps light the road: this is a daytime method"
     return ""
 
 

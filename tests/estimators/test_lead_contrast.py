@@ -133,6 +133,20 @@ def test_a_vehicle_that_draws_away_tells_the_visibility_and_how_sure_that_is():
     assert np.mean(inside) >= 0.75
 
 
+@pytest.mark.parametrize("farther", [120.0, 400.0])
+def test_a_vehicle_too_dark_or_too_bright_for_the_decrease_of_its_contrast_shows_uneven_fog(farther):
+    """On average V_met is 200 m before the vehicle at 60 m, another at 90 m."""
+    depths, means = np.linspace(60.0, 90.0, 10), np.geomspace(200.0, farther, 10)
+    images = [paint(CAMERA, (Rear(depth),), mean, i) for i, (depth, mean) in enumerate(zip(depths, means, strict=True))]
+    found = every(
+        Observation(Frame(float(i), image, CAMERA), lead=LeadMeasurement(depth - SETBACK, 3.3))
+        for i, (depth, image) in enumerate(zip(depths, images, strict=True))
+    )
+    reasons = [one.diagnostics["reason"] for one in found[3:]]
+    assert any("may be uneven" in reason for reason in reasons)
+    assert all("may be uneven" in reason or "Duntley" in reason for reason in reasons)
+
+
 @pytest.mark.parametrize("visibility", sorted(DARK_LAND))
 def test_airlight_that_darkens_toward_the_road_is_reckoned_with_the_extinction_that_is_found(visibility):
     ranges = np.linspace(12.0, min(0.9 * visibility, 160.0), 20).tolist()

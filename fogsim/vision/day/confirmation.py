@@ -11,6 +11,8 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
+from fogsim.vision.day.recent_change import RecentChange
+from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import (
     CLEAR,
     DISAGREE,
@@ -33,6 +35,9 @@ PERIOD, SOON = 10.0, 1.0
 MODEL_DEVIATION = 0.15
 """Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
 are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
+
+_MOST_CHANGE = 0.3
+"""Largest relative deviation of k by how it changed over the last images: these methods take fog for even [-]."""
 
 _CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
@@ -57,6 +62,7 @@ class _Outcome:
     # relative, absolute: what the day model leaves open besides: of k over k [-], and of k where the air is clear [1/m]
     relative: float = 0.0
     absolute: float = 0.0
+    reach: float = math.inf  # Distance up to which clear air was seen [m]
 
 
 class Confirmation:
@@ -69,10 +75,12 @@ class Confirmation:
 
     def __init__(self, camera: Camera, horizon: Horizon, scale_deviation: float) -> None:
         self._camera, self._horizon, self._scale = camera, horizon, scale_deviation
+        self._change = RecentChange(_MOST_CHANGE)
         self._last = _Outcome()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
+        self._change.reset()
         self._last = _Outcome()
 
     def of(self, own: Estimate, image: NDArray[Any], free: float, time: float) -> Estimate:
@@ -90,8 +98,10 @@ class Confirmation:
             last = self._last = self._compared(own, levelled(image, self._camera), free, time)
         if last.reason:
             return refused(own, last.reason)
-        deviation = math.hypot(own.standard_deviation, last.relative * own.extinction, last.absolute)
-        return replace(own, standard_deviation=deviation, common_deviation=math.hypot(common, last.relative))
+        relative = math.hypot(last.relative, self._change.of(time, own.extinction))
+        deviation = math.hypot(own.standard_deviation, relative * own.extinction, last.absolute)
+        common, reach = math.hypot(common, relative), min(own.reach, last.reach)
+        return replace(own, standard_deviation=deviation, common_deviation=common, reach=reach)
 
     def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:
         fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
@@ -100,7 +110,10 @@ class Confirmation:
         reason = self._rejection_reason(own, level, day, is_open=is_open)
         more = _added_deviation(own, day, is_open=is_open, is_behind=math.isfinite(min(free, day.free)))
         relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
-        return _Outcome(time, own.visibility_interval, reason, relative, absolute)
+        # A bank of fog farther away would only raise the horizon by less than the doubt of it.
+        doubtful = near_horizon(self._horizon.standard_deviation)
+        reach = self._camera.row_distance / doubtful if is_open else math.inf
+        return _Outcome(time, own.visibility_interval, reason, relative, absolute, reach)
 
     def _rejection_reason(self, own: Estimate, level: NDArray[Any], day: DayVerdict, *, is_open: bool) -> str:
         """Say why an estimate does not count; empty if it does."""

@@ -9,6 +9,7 @@ import pytest
 from fogsim.values import Camera, Estimate, LeadMeasurement
 from fogsim.vision.day import confirmation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import DISAGREE, STANDS_OUT, DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
@@ -52,6 +53,11 @@ def test_fog_that_shows_in_both_counts_with_what_camera_and_models_leave_open(lo
     assert high > 110.0
 
 
+def test_clear_air_is_claimed_only_as_far_as_rows_are_surely_below_the_horizon(looked):
+    assert once(looked, NO_FOG, CLEAR, far=True).reach == pytest.approx(60.0 * 1.3 / near_horizon(1.0))
+    assert once(looked, OWN, FOG).reach == math.inf
+
+
 @pytest.mark.parametrize("own", [OWN, NO_FOG])
 def test_a_day_model_with_other_fog_or_without_any_refuses(looked, own):
     other = replace(FOG, extinction=0.2, deviation=0.01, median=0.2, interval=(14.0, 16.0))
@@ -85,6 +91,20 @@ def test_in_a_drive_it_looks_from_time_to_time_and_where_the_estimate_changes(lo
     for time in (0.0, 0.5 * confirmation.SOON, 1.5 * confirmation.SOON):
         assert not refuses.of(OWN, IMAGE, math.inf, time).valid
     assert len(looks) == 2
+
+
+def test_fog_that_changes_along_the_way_widens_the_interval_for_some_seconds(looked):
+    confirms, _ = looked(FOG)
+
+    def relative(time, extinction):
+        found = confirms.of(replace(OWN, extinction=extinction), IMAGE, math.inf, time)
+        return found.standard_deviation / found.extinction
+
+    even, changed = relative(0.0, 0.03), relative(1.0, 0.034)
+    assert changed > 1.05 * even
+    assert relative(12.0, 0.034) < changed
+    confirms.reset()
+    assert relative(0.0, 0.03) == even
 
 
 def test_a_refusal_of_the_method_stays(looked):

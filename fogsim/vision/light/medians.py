@@ -27,23 +27,23 @@ def columns_apart(image: NDArray[Any], step: int) -> NDArray[Any]:
 
 def median(values: NDArray[np.floating[Any]]) -> float:
     """Median of numbers that are all finite (`values` (n, …))."""
-    flat = values.ravel()
-    half = flat.size // 2
-    if flat.size % 2:
-        return float(np.partition(flat, half)[half])
-    ordered = np.partition(flat, half)
+    ordered = values.flatten()
+    half = ordered.size // 2
+    ordered.partition(half)
+    if ordered.size % 2:
+        return float(ordered[half])
     # Of the lower half the largest is the neighbour: to ask for both takes numpy several times as long.
     return 0.5 * (float(ordered[:half].max()) + float(ordered[half]))
 
 
 def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
     """What a share of numbers lie below, linear between neighbours (`values` (n, …))."""
-    flat = values.ravel()
-    place = share * (flat.size - 1)
-    below = min(int(place), flat.size - 1)
-    ordered = np.partition(flat, below)
+    ordered = values.flatten()
+    place = share * (ordered.size - 1)
+    below = min(int(place), ordered.size - 1)
+    ordered.partition(below)
     lower = float(ordered[below])
-    upper = float(ordered[below + 1 :].min()) if below + 1 < flat.size else lower
+    upper = float(ordered[below + 1 :].min()) if below + 1 < ordered.size else lower
     share = place - below
     return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)
 

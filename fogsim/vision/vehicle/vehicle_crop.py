@@ -20,6 +20,7 @@ from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, 
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.airlight import (
     RoadFall,
+    Rows,
     check_road,
     hidden_at_side,
     neighbouring_airlight,
@@ -149,7 +150,7 @@ class VehicleCrop:
 def vehicle_crop(
     camera: Camera,
     depth: float,
-    luminance_of: Callable[[slice, slice], Luminance],
+    luminance_of: Callable[[Rows, slice], Luminance],
     read_sky: Callable[[], SkyReading],
     least_noise: float = 0.0,
     share: NDArray[np.float64] | None = None,
@@ -209,13 +210,14 @@ def daytime_crop(
     return replace(crop, levelled=LevelledRows(sky, camera, rows, _rows_above(camera, margin), extinction))
 
 
-def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
-    first, end, step = rows.indices(len(pixels.pixels))
+def _luminance(pixels: LinearPixels, rows: Rows, cols: slice) -> NDArray[np.float32]:
+    if isinstance(rows, slice):
+        rows = np.arange(*rows.indices(len(pixels.pixels)))
     left, right, _ = cols.indices(pixels.pixels.shape[1])
-    return part_luminance(pixels, first, end, step, left, right)
+    return part_luminance(pixels, rows, left, right)
 
 
-def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
+def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: Rows, cols: slice) -> NDArray[np.float32]:
     """Luminance over the share of the airlight that its rows have."""
     share: NDArray[np.float32] = airlight.share[rows].astype(np.float32)
     return np.asarray(_luminance(pixels, rows, cols) / share[:, None], np.float32)
@@ -229,7 +231,7 @@ class _DaytimeFrame(NamedTuple):
     margin: float
     sky: Sky | None
     airlight: RowAirlight | None
-    luminance_of: Callable[[slice, slice], Luminance]
+    luminance_of: Callable[[Rows, slice], Luminance]
 
 
 def _rows_above(camera: Camera, margin: float) -> slice:
@@ -274,9 +276,8 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
     Takes `luminance` (rows, cols) [linear grey levels], `sky` [linear grey levels].
     """
     table, slope = _table_with_slope(camera.response, camera.bits, camera.black_level)
-    here, there = (int(np.searchsorted(table, level)) for level in (median(luminance), sky))
-    most = table.size - 1
-    return float(slope[min(here, most)] / slope[min(there, most)])
+    here, there = np.minimum(table.searchsorted((median(luminance), sky)), table.size - 1)
+    return float(slope[here] / slope[there])
 
 
 @functools.lru_cache(maxsize=8)

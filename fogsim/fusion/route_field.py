@@ -108,6 +108,11 @@ class RouteField:
         weights = self._weights(start, end)
         return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor, share)
 
+    def learn_curve(self, stretches: Floats, least: float, floor: float, wrong: float, share: float) -> None:
+        """Update with measurements of stretches, one after another; see `route_field_kernels.learn_curve`."""
+        known, rear = (self._mean, self._covariance), self._rear()
+        route_field_kernels.learn_curve(*known, CELL, rear, stretches, least, floor, wrong, share)
+
     def learn_at_most(
         self, end: float, value: float, softness: float, wrong: float = 0.0, share: float = 1.0, side: float = 1.0
     ) -> None:

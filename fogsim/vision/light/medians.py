@@ -33,7 +33,7 @@ def median(values: NDArray[np.floating[Any]]) -> float:
     if ordered.size % 2:
         return float(ordered[half])
     # Of the lower half the largest is the neighbour: to ask for both takes numpy several times as long.
-    return 0.5 * (float(ordered[:half].max()) + float(ordered[half]))
+    return 0.5 * (float(np.maximum.reduce(ordered[:half])) + float(ordered[half]))
 
 
 def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
@@ -43,7 +43,7 @@ def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
     below = min(int(place), ordered.size - 1)
     ordered.partition(below)
     lower = float(ordered[below])
-    upper = float(ordered[below + 1 :].min()) if below + 1 < ordered.size else lower
+    upper = float(np.minimum.reduce(ordered[below + 1 :])) if below + 1 < ordered.size else lower
     share = place - below
     return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)
 

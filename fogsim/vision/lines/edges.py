@@ -7,7 +7,7 @@ wants the gradient in 16 bits.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -58,8 +58,9 @@ def smoothed(luminance: Image) -> Image:
     return blurred
 
 
+@cache
 def _gaussian() -> Image:
-    """Weights from the middle one on: the rest is its mirror image."""
+    """Weights from the middle one on: the rest is its mirror image; all who ask get the same."""
     weights = np.exp(-0.5 * np.arange(_SMOOTH_TAPS + 1) ** 2)
     return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
@@ -330,12 +331,13 @@ def derivatives(image: Image, across: Image, down: Image) -> None:
 
     Takes `image` (rows, cols), `across`, `down` (rows, cols).
     """
-    _derivatives(image, _half(smoothing_kernel()), _half(derivative_kernel()), across, down)
+    _derivatives(image, *_halves(), across, down)
 
 
-def _half(weights: NDArray[np.float64]) -> Image:
-    """From the middle one on: the rest is its mirror image."""
-    return weights[_TAPS:].astype(np.float32)
+@cache
+def _halves() -> tuple[Image, Image]:
+    """Weights that smooth, and those of the derivative, as in `_gaussian`."""
+    return smoothing_kernel()[_TAPS:].astype(np.float32), derivative_kernel()[_TAPS:].astype(np.float32)
 
 
 @kernel

@@ -343,9 +343,7 @@ class SceneRenderer:
     def _drawing(self, vehicles: Sequence[Batch], lens: Lens) -> Drawing:
         """What a picture may show."""
         end, focal = self._place(vehicles), float(lens.lens[0])
-        count = select_copies(
-            self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, focal, self._chosen
-        )
+        count = select_copies(self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, focal, self._chosen)
         return Drawing(
             self._chosen.mesh[:count],
             self._chosen.record.view(RECORD)[:count, 0],

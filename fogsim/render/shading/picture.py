@@ -227,9 +227,7 @@ class Shading:
         light = self._scene.light._replace(white=white, zenith=zenith, vertical=sides.vertical, below=sides.below)
         self._scene = self._scene._replace(light=light)
 
-    def view(
-        self, triangle_ids: NDArray[np.int32], drawing: Drawing, lens: Lens, *, lamplight: bool
-    ) -> View:
+    def view(self, triangle_ids: NDArray[np.int32], drawing: Drawing, lens: Lens, *, lamplight: bool) -> View:
         """Shade what each pixel sees (`triangle_ids` (rows, cols) int32)."""
         rows, columns = triangle_ids.shape
         copies = Copies(

@@ -185,9 +185,7 @@ def candidate_shapes(curve: RoadCurve) -> Floats:
 
 
 @kernel
-def subpixel_inflections(
-    curve: RoadCurve, shapes: Floats, luminance: Floats, printed: bool
-) -> tuple[Floats, Floats]:
+def subpixel_inflections(curve: RoadCurve, shapes: Floats, luminance: Floats, printed: bool) -> tuple[Floats, Floats]:
     """Inflections of some curves to a fraction of a row.
 
     As negru2013 section IV.B.c, but for candidates between rows as well: for each of them level and slope are those of

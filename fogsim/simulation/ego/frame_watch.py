@@ -4,7 +4,6 @@ import math
 from collections import deque
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera import Pixels

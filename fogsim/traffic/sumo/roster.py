@@ -53,8 +53,7 @@ class Roster:
         getters = subscribed(api, _GETTERS) if remote else [getter(api, "simulation", name) for name in _GETTERS]
         self._now, self._departed, self._returned, self._teleporting, self._arrived = getters
         self._all_ids = getter(api, "vehicle", "getIDList")
-        self._count, self._parameter = getter(api, "vehicle", "getIDCount"), getter(api, "simulation", "getParameter")
-        self._elsewhere = -1
+        self._count = getter(api, "vehicle", "getIDCount")
         self._step = float(api.simulation.getDeltaT())
         self._checked = 0.0
         self._entered: list[str] = []
@@ -99,12 +98,8 @@ class Roster:
         self._recount()
 
     def _recount(self) -> None:
-        # SUMO counts those on the road one by one, but knows how many are running, with those that are teleported.
-        elsewhere = int(self._parameter("", "stats.vehicles.running")) - len(self.present)
-        if elsewhere != self._elsewhere:
-            self._elsewhere = elsewhere
-            if self._count() != len(self.present):
-                self.reload()
+        if self._count() != len(self.present):
+            self.reload()
 
     def reload(self) -> None:
         """Ask for all ids."""

@@ -249,8 +249,9 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
     samples = np.empty((rows // stride, cols // stride), np.float32)
     _luminance_samples(np.ascontiguousarray(radiance, dtype=np.float32), stride, samples)
     if metering is Metering.HIGHLIGHTS:
-        place = int(_HIGHLIGHT_SHARE * (samples.size - 1))
-        return float(np.partition(samples.ravel(), place)[place])
+        ordered, place = samples.reshape(-1), int(_HIGHLIGHT_SHARE * (samples.size - 1))
+        ordered.partition(place)
+        return float(ordered[place])
     return math.exp(float(np.mean(np.log(np.maximum(samples, _DARKEST_METERED, dtype=np.float64)))))
 
 

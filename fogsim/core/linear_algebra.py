@@ -64,10 +64,12 @@ def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     if right.ndim == 1:
         return np.asarray((left * right).sum(axis=-1))
     kind = left.dtype if left.dtype == right.dtype else np.result_type(left, right)
-    rows = np.ascontiguousarray(left, kind).reshape(math.prod(left.shape[:-1]), left.shape[-1])
+    rows = np.ascontiguousarray(left, kind)
+    if left.ndim != 2:
+        rows = rows.reshape(math.prod(left.shape[:-1]), left.shape[-1])
     out = np.zeros((len(rows), right.shape[1]), kind)
     _add_product(rows, np.ascontiguousarray(right, kind), out)
-    return out.reshape(*left.shape[:-1], right.shape[1])
+    return out if left.ndim == 2 else out.reshape(*left.shape[:-1], right.shape[1])
 
 
 @kernel

@@ -36,7 +36,7 @@ from fogsim.vision.strips.course_geometry import course_deviation, course_geomet
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road
 from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.shade import divided_road, is_sure
-from fogsim.vision.strips.sky import Sky, sky_above
+from fogsim.vision.strips.sky import Sky, shared_sky
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
     lowest_road_row,
@@ -198,7 +198,8 @@ class JointRoad:
             return Estimate.invalid(self.method, self._impossible, **found)
         level = levelled(image, self._camera)
         pixels = linear_pixels(level, self._camera)
-        sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
+        margin = 3.0 * self._horizon.standard_deviation + 2.0
+        sky = shared_sky(observation.shared, pixels, self._camera, margin)
         if sky is not None and sky.luminance < _MIN_AIRLIGHT:
             return Estimate.invalid(self.method, TOO_DARK, **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
@@ -368,7 +369,8 @@ class JointRoad:
     def _is_hidden(self, fit: JointFit, curves: StripCurves, free: float) -> bool:
         """Whether too little of the own lane, as far as it is free, fits a road."""
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
-        return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < _MIN_USED)
+        rows = np.count_nonzero(near)
+        return bool(rows < MIN_ROWS // 2 or np.count_nonzero(fit.used[0] & near) / rows < _MIN_USED)
 
     def _estimate(
         self,
@@ -381,10 +383,11 @@ class JointRoad:
         fit = uneven.fit
         unevenness = math.hypot(_unevenness(uneven), changing)
         horizon = self._camera.horizon_row + fit.shift
-        rows = self._geometry.first[fit.used[0]]
-        left, right = self._geometry.left[0][fit.used[0]], self._geometry.right[0][fit.used[0]]
+        used, geometry = fit.used[0], self._geometry
+        rows, left = geometry.first[used].tolist(), geometry.left[0][used].tolist()
+        right = geometry.right[0][used].tolist()
         found |= {"horizon_row": horizon, "airlight": fit.airlight, "road": fit.road, "misfit": fit.misfit}
-        found["band"] = (int(left.min()), int(right.max()), int(rows.min()), int(self._geometry.last[0]))
+        found["band"] = (int(min(left)), int(max(right)), min(rows), int(geometry.last[0]))
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
@@ -429,7 +432,7 @@ def _optical_depths(uneven: UnevenFit, unevenness: float) -> OpticalDepths:
     model = math.hypot(MODEL_DEVIATION, unevenness)
     deviation = np.hypot(_OVERCONFIDENCE * uneven.deviation, model * uneven.depth)
     deviation = np.hypot(deviation, _LEAST_DEVIATION * uneven.distance)
-    return OpticalDepths(*(tuple(values.tolist()) for values in (uneven.distance, uneven.depth, deviation)))
+    return OpticalDepths(tuple(uneven.distance.tolist()), tuple(uneven.depth.tolist()), tuple(deviation.tolist()))
 
 
 def _obstacle(fit: JointFit, geometry: StripGeometry) -> float:

@@ -256,28 +256,27 @@ class LeadContrast:
         """
         image = self._check.kernel_image(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
-        lead = observation.lead
+        lead, time = observation.lead, observation.time
         if lead is None or not (math.isfinite(lead.distance) and lead.distance >= 0):
-            self._miss(observation.time)
+            self._miss(time)
             return Estimate.invalid(self.method, "no vehicle ahead is tracked", **found)
-        surprise = self._surprise(lead, observation.time)
-        self._last = (observation.time, lead)
+        surprise = self._surprise(lead, time)
+        self._last = (time, lead)
         reason, road = "", None
         try:
-            number = self._ranges.add(observation.time, lead)
+            number = self._ranges.add(time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
             fit = self._fit(self._track.likely_distances())
             about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, _LEAST_EXTINCTION), DENSEST)
             self._track.relevel(about)
-            crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
+            depth, shared = likely + self._setback, observation.shared
+            crop = daytime_crop(image, self._camera, depth, self._pitch_deviation, about, shared)
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
-            detection = self._track.look(
-                crop, number, lead.distance, observation.time, surprise=surprise, densest=densest
-            )
+            detection = self._track.look(crop, number, lead.distance, time, surprise=surprise, densest=densest)
             found["lead_box"], road = _box(detection), crop.road
         except CannotTellError as error:
             reason = str(error)
-            self._miss(observation.time)
+            self._miss(time)
         return without_far_objects(self._estimate(reason, road, found), image, self._camera, self._horizon)
 
     def _miss(self, time: float) -> None:
@@ -329,7 +328,7 @@ class LeadContrast:
         """Fit to the track; most frames leave it as it was when the frame came."""
         track, (before, known, fit) = self._track.detections, self._fitted
         is_known = len(known) == len(track) and all(map(operator.is_, known, track))
-        if not is_known or not np.array_equal(before, distance):
+        if not is_known or before.tobytes() != distance.tobytes():
             fit = self._fit_to(track, distance)
             self._fitted = distance, tuple(track), fit
         return fit

@@ -302,7 +302,7 @@ class Negru2013:
         The band is on the road from `paved` rows below the horizon downward.
         """
         apart = np.abs(curve.below_horizon) > _BETWEEN
-        curve = curve._replace(weight=curve.weight * apart)
+        curve = RoadCurve(*curve[:3], curve.weight * apart, curve.row_distance)
         deviation_of_row = seen.horizon.standard_deviation
         extinction, deviation, square = inflection_with_deviation(
             curve, block_signs(), deviation_of_row, Negru2013Repair.SIGNS not in self._repairs

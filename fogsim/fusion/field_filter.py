@@ -209,12 +209,13 @@ class FieldFilter:
             self._field.learn_at_most(min(estimate.reach, self._sight(most)), math.log(most), 0.3)
             return
         if estimate.optical_depths is None:
-            end = min(estimate.reach, self._sight(k))
-            for start in (0.0, 0.5 * end):
-                self._learn(start, start + 0.5 * end, math.log(k), math.sqrt(2.0) * relative, estimate.common_deviation)
-            return
-        for start, end, value, deviation in _curve_stretches(estimate.optical_depths, FARTHEST).tolist():
-            self._learn(start, end, value, max(deviation, 0.5 * relative), estimate.common_deviation)
+            end, known = min(estimate.reach, self._sight(k)), (math.log(k), math.sqrt(2.0) * relative)
+            stretches, least = np.array([(0.0, 0.5 * end, *known), (0.5 * end, 0.5 * end + 0.5 * end, *known)]), 0.0
+        else:
+            stretches, least = _curve_stretches(estimate.optical_depths, FARTHEST), 0.5 * relative
+        # The errors of pictures that follow one another are alike: each counts for the share of time that is new.
+        floor = max(self._floor, estimate.common_deviation)
+        self._field.learn_curve(stretches, least, floor, self._outlier_share, self._share)
 
     def _take_in_bounds(self, bounds: ExtinctionBounds) -> None:
         how = max(bounds.softness, 0.05), max(self._outlier_share, LEAST_UNBOUND), self._share
@@ -223,12 +224,6 @@ class FieldFilter:
             self._field.learn_at_most(self._sight(most), math.log(most), *how)
         if bounds.least > _CLEAR:
             self._field.learn_at_most(self._sight(bounds.least), math.log(bounds.least), *how, side=-1.0)
-
-    def _learn(self, start: float, end: float, value: float, deviation: float, common: float) -> None:
-        # The errors of pictures that follow one another are alike: each counts for the share of time that is new.
-        floor = max(self._floor, common)
-        widened = max(deviation, floor) / math.sqrt(self._share)
-        self._field.learn(start, end, value, widened, self._outlier_share, floor, self._share)
 
     def _hear(self, report: FogReport, time: float, place: float) -> None:
         """Learn what others have measured."""

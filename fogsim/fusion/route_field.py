@@ -93,10 +93,8 @@ class RouteField:
 
     def _linearised(self, start: float, end: float) -> tuple[float, Floats, float]:
         """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance."""
-        return route_field_kernels.linearised(self._mean, self._covariance, self._weights(start, end))
-
-    def _weights(self, start: float, end: float) -> Floats:
-        return route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
+        weights = route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
+        return route_field_kernels.linearised(self._mean, self._covariance, weights)
 
     def learn(
         self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float, share: float = 1.0
@@ -105,8 +103,13 @@ class RouteField:
 
         Takes `start`, `end` [m].
         """
-        weights = self._weights(start, end)
+        weights = route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
         return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor, share)
+
+    def learn_curve(self, stretches: Floats, least: float, floor: float, wrong: float, share: float) -> None:
+        """Update with measurements of stretches, one after another; see `route_field_kernels.learn_curve`."""
+        known, rear = (self._mean, self._covariance), self._rear()
+        route_field_kernels.learn_curve(*known, CELL, rear, stretches, least, floor, wrong, share)
 
     def learn_at_most(
         self, end: float, value: float, softness: float, wrong: float = 0.0, share: float = 1.0, side: float = 1.0

@@ -143,6 +143,28 @@ def learn(
 
 
 @kernel
+def learn_curve(
+    mean: Floats,
+    covariance: Floats,
+    cell: float,
+    rear: float,
+    stretches: Floats,
+    least: float,
+    floor: float,
+    wrong: float,
+    share: float,
+) -> None:
+    """`learn` in turn what each stretch has measured: its start and end [m], ln k and the deviation of that (n, 4).
+
+    Takes `mean` (n,), `covariance` (n, n), `cell`, `rear` [m].
+    """
+    for i in range(len(stretches)):
+        weights = stretch_weights(mean.size, cell, rear, stretches[i, 0], stretches[i, 1])
+        deviation = max(stretches[i, 3], least, floor) / math.sqrt(share)
+        learn(mean, covariance, weights, stretches[i, 2], deviation, wrong, floor, share)
+
+
+@kernel
 def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> Floats:
     """Probability of each of evenly spaced cells by samples, spread evenly between one and the next.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import kernel
 from fogsim.errors import InputError
 from fogsim.render.drawing import RECORD, Drawing, MeshTable, Rasteriser
-from fogsim.render.projection import lens_of
+from fogsim.render.projection import Lens, lens_of
 from fogsim.render.protocol import FARTHEST, RenderError
 from fogsim.render.shading import Shading
 from fogsim.render.vectors import Vector, dot, row
@@ -329,9 +329,10 @@ class SceneRenderer:
         """Draw the scene and the vehicles (see `Renderer.render`)."""
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
-        drawing = self._drawing(vehicles, camera, pose)
+        lens = lens_of(camera, pose)
+        drawing = self._drawing(vehicles, lens)
         triangle_ids = self._rasteriser.triangle_ids(drawing, camera, pose)
-        return self._shading.view(triangle_ids, drawing, camera, pose, lamplight)
+        return self._shading.view(triangle_ids, drawing, lens, lamplight=lamplight)
 
     def close(self) -> None:
         """Give back what the rasteriser holds."""
@@ -339,13 +340,10 @@ class SceneRenderer:
             self._rasteriser.close()
         self._rasteriser = None
 
-    def _drawing(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose) -> Drawing:
+    def _drawing(self, vehicles: Sequence[Batch], lens: Lens) -> Drawing:
         """What a picture may show."""
-        end = self._place(vehicles)
-        lens = lens_of(camera, pose)
-        count = select_copies(
-            self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, camera.focal_length, self._chosen
-        )
+        end, focal = self._place(vehicles), float(lens.lens[0])
+        count = select_copies(self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, focal, self._chosen)
         return Drawing(
             self._chosen.mesh[:count],
             self._chosen.record.view(RECORD)[:count, 0],
@@ -383,18 +381,16 @@ class SceneRenderer:
             np.concatenate([batch.paint for batch in vehicles], out=record[:, 12:15])
             np.concatenate([batch.lamps for batch in vehicles], out=integers[:, 15])
             np.concatenate([batch.instance for batch in vehicles], out=integers[:, 16])
-            begin = self._still
-            for batch, count in zip(vehicles, counts, strict=True):
-                self._copies.shape[begin : begin + count] = self._number(batch)
-                begin += count
+            self._copies.shape[self._still : end] = np.repeat([*map(self._number, vehicles)], counts)
             self._copies.place[self._still : end] = record[:, 3:12:4]
         return end
 
     def _number(self, batch: Batch) -> int:
-        if batch.shape not in self._table.numbers:
-            known = sorted(self._table.numbers)
+        numbers = self._table.numbers
+        if batch.shape not in numbers:
+            known = sorted(numbers)
             raise InputError(f"a batch names the shape {batch.shape!r}, which the scene does not have: {known}")
-        return self._table.numbers[batch.shape]
+        return numbers[batch.shape]
 
 
 def _records(batch: Batch) -> NDArray[np.float32]:

@@ -166,7 +166,7 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
         (state.position, state.heading, state.grade, state.length, state.width, state.height, state.paint),
     )
     _place_copies(rows, _Vehicles(position, heading, grade, length, width, height, painted, state.lamps), copies)
-    return tuple(Batch(name, transforms[own], paint[own], copies.lamps[own], instance[own]) for name, own in shapes)
+    return tuple([Batch(name, transforms[own], paint[own], copies.lamps[own], instance[own]) for name, own in shapes])
 
 
 class _Vehicles(NamedTuple):

@@ -37,7 +37,13 @@ _SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of a belief's probabilities."""
 
 
-_ESTIMATED = ("extinction", "standard_deviation", "common_deviation", "scale_deviation")
+_ESTIMATED = {
+    "extinction": " [1/m]; return Estimate.invalid if there is no estimate",
+    "standard_deviation": " [1/m]",
+    "common_deviation": " [-]",
+    "scale_deviation": " [-]",
+}
+"""Numbers of an estimate, with what a message adds to them."""
 
 
 def checked_estimate(method: str, value: object) -> Estimate:
@@ -53,11 +59,12 @@ def checked_estimate(method: str, value: object) -> Estimate:
         raise InputError(f"{who}: valid must be True or False, got {shown(estimate.valid)}")
     if not isinstance(estimate.diagnostics, Mapping):
         raise InputError(f"{who}: diagnostics must be a mapping, got {shown(estimate.diagnostics)}")
-    if estimate.valid:
-        _check_number(who, "extinction", estimate.extinction, " [1/m]; return Estimate.invalid if there is no estimate")
-        _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
-        for name in ("common_deviation", "scale_deviation"):
-            _check_number(who, name, getattr(estimate, name), " [-]")
+    plain: dict[str, Any] = {}
+    for name, unit in _ESTIMATED.items() if estimate.valid else ():
+        number = getattr(estimate, name)
+        if type(number) is not float or not 0.0 <= number < math.inf:
+            _check_number(who, name, number, unit)
+            plain[name] = float(number)
     if not (_is_number(estimate.reach) and estimate.reach >= 0.0):
         raise InputError(f"{who}: reach must be at least 0 [m], or inf; got {shown(estimate.reach)}")
     _check_part(who, "bounds", estimate.bounds, ExtinctionBounds)
@@ -65,8 +72,6 @@ def checked_estimate(method: str, value: object) -> Estimate:
     if (curve := estimate.optical_depths) is not None:
         _check_kind(who, "optical_depths", curve, OpticalDepths, "of type fogsim.values.OpticalDepths, or None")
         _check_curve(f"{who}: optical_depths", curve)
-    numbers = {name: getattr(estimate, name) for name in _ESTIMATED} if estimate.valid else {}
-    plain: dict[str, Any] = {name: float(number) for name, number in numbers.items() if type(number) is not float}
     if plain or type(estimate.valid) is not bool:
         return replace(estimate, valid=bool(estimate.valid), **plain)
     return estimate
@@ -75,7 +80,7 @@ def checked_estimate(method: str, value: object) -> Estimate:
 def _check_curve(who: str, curve: OpticalDepths) -> None:
     columns = (curve.distance, curve.depth, curve.standard_deviation)
     try:
-        fits = len({len(column) for column in columns}) == 1 and math.isfinite(sum(map(sum, columns)))
+        fits = len(set(map(len, columns))) == 1 and math.isfinite(sum(map(sum, columns)))
         ascends = [*curve.distance] == sorted({*curve.distance}) != []
     except (TypeError, ValueError):
         fits = ascends = False

@@ -152,9 +152,13 @@ def distance_at_depth(
         np.empty((2, 4 * MOST_PIECES)),
         depth,
     )
-    if depths[count - 1] < depth:
+    last = count - 1
+    if depths[last] < depth:
         return math.inf
-    return float(np.interp(depth, depths[:count], distances[:count]))
+    if last == 0 or depths[last] == depth:
+        return float(distances[last])
+    near, far, low, high = *distances[last - 1 : count].tolist(), *depths[last - 1 : count].tolist()
+    return float((far - near) / (high - low) * (depth - low) + near)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.core.jit import Bands, kernel
 from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
-from fogsim.render.projection import Lens, lens_of
+from fogsim.render.projection import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
 from fogsim.render.shading.layout import (
@@ -30,7 +30,6 @@ from fogsim.render.shading.pavement import Asphalt, asphalt
 from fogsim.render.shading.road import shade_road
 from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces, shade_objects, shade_sky
 from fogsim.render.shading.texture import GRASS, Noise, Row, memory_for_row, set_texture, tiles
-from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import Pavement, Surface
@@ -228,9 +227,7 @@ class Shading:
         light = self._scene.light._replace(white=white, zenith=zenith, vertical=sides.vertical, below=sides.below)
         self._scene = self._scene._replace(light=light)
 
-    def view(
-        self, triangle_ids: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
-    ) -> View:
+    def view(self, triangle_ids: NDArray[np.int32], drawing: Drawing, lens: Lens, *, lamplight: bool) -> View:
         """Shade what each pixel sees (`triangle_ids` (rows, cols) int32)."""
         rows, columns = triangle_ids.shape
         copies = Copies(
@@ -246,7 +243,6 @@ class Shading:
         picture = Picture(
             radiance.reshape(-1), distance, instance, _NO_RESPONSE if response is None else response.reshape(-1)
         )
-        lens = lens_of(camera, pose)
 
         def shade(band: int, top: int, bottom: int) -> None:
             spans = self._room(band, (bottom - top) * columns, int(drawing.first[-1]))

@@ -4,7 +4,6 @@ import math
 from collections import deque
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera import Pixels
@@ -54,7 +53,8 @@ def why_useless(frame: Frame, time: float) -> str:
     """Say why a frame, news or not, does not show the road of now; empty if it may (`time` [s])."""
     if time - frame.time > _LATEST:
         return f"the frame is {time - frame.time:.2f} s late"
-    levels = np.sort(frame.image[::_APART, ::_APART], axis=None)
+    levels = frame.image[::_APART, ::_APART].flatten()
+    levels.sort()
     dark, bright = _quantile(levels, 0.01), _quantile(levels, 0.99)
     if bright - dark < _LEAST_CONTRAST * (2**frame.camera.bits - 1):
         return f"the picture shows nothing: {dark:.0f} … {bright:.0f} grey levels"

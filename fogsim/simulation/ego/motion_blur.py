@@ -32,7 +32,7 @@ def exposed(
 
     Vehicles, the camera's own among them, go straight on for the time; what they turn and speed up in it is left out.
     """
-    if shutter.open_time * float(np.max(state.speed)) < _LEAST_WAY:
+    if shutter.open_time * float(state.speed.max()) < _LEAST_WAY:
         return draw(state, pose)
     own, total = _velocities(state)[ego], np.zeros(())
     for seconds in shutter.offsets():

@@ -48,7 +48,7 @@ class NearbyVehicles:
     def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
         self._ego = ego
         self._radius = radius
-        self._position = vehicle_getter(api, "getPosition3D")
+        self._position, self._place = vehicle_getter(api, "getPosition3D"), vehicle_getter(api, "getPosition")
         self._speed = vehicle_getter(api, "getSpeed")
         self._roster = Roster(api) if roster is None else roster
         self._far = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
@@ -72,8 +72,7 @@ class NearbyVehicles:
             self._removals = roster.removals
             self._set_near([v for v in self._near if v in roster.present])
         # Plain numbers: mostly some ten are due, for which arrays would cost three times as much.
-        there, dist = here[:2], math.dist
-        distances = [dist(place[:2], there) for place in map(self._position, far)]
+        distances = list(map(math.dist, map(self._place, far), itertools.repeat(here[:2])))
         come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])

@@ -245,7 +245,7 @@ class DueVehicles:
         if vehicles:
             self._schedule.add(vehicles, self._roster.time + pause)
 
-    def schedule_each(self, vehicles: Sequence[str], pauses: Sequence[float]) -> None:
+    def schedule_each(self, vehicles: Iterable[str], pauses: Iterable[float]) -> None:
         """Schedule vehicles that have been taken out, each for a pause of its own (`pauses` [s])."""
         self._schedule.add_each(vehicles, pauses, self._roster.time)
 

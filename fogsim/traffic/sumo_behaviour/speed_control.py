@@ -265,6 +265,8 @@ class SumoDesiredSpeeds:
         """Who has had another type since the last time: by a device (``toc``) or a user, which undoes what was set."""
         before, now = self._types, dict(zip(vehicles, map(self._type, vehicles), strict=True))
         self._types = now
+        if now.items() <= before.items():
+            return []
         # With the first change of what its type says a vehicle gets a type of its own, with its id after the name.
         changed = [v for v, name in now.items() if before.get(v, name) != name]
         return [v for v in changed if before[v].removesuffix(f"@{v}") != now[v].removesuffix(f"@{v}")]

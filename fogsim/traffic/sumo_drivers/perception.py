@@ -255,19 +255,16 @@ class Perception:
         ignored, speed, seen, hidden = self._ignored, self.speed, self._certainly_seen, self._certainly_hidden
         ahead = list(map(self.leader, due, itertools.repeat(REACH)))
         behind = self._obstructed(due, ahead)
-        # Most vehicles are far from any doubt, and pause for the longest time.
-        calm: list[str] = []
         near: list[_Pair] = []
         doubtful: list[_Pair] = []
         for follower, found in zip(due, ahead, strict=True):
             leader, gap = found or _NO_LEADER
             if not leader:
-                calm.append(follower)
                 if follower in ignored:
                     self._reveal(follower)
                 continue
             if gap > hidden or follower in behind:
-                if ignored.get(follower) != leader or follower in self._emerging:
+                if follower not in ignored or ignored[follower] != leader or follower in self._emerging:
                     self._hide(follower, leader)
                 near_edge = 0.0 if follower in behind else gap - hidden
             elif gap > seen or follower in ignored:
@@ -275,21 +272,21 @@ class Perception:
                 continue
             else:
                 near_edge = seen - gap
-            if near_edge >= _LONG_WAY:
-                calm.append(follower)
-            else:
+            if near_edge < _LONG_WAY:
                 near.append((follower, leader, near_edge))
         followers, leaders, ways = zip(*near, strict=True) if near else ((), (), ())
-        speeds = zip(map(speed, followers), map(speed, leaders), ways, strict=True)
-        # Until the gap could have changed by so much.
-        pauses = [
-            pause if (pause := way / (abs(other - own) + _CLOSING)) < MAX_PAUSE else MAX_PAUSE
-            for own, other, way in speeds
-        ]
+        speeds = zip(followers, map(speed, followers), map(speed, leaders), ways, strict=True)
+        # Until the gap could have changed by so much. Most are far from any doubt, and pause for the longest time.
+        soon = {
+            follower: pause
+            for follower, own, other, way in speeds
+            if (pause := way / ((other - own if other > own else own - other) + _CLOSING)) < MAX_PAUSE
+        }
         if doubtful:
-            pauses += self._decide_by_sight(doubtful, own_lamps)
-        self._due.schedule(calm, MAX_PAUSE)
-        self._due.schedule_each([pair[0] for pair in near + doubtful], pauses)
+            pauses = self._decide_by_sight(doubtful, own_lamps)
+            soon |= {pair[0]: pause for pair, pause in zip(doubtful, pauses, strict=True) if pause < MAX_PAUSE}
+        self._due.schedule([follower for follower in due if follower not in soon], MAX_PAUSE)
+        self._due.schedule_each(soon, soon.values())
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float] | None]) -> Collection[str]:
         """Those whose leaders are behind something that stands next to the road."""

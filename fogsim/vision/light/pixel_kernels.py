@@ -64,12 +64,12 @@ def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
 
 
 @kernel
-def part_luminance(image: LinearPixels, first: int, end: int, step: int, left: int, right: int) -> NDArray[np.float32]:
-    """Luminance of every so many rows, and of columns up to the right one [linear grey levels]."""
-    rows, cols = max((end - first + step - 1) // step, 0), max(right - left, 0)
-    out, part = np.empty((rows, cols), np.float32), image.pixels[:, left : left + cols]
-    for row in range(rows):
-        row_luminance(part, image.tables, first + row * step, out[row])
+def part_luminance(image: LinearPixels, rows: NDArray[np.int64], left: int, right: int) -> NDArray[np.float32]:
+    """Luminance of rows (n,) int64, and of columns up to the right one [linear grey levels]."""
+    cols = max(right - left, 0)
+    out, part = np.empty((rows.size, cols), np.float32), image.pixels[:, left : left + cols]
+    for i in range(rows.size):
+        row_luminance(part, image.tables, rows[i], out[i])
     return out
 
 

@@ -7,14 +7,14 @@ wants the gradient in 16 bits.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.core.jit import kernel
-from fogsim.vision.light.medians import columns_apart, median
+from fogsim.vision.light.medians import median_in
 
 Image = NDArray[np.float32]
 
@@ -58,8 +58,9 @@ def smoothed(luminance: Image) -> Image:
     return blurred
 
 
+@cache
 def _gaussian() -> Image:
-    """Weights from the middle one on: the rest is its mirror image."""
+    """Weights from the middle one on: the rest is its mirror image; all who ask get the same."""
     weights = np.exp(-0.5 * np.arange(_SMOOTH_TAPS + 1) ** 2)
     return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
@@ -126,10 +127,18 @@ def _sobel(image: Image, across: Image, down: Image) -> None:
     cv2.Sobel(image, cv2.CV_32F, 0, 1, dst=down, scale=0.125, borderType=cv2.BORDER_REPLICATE)
 
 
+@kernel
 def _median_size(squares: Image, step: int) -> float:
     """Median size of the gradient in the lower half, of whose squares there is a border of one pixel."""
-    inside = squares[1:-1, 1:-1]
-    return median(np.sqrt(columns_apart(inside[len(inside) // 2 :: step], step)))
+    rows, cols = squares.shape[0] - 2, squares.shape[1] - 2
+    sizes, count = np.empty((rows // (2 * step) + 2) * (cols // step + 3), np.float32), 0
+    for row in range(rows // 2, rows, step):
+        # From both sides inward: of a mirrored image the same pixels.
+        for side in range(2):
+            for i in range(0, (cols + 1 - side) // 2, step):
+                sizes[count] = math.sqrt(squares[row + 1, cols - i if side else i + 1])
+                count += 1
+    return median_in(sizes[:count])
 
 
 @kernel
@@ -330,12 +339,13 @@ def derivatives(image: Image, across: Image, down: Image) -> None:
 
     Takes `image` (rows, cols), `across`, `down` (rows, cols).
     """
-    _derivatives(image, _half(smoothing_kernel()), _half(derivative_kernel()), across, down)
+    _derivatives(image, *_halves(), across, down)
 
 
-def _half(weights: NDArray[np.float64]) -> Image:
-    """From the middle one on: the rest is its mirror image."""
-    return weights[_TAPS:].astype(np.float32)
+@cache
+def _halves() -> tuple[Image, Image]:
+    """Weights that smooth, and those of the derivative, as in `_gaussian`."""
+    return smoothing_kernel()[_TAPS:].astype(np.float32), derivative_kernel()[_TAPS:].astype(np.float32)
 
 
 @kernel

@@ -150,21 +150,42 @@ def inflection_with_deviation(
 
     0 where there is none. Takes `signs` of `block_signs`, `horizon_deviation` [px].
     """
-    rows, square = subpixel_inflections(curve, curve.luminance.copy().reshape(-1, 1), printed)
+    own, shapes = curve.luminance.copy().reshape(-1, 1), candidate_shapes(curve)
+    rows, square = subpixel_inflections(curve, shapes, own, printed)
     per_row = 2.0 / curve.row_distance
     k = per_row * rows[0]
     if not k > 0.0:
         return 0.0, np.inf, 0.0
-    found = per_row * subpixel_inflections(curve, redrawn(curve, law_fit(curve, k).model, signs), printed)[0]
+    found = per_row * subpixel_inflections(curve, shapes, redrawn(curve, law_fit(curve, k).model, signs), printed)[0]
     ends = np.empty(2)
     for side in range(2):
         other = moved(curve, horizon_deviation if side == 0 else -horizon_deviation)
-        ends[side] = per_row * subpixel_inflections(other, curve.luminance.copy().reshape(-1, 1), printed)[0][0]
+        ends[side] = per_row * subpixel_inflections(other, candidate_shapes(other), own, printed)[0][0]
     return k, whole_deviation(k, found, ends[0], ends[1]), square[0]
 
 
 @kernel
-def subpixel_inflections(curve: RoadCurve, luminance: Floats, printed: bool) -> tuple[Floats, Floats]:
+def _candidates(curve: RoadCurve) -> Floats:
+    """Rows below the horizon at which an inflection is looked for [px] (n,)."""
+    step = math.log(max(curve.below_horizon[-1], 2.0 * _HIGHEST) / _HIGHEST) / (_CANDIDATES - 1)
+    return _HIGHEST * np.exp(step * np.arange(_CANDIDATES))
+
+
+@kernel
+def candidate_shapes(curve: RoadCurve) -> Floats:
+    """Share of the road's light that reaches the camera, by candidate and row in use (n, m) [-]."""
+    at, used = _candidates(curve), np.flatnonzero(curve.weight > 0.0)
+    rates, shapes = _rates(curve.below_horizon[used], slants(curve)[used]), np.empty((at.size, used.size))
+    for candidate in range(at.size):
+        if at[candidate] <= curve.below_horizon[-1] / 1.2:
+            for i in range(used.size):
+                ends = exponential(at[candidate] * rates[0, i]) + exponential(at[candidate] * rates[2, i])
+                shapes[candidate, i] = (ends + 4.0 * exponential(at[candidate] * rates[1, i])) / 6.0
+    return shapes
+
+
+@kernel
+def subpixel_inflections(curve: RoadCurve, shapes: Floats, luminance: Floats, printed: bool) -> tuple[Floats, Floats]:
     """Inflections of some curves to a fraction of a row.
 
     As negru2013 section IV.B.c, but for candidates between rows as well: for each of them level and slope are those of
@@ -172,27 +193,20 @@ def subpixel_inflections(curve: RoadCurve, luminance: Floats, printed: bool) -> 
     and the candidate whose model leaves the least of the whole curve is the inflection.
 
     Returns v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none
-    (m,). Takes `luminance` (n, m) [linear grey levels].
+    (m,). Takes `shapes` of `candidate_shapes`, `luminance` (n, m) [linear grey levels].
     """
     below, weight = curve.below_horizon, curve.weight
-    top = max(below[-1], 2.0 * _HIGHEST)
-    step = math.log(top / _HIGHEST) / (_CANDIDATES - 1)
-    at, error = _HIGHEST * np.exp(step * np.arange(_CANDIDATES)), np.full((_CANDIDATES, luminance.shape[1]), np.inf)
+    at, error = _candidates(curve), np.full((_CANDIDATES, luminance.shape[1]), np.inf)
     used = np.flatnonzero(weight > 0.0)
     rows, weights, light = below[used], weight[used], luminance[used]
-    rates = _rates(rows, slants(curve)[used])
     sums = np.zeros((2, luminance.shape[1]))
     for i in range(used.size):
         for m in range(sums.shape[1]):
             sums[0, m] += weights[i] * light[i, m]
             sums[1, m] += weights[i] * light[i, m] ** 2
-    shape = np.empty(used.size)
     for candidate in range(_CANDIDATES):
         if at[candidate] <= below[-1] / 1.2:
-            for i in range(used.size):
-                ends = exponential(at[candidate] * rates[0, i]) + exponential(at[candidate] * rates[2, i])
-                shape[i] = (ends + 4.0 * exponential(at[candidate] * rates[1, i])) / 6.0
-            _add_errors(rows, weights, shape, light, sums, at[candidate], printed, error[candidate])
+            _add_errors(rows, weights, shapes[candidate], light, sums, at[candidate], printed, error[candidate])
     return _least(at, error, weight.sum())
 
 

@@ -178,7 +178,7 @@ def cumulative_limits(steps: NDArray[np.float32], seed_tolerance: float) -> Grow
     Takes `steps` (rows,) [linear grey levels], `seed_tolerance` [linear grey levels].
     """
     upward = np.concatenate(([seed_tolerance], steps[-2::-1].astype(np.float64)))
-    return GrowthLimits(steps, np.ascontiguousarray(np.cumsum(upward)[::-1]))
+    return GrowthLimits(steps, np.ascontiguousarray(upward.cumsum()[::-1]))
 
 
 def constant_limits(rows: int, step: float, per_row: float, seed_tolerance: float) -> GrowthLimits:

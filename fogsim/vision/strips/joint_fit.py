@@ -161,7 +161,7 @@ def fit_jointly(
 
     Returns None if there are too few bins.
     """
-    if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
+    if np.count_nonzero(curves.variance[0] > 0) < LEAST_BINS:
         return None
     table, tried = slope_table(), _tried(albedos)
     begin = (math.nan, 0.0, 0.0) if near is None else (near.extinction, near.airlight, near.shift)
@@ -294,7 +294,7 @@ def _average(priors: Priors, found: list[_Answers]) -> JointFit:
     uneven = [(prior, one) for prior, one in zip(priors, found, strict=True) if prior.rise.size]
     table = found[0].table if len(found) == 1 else np.concatenate([one.table for one in found])
     mixture = _mixed(table, len(table) - sum(len(one.table) for _, one in uneven))
-    best = min(found, key=lambda one: float(one.table[:, 0].min()))
+    best = found[0] if len(found) == 1 else min(found, key=lambda one: float(one.table[:, 0].min()))
     return JointFit(
         extinction=float(mixture.theta[0]),
         extinction_deviation=mixture.deviation,
@@ -306,7 +306,7 @@ def _average(priors: Priors, found: list[_Answers]) -> JointFit:
         hidden=best.used[0] == albedo_filter.HIDDEN,
         darkening_chance=mixture.uneven,
         droplets=_droplets([np.logaddexp.reduce(-0.5 * (one.table[:, 0] - prior.cost)) for prior, one in uneven]),
-        albedos=tuple(albedo for albedo, share in enumerate(mixture.albedo.tolist()) if share > _NEGLIGIBLE),
+        albedos=tuple([albedo for albedo, share in enumerate(mixture.albedo.tolist()) if share > _NEGLIGIBLE]),
     )
 
 

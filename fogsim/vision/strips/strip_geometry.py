@@ -46,7 +46,7 @@ class StripGeometry(NamedTuple):
     def only(self, strips: list[int]) -> "StripGeometry":
         """Some of the strips; the first ones are not copied."""
         which = slice(len(strips)) if strips == [*range(len(strips))] else strips
-        return StripGeometry(*self[:7], *(values[which] for values in self[7:]))
+        return StripGeometry(*self[:7], *[values[which] for values in self[7:]])
 
 
 class RoadView(NamedTuple):

@@ -14,6 +14,8 @@ from fogsim.vision.light.daylight import BRIGHT_ROAD, CannotTellError
 from fogsim.vision.light.medians import median, median_among
 
 Floats = NDArray[np.float32]
+Ints = NDArray[np.int64]
+Rows = slice | Ints
 
 _BRIGHT_ROAD = 1.1
 """Luminance of the road before the vehicle over that of the sky, from which on there is no daylight, or no road [-]."""
@@ -109,7 +111,7 @@ _NOWHERE = RoadFall(*(np.zeros(0) for _ in range(3)))
 
 
 def road_fall(
-    luminance_of: Callable[[slice, slice], Floats],
+    luminance_of: Callable[[Rows, slice], Floats],
     camera: Camera,
     depth: float,
     sky: float,
@@ -126,31 +128,33 @@ def road_fall(
     farthest = min(FARTHEST, depth - _SHADOW)
     if farthest < _FARTHER * nearest:
         return _NOWHERE
-    at = np.linspace(nearest, farthest, _ROWS)
-    rows = _rows(camera, nearest, farthest)
-    contrast = np.array([1.0 - _median(luminance_of(*where), sky) / sky for where in rows])
+    at, rows, left, right = _road_rows(camera, nearest, farthest)
+    first = int(left.min())
+    contrast = _contrasts(luminance_of(rows, slice(first, int(right.max()))), left - first, right - first, sky)
     seen = contrast > _LEAST_CONTRAST
-    if int(seen.sum()) < _ROWS // 2:
+    if np.count_nonzero(seen) < _ROWS // 2:
         return _NOWHERE
-    rows = np.clip(np.rint(camera.horizon_row + camera.row_distance / at[seen]).astype(int), 0, camera.height - 1)
-    return RoadFall(at[seen], contrast[seen], np.ones(rows.size) if share is None else share[rows])
+    return RoadFall(at[seen], contrast[seen], np.ones(at.size)[seen] if share is None else share[rows[seen]])
 
 
 @functools.lru_cache(maxsize=64)
-def _rows(camera: Camera, nearest: float, farthest: float) -> list[tuple[slice, slice]]:
-    """Single rows, and columns, of the road between two distances [m]; the list is shared."""
-    found = []
-    for distance in np.linspace(nearest, farthest, _ROWS).tolist():
-        row = max(min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1), 0)
-        middle, half = camera.principal_point[0], max(_HALF_STRIP * camera.focal_length / distance, 4.0)
-        cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
-        found.append((slice(row, row + 1), cols))
-    return found
+def _road_rows(camera: Camera, nearest: float, farthest: float) -> tuple[NDArray[np.float64], ...]:
+    """Distances of rows of road between two of them [m], those rows, and their columns (n,); the arrays are shared."""
+    at = np.linspace(nearest, farthest, _ROWS)
+    rows = np.clip(np.rint(camera.horizon_row + camera.row_distance / at).astype(int), 0, camera.height - 1)
+    middle, half = camera.principal_point[0], np.maximum(_HALF_STRIP * camera.focal_length / at, 4.0)
+    left = np.maximum(np.floor(middle - half).astype(int), 0)
+    return at, rows, left, np.clip(np.ceil(middle + half).astype(int) + 1, 0, camera.width)
 
 
 @kernel
-def _median(pixels: Floats, otherwise: float) -> float:
-    return float(np.float32(median_among(pixels.ravel()))) if pixels.size else otherwise
+def _contrasts(light: Floats, left: Ints, right: Ints, sky: float) -> NDArray[np.float64]:
+    """Contrast to the sky of the median of each row between two columns; 0 where there is none."""
+    out = np.zeros(left.size)
+    for i in range(left.size):
+        if right[i] > left[i]:
+            out[i] = 1.0 - float(np.float32(median_among(light[i, left[i] : right[i]]))) / sky
+    return out
 
 
 _BLOCKS, _BRIGHT_SHARE = 12, 0.8

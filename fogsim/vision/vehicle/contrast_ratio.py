@@ -312,6 +312,7 @@ def _line_through_airlight(
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:
-    order = np.argsort(values, axis=None)
-    upto = np.cumsum(weights.ravel()[order])
-    return float(values.ravel()[order][int(np.searchsorted(upto, 0.5 * upto[-1]))])
+    flat = values.ravel()
+    order = flat.argsort()
+    upto = weights.ravel()[order].cumsum()
+    return float(flat[order[upto.searchsorted(0.5 * upto[-1])]])

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
+from fogsim.vision.light.medians import median_among
 from fogsim.vision.vehicle.patch import vertex
 
 Floats = NDArray[np.float64]
@@ -119,13 +121,29 @@ def upright_steps(body: NDArray[np.float32], noise: float) -> tuple[Floats, floa
     Returns both in linear grey levels per pixel (cols,). Takes `body` (rows, cols) [linear grey levels], `noise`
     [linear grey levels].
     """
-    padded = np.pad(body.astype(np.float64), ((0, 0), (2, 2)), mode="reflect")
-    smooth = np.sum([share * padded[:, i : i + body.shape[1]] for i, share in enumerate(SMOOTHING)], axis=0)
-    # The median down the rows keeps what is upright; marks of the road, which run aslant, drop out.
-    step = np.asarray(np.median(np.gradient(smooth, axis=1), axis=0), np.float64)
+    step, usual = _upright_steps(body)
     # Blur, difference and median leave half of a pixel's noise in one row, and what the road's texture adds.
     by_noise = _LEAST_EDGE * max(0.5 * noise, _LEAST_STEP) / math.sqrt(body.shape[0])
-    return step, max(by_noise, _CLUTTER * float(np.median(np.abs(step))))
+    return step, max(by_noise, _CLUTTER * usual)
+
+
+@kernel
+def _upright_steps(body: NDArray[np.float32]) -> tuple[Floats, float]:
+    """`upright_steps`, and the median of their sizes."""
+    (rows, cols), step = body.shape, np.empty(body.shape[1])
+    smooth, down = np.zeros((rows, cols)), np.empty(rows)
+    for row in range(rows):
+        for col in range(cols):
+            for i in range(len(SMOOTHING)):
+                at = abs(col + i - 2)
+                smooth[row, col] += SMOOTHING[i] * body[row, min(at, 2 * (cols - 1) - at)]
+    for col in range(cols):
+        left, right = max(col - 1, 0), min(col + 1, cols - 1)
+        for row in range(rows):
+            down[row] = (smooth[row, right] - smooth[row, left]) / (right - left)
+        # The median down the rows keeps what is upright; marks of the road, which run aslant, drop out.
+        step[col] = median_among(down)
+    return step, median_among(np.abs(step))
 
 
 def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
 from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
-from fogsim.vision.strips.sky import Sky, sky_above
+from fogsim.vision.strips.sky import Sky, shared_sky
 from fogsim.vision.vehicle.airlight import (
     RoadFall,
+    Rows,
     check_road,
     hidden_at_side,
     neighbouring_airlight,
@@ -149,7 +150,7 @@ class VehicleCrop:
 def vehicle_crop(
     camera: Camera,
     depth: float,
-    luminance_of: Callable[[slice, slice], Luminance],
+    luminance_of: Callable[[Rows, slice], Luminance],
     read_sky: Callable[[], SkyReading],
     least_noise: float = 0.0,
     share: NDArray[np.float64] | None = None,
@@ -176,22 +177,27 @@ def vehicle_crop(
 
 
 def daytime_crop(
-    image: Pixels, camera: Camera, depth: float, pitch_deviation: float, extinction: float = USUAL_EXTINCTION
+    image: Pixels,
+    camera: Camera,
+    depth: float,
+    pitch_deviation: float,
+    extinction: float = USUAL_EXTINCTION,
+    shared: dict[Any, Any] | None = None,
 ) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be, before an even sky or one that brightens upward.
 
     In the latter case the airlight before the vehicle darkens downward, and each row is taken relative to its own.
 
-    Takes `image` (rows, cols), `depth` [m], `pitch_deviation` [rad], `extinction` [1/m].
+    Takes `image` (rows, cols), `depth` [m], `pitch_deviation` [rad], `extinction` [1/m], `shared` of the `Observation`.
     """
     if abs(camera.roll) > math.pi / 4:
         raise CannotTellError("the camera lies on its side or is upside-down")
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    # That of joint_road, so that a frame's sky is read once.
+    # That of joint_road, with which the sky is shared.
     margin = 3.0 * calibrated_horizon(camera, pitch_deviation).standard_deviation + 2.0
-    sky = sky_above(pixels, camera, margin)
+    sky = shared_sky({} if shared is None else shared, pixels, camera, margin)
     airlight = None if sky is None else row_airlight(sky, camera, extinction)
     luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)
     crop = vehicle_crop(
@@ -209,13 +215,14 @@ def daytime_crop(
     return replace(crop, levelled=LevelledRows(sky, camera, rows, _rows_above(camera, margin), extinction))
 
 
-def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
-    first, end, step = rows.indices(len(pixels.pixels))
+def _luminance(pixels: LinearPixels, rows: Rows, cols: slice) -> NDArray[np.float32]:
+    if isinstance(rows, slice):
+        rows = np.arange(*rows.indices(len(pixels.pixels)))
     left, right, _ = cols.indices(pixels.pixels.shape[1])
-    return part_luminance(pixels, first, end, step, left, right)
+    return part_luminance(pixels, rows, left, right)
 
 
-def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
+def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: Rows, cols: slice) -> NDArray[np.float32]:
     """Luminance over the share of the airlight that its rows have."""
     share: NDArray[np.float32] = airlight.share[rows].astype(np.float32)
     return np.asarray(_luminance(pixels, rows, cols) / share[:, None], np.float32)
@@ -229,7 +236,7 @@ class _DaytimeFrame(NamedTuple):
     margin: float
     sky: Sky | None
     airlight: RowAirlight | None
-    luminance_of: Callable[[slice, slice], Luminance]
+    luminance_of: Callable[[Rows, slice], Luminance]
 
 
 def _rows_above(camera: Camera, margin: float) -> slice:
@@ -274,9 +281,8 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
     Takes `luminance` (rows, cols) [linear grey levels], `sky` [linear grey levels].
     """
     table, slope = _table_with_slope(camera.response, camera.bits, camera.black_level)
-    here, there = (int(np.searchsorted(table, level)) for level in (median(luminance), sky))
-    most = table.size - 1
-    return float(slope[min(here, most)] / slope[min(there, most)])
+    here, there = np.minimum(table.searchsorted((median(luminance), sky)), table.size - 1)
+    return float(slope[here] / slope[there])
 
 
 @functools.lru_cache(maxsize=8)

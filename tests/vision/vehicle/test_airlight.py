@@ -42,7 +42,7 @@ def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
             d = CAMERA.row_distance / (np.arange(CAMERA.height)[rows] - CAMERA.horizon_row)
             light = reflectance * (1.0 + beam * (6.0 / d) ** 2)
             seen = 200.0 * (1.0 - (1.0 - light) * np.exp(-extinction * d))
-            return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
+            return np.repeat(seen[:, None], cols.stop - cols.start, axis=1).astype(np.float32)
 
         return road_fall(luminance_of, CAMERA, 40.0, 200.0)
 
@@ -62,7 +62,7 @@ def test_before_airlight_that_darkens_downward_a_road_by_day_is_not_lit(extincti
     def luminance_of(rows, cols):
         d = CAMERA.row_distance / (np.arange(CAMERA.height)[rows] - CAMERA.horizon_row)
         seen = 200.0 * (share[rows] - (share[rows] - 0.25) * np.exp(-extinction * d)) / share[rows]
-        return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
+        return np.repeat(seen[:, None], cols.stop - cols.start, axis=1).astype(np.float32)
 
     found = road_fall(luminance_of, CAMERA, 40.0, 200.0, share)
     assert not found.is_lit(extinction, 0.0)

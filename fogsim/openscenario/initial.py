@@ -80,6 +80,9 @@ class Beginning:
             if (name := one.get("entityRef")) in {*self.spots, *self.positions.off_lanes} - {*added}:
                 one.refuse(f"{name} is there from Init on, and who leaves does not come back; delete it in Init")
             self.late |= {name} - {*added}
+        for one in private:
+            if (name := one.get("entityRef")) in self.late and (name in self.orders or self.effect.do.get(name)):
+                one.refuse(f"{name} comes in a story, and stands then: write what it is to do next to its AddEntityAction")
         for name, vehicle in self.vehicles.items():
             if name not in gone | self.late or name == self.vehicles.ego:
                 self._begin(vehicle)

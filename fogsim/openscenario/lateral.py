@@ -51,6 +51,17 @@ class Effect:
         self.is_endless |= part.is_endless
         self.has_unknown_end |= part.has_unknown_end
 
+    def wait_for_those_who_come(self) -> None:
+        """Order of vehicles that it brings onto the road all but their path once they are there."""
+        for subject, there in self.once_there.items():
+            done = self.do[subject]
+            rest = {key: done.pop(key) for key in [*done] if key != "path"}
+            if MOTION & rest.keys():
+                del there["speed"]
+            if rest.get("speed", {}).get("shape") == "step" and "at_s" not in done["path"]:
+                done["path"]["speed_kmh"] = rest["speed"].get("to_kmh", 0.0)
+            Effect(do=self.once_there).add(subject, **rest)
+
     @property
     def moves(self) -> bool:
         """Whether it orders a speed."""

@@ -149,6 +149,7 @@ class Storyboard:
             entry.effect.join(part)
             if len(actions) > 1:
                 entry.parts[id(action)] = part
+        entry.effect.wait_for_those_who_come()
 
     def timeline(self) -> list[TimelineEntry]:
         """Entries of the timeline, each with its element."""
@@ -157,6 +158,7 @@ class Storyboard:
         self._stops = {id(act): free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
+        comes: list[TimelineEntry] = []
         for act in self._acts:
             until = self._until(act)
             for entry in (one for one in self.entries.values() if one.group.above is act):
@@ -165,7 +167,12 @@ class Storyboard:
                 if entry.node.get("priority") == "skip":
                     entry.trigger = self._unless_another_runs(entry)
                 written += self._executed(entry, until)
-        return written
+                for name in entry.names if entry.effect.once_there else ():
+                    happened = Trigger(f"happened({name})")
+                    done = entry.effect.once_there
+                    comes.append(timeline_entry(entry.node, f"{name}_once_there", happened, done, until))
+        # What other events order of who comes in the same step counts more.
+        return comes + written
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
         written, node, effect = [], entry.node, entry.effect
@@ -177,9 +184,6 @@ class Storyboard:
                 # It is played again once it is over and its own trigger holds.
                 trigger = both(Trigger(self._played(entry, entry.names[number - 1])), trigger)
             written.append(timeline_entry(node, name, trigger, effect.do, until))
-            if effect.once_there:
-                happened = Trigger(f"happened({name})")
-                written.append(timeline_entry(node, f"{name}_once_there", happened, effect.once_there, until))
             for order, (actor, reached) in enumerate(effect.reached.items()):
                 held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
                 when = Trigger(" and ".join([f"happened({name})", reached, *self._still_ordered(entry, name, actor)]))

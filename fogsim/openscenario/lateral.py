@@ -62,10 +62,9 @@ class Effect:
                 done["path"]["speed_kmh"] = rest["speed"].get("to_kmh", 0.0)
             Effect(do=self.once_there).add(subject, **rest)
 
-    @property
-    def moves(self) -> bool:
-        """Whether it orders a speed."""
-        return any(MOTION & done.keys() for done in self.do.values())
+    def moved(self) -> set[str]:
+        """Subjects whose speed it orders."""
+        return {subject for subject, done in self.do.items() if MOTION & done.keys()}
 
     def changes_speed(self, *subjects: str) -> bool:
         """Whether the speed of a subject (default: any) changes, or goes by another vehicle's, for some time."""

@@ -17,6 +17,7 @@ from fogsim.openscenario.triggers import (
     Trigger,
     Triggers,
     both,
+    fires,
     is_single,
     timeline_entry,
 )
@@ -28,6 +29,7 @@ _STRAIGHT, _SHORT = 1000.0, 0.01  # Lengths of paths [m]
 _ROOM = 600  # Most characters of conditions that are joined into one
 _REFERENCE = "CatalogReference"
 _GENTLE = ("parallel", "skip")  # Priorities that end nothing
+_REPEATED = ("Event", "Action")
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -215,8 +217,8 @@ class Storyboard:
             if any(one is other for other in others):
                 running += [f"(happened({name}) and not ({self._played(one, name)}))" for name in one.names]
                 if earlier and one.trigger.condition:
-                    running.append(f"({_fires(one.trigger)} and not happened({one.names[0]}))")
-        return Trigger(f"{_fires(entry.trigger)} and not ({' or '.join(running)})")
+                    running.append(f"({fires(one.trigger)} and not happened({one.names[0]}))")
+        return Trigger(f"{fires(entry.trigger)} and not ({' or '.join(running)})")
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
         """What an overriding event does to others of its maneuver that run: speeds stay as they are, and paths end."""
@@ -237,7 +239,7 @@ class Storyboard:
         written: list[TimelineEntry] = []
         for done, ended in ((held, fast), (stays, timed), (ends, untimed)):
             for running in _joined((part for one in ended for part in self._running(one)), " or "):
-                when = Trigger(f"{_fires(trigger)} and not happened({name}) and ({running})")
+                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({running})")
                 called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
                 written.append(timeline_entry(entry.node, called, when, done, until))
         return written
@@ -249,21 +251,24 @@ class Storyboard:
 
     def _running(self, entry: Entry) -> list[str]:
         """Conditions that an execution of an event is running; where its end is not known, that the first has begun."""
-        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moves):
+        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moved()):
             return [f"happened({entry.names[0]})"]
         return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
 
     def _overridden(self, entry: Entry) -> list[str]:
-        """Conditions that an event whose changes of speed would go on is ended by one that overrides it."""
+        """Conditions that an event whose changes of speed would go on is ended by one that overrides or replaces it."""
         effect = entry.effect
         goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
         if len(entry.names) > 1 or not goes_on:
             return []
         others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
+        if effect.ends and (moved := effect.moved()):
+            # A speed that another event orders instead is never reached.
+            others += [one for one in self.entries.values() if one is not entry and moved <= one.effect.moved()]
         begun = (
             f"(happened({entry.names[0]}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
         )
-        return [begun.format(name) for one in others for name in one.names]
+        return list(dict.fromkeys(begun.format(name) for one in others for name in one.names))
 
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
@@ -306,7 +311,8 @@ class Storyboard:
         self._open.append(found[0])
         try:
             if state in _OVER:
-                return self._over(found[0])
+                # What may be repeated ends each time, and an action is complete then.
+                return self._over(found[0], 0 if state == _OVER[0] or kind == "Action" else -1)
             begun = self._begun(found[0])
             if state != "runningState" or (is_single(node) and kind != "Event"):
                 return begun
@@ -347,13 +353,15 @@ class Storyboard:
             self._begins[id(act)] = self._act_begins(act)
         return self._begins[id(act)]
 
-    def _over(self, part: Node) -> Trigger:
+    def _over(self, part: Node, execution: int = -1) -> Trigger:
+        """When a part is over; an event or action, after one of its executions."""
         inside = {id(one) for one in part.walk()}
         inside |= {id(self._entry(part).node)} if part.tag == "Action" else set()
         phrases = []
         for act in self._acts:
             entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
-            ends = ((one, one.names[-1], one.parts.get(id(part), one.effect)) for one in entries)
+            which = execution if part.tag in _REPEATED else -1
+            ends = ((one, one.names[which], one.parts.get(id(part), one.effect)) for one in entries)
             joined = _joined((self._played(*end) for end in ends), " and ")
             if len(joined) > 1:
                 joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
@@ -368,7 +376,7 @@ class Storyboard:
             message = "when a trajectory without times or places is over is not known"
             entry.node.refuse(f"{message}; nor is the end of a relative speed by rate")
         if effect.ends_itself:
-            if effect.moves:
+            if effect.moved():
                 entry.node.refuse("together with a speed, the end of a change of lane by distance is not known")
             phrase = f"over({name})"
         elif effect.lasts > 0.0:
@@ -386,11 +394,6 @@ class Storyboard:
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
-
-
-def _fires(trigger: Trigger) -> str:
-    """Condition of a trigger with its delay."""
-    return f"({trigger.condition})" + (f" delayed {trigger.delay:g} s" if trigger.delay else "")
 
 
 def _left(vehicle: Vehicle) -> dict[str, Any]:

@@ -255,20 +255,21 @@ class Storyboard:
             return [f"happened({entry.names[0]})"]
         return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
 
-    def _overridden(self, entry: Entry) -> list[str]:
-        """Conditions that an event whose changes of speed would go on is ended by one that overrides or replaces it."""
+    def _overridden(self, entry: Entry, name: str) -> list[str]:
+        """Conditions that an event whose changes of speed would go on is ended by one that overrides or replaces it.
+
+        They are for its execution of a name.
+        """
         effect = entry.effect
         goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
-        if len(entry.names) > 1 or not goes_on:
+        if not goes_on:
             return []
         others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
         if effect.ends and (moved := effect.moved()):
             # A speed that another event orders instead is never reached.
             others += [one for one in self.entries.values() if one is not entry and moved <= one.effect.moved()]
-        begun = (
-            f"(happened({entry.names[0]}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
-        )
-        return list(dict.fromkeys(begun.format(name) for one in others for name in one.names))
+        begun = f"(happened({name}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
+        return list(dict.fromkeys(begun.format(other) for one in others for other in one.names))
 
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
@@ -384,7 +385,7 @@ class Storyboard:
         own = [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
         key = name, id(effect)
         if key not in self._over_marks:
-            overridden = self._overridden(entry)
+            overridden = self._overridden(entry, name)
             # What is over stays over.
             parts = [*own, *overridden] if effect.ends or overridden else []
             marks = [self._mark(entry.node, f"{name}_over", Trigger(one)) for one in _joined(parts, " or ")]

@@ -197,6 +197,12 @@ def test_what_is_repeated_ends_each_time(tmp_path: Path) -> None:
         assert steps[-1].time == pytest.approx(ends, abs=0.41)
 
 
+def test_what_is_repeated_begins_again_once_it_is_overridden(tmp_path: Path) -> None:
+    events = event("up", speed(30, linear(8)), after(1.0), count=2) + event("down", speed(10), after(3.0))
+    times = begun(run(_two_cars(tmp_path, events, after(4.0))))
+    assert (times["down"], times["up_2"]) == pytest.approx((3.0, 3.1), abs=0.21)
+
+
 def test_a_speed_that_another_event_replaces_is_over(tmp_path: Path) -> None:
     up = event("up", speed(40, RATE), after(1.0))
     down = event("down", speed(10, linear(1)), after(2.0)).replace("override", "parallel")

@@ -41,7 +41,7 @@ _AGAIN = re.compile(r"(and|or|not|for|delayed)\b")
 OPERATORS = ("<", "<=", ">", ">=", "==", "!=")
 """Operators of comparisons."""
 
-_MOST_CHARACTERS = 1000
+_MOST_CHARACTERS = 10_000
 """Longest condition that is read."""
 
 DEEPEST = 20

@@ -94,7 +94,9 @@ class Actions(LateralActions):
         degrees = math.degrees(heading if heading is not None else along or 0.0)
         vehicle = self.vehicles[name]
         path = {"points": [[x, y, degrees]], "ahead_m": vehicle.front, "speed_kmh": 0.0, "stays": bool(vehicle.body)}
-        effect.add(name, path=path)
+        if "path" not in effect.do.get(name, {}):
+            # A trajectory of the same event begins there.
+            effect.add(name, path=path)
         effect.once_there[name] = {"speed": {"to_kmh": 0.0, "shape": "step"}, **vehicle.lamps}
 
     def environment_action(self, action: Node, effect: Effect) -> None:

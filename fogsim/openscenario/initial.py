@@ -76,13 +76,21 @@ class Beginning:
         for name in gone:
             self.spots.pop(name, None)
             self.positions.off_lanes.pop(name, None)
-        for one in _entity_actions(init.above, "AddEntityAction") if init and init.above else ():
-            if (name := one.get("entityRef")) in {*self.spots, *self.positions.off_lanes} - {*added}:
-                one.refuse(f"{name} is there from Init on, and who leaves does not come back; delete it in Init")
-            self.late |= {name} - {*added}
+        if init and init.above:
+            self._find_late(_entity_actions(init.above, "AddEntityAction"), private, added)
         for name, vehicle in self.vehicles.items():
             if name not in gone | self.late or name == self.vehicles.ego:
                 self._begin(vehicle)
+
+    def _find_late(self, adding: Sequence[Node], private: Sequence[Node], added: Mapping[str, Node]) -> None:
+        """Find who comes in a story; it is not there in the beginning, and does nothing then."""
+        for one in adding:
+            if (name := one.get("entityRef")) in {*self.spots, *self.positions.off_lanes} - {*added}:
+                one.refuse(f"{name} is there from Init on, and who leaves does not come back; delete it in Init")
+            self.late |= {name} - {*added}
+        for one in private:
+            if (name := one.get("entityRef")) in self.late and (name in self.orders or self.effect.do.get(name)):
+                one.refuse(f"{name} comes in a story, and stands then; order what it does next to its AddEntityAction")
 
     def _begin(self, vehicle: Vehicle) -> None:
         """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""

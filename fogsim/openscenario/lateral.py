@@ -51,10 +51,20 @@ class Effect:
         self.is_endless |= part.is_endless
         self.has_unknown_end |= part.has_unknown_end
 
-    @property
-    def moves(self) -> bool:
-        """Whether it orders a speed."""
-        return any(MOTION & done.keys() for done in self.do.values())
+    def wait_for_those_who_come(self) -> None:
+        """Order of vehicles that it brings onto the road all but their path once they are there."""
+        for subject, there in self.once_there.items():
+            done = self.do[subject]
+            rest = {key: done.pop(key) for key in [*done] if key != "path"}
+            if MOTION & rest.keys():
+                del there["speed"]
+            if rest.get("speed", {}).get("shape") == "step" and "at_s" not in done["path"]:
+                done["path"]["speed_kmh"] = rest["speed"].get("to_kmh", 0.0)
+            Effect(do=self.once_there).add(subject, **rest)
+
+    def moved(self) -> set[str]:
+        """Subjects whose speed it orders."""
+        return {subject for subject, done in self.do.items() if MOTION & done.keys()}
 
     def changes_speed(self, *subjects: str) -> bool:
         """Whether the speed of a subject (default: any) changes, or goes by another vehicle's, for some time."""

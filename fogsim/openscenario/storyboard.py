@@ -17,6 +17,7 @@ from fogsim.openscenario.triggers import (
     Trigger,
     Triggers,
     both,
+    fires,
     is_single,
     timeline_entry,
 )
@@ -28,6 +29,7 @@ _STRAIGHT, _SHORT = 1000.0, 0.01  # Lengths of paths [m]
 _ROOM = 600  # Most characters of conditions that are joined into one
 _REFERENCE = "CatalogReference"
 _GENTLE = ("parallel", "skip")  # Priorities that end nothing
+_REPEATED = ("Event", "Action")
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -149,6 +151,7 @@ class Storyboard:
             entry.effect.join(part)
             if len(actions) > 1:
                 entry.parts[id(action)] = part
+        entry.effect.wait_for_those_who_come()
 
     def timeline(self) -> list[TimelineEntry]:
         """Entries of the timeline, each with its element."""
@@ -157,6 +160,7 @@ class Storyboard:
         self._stops = {id(act): free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
+        comes: list[TimelineEntry] = []
         for act in self._acts:
             until = self._until(act)
             for entry in (one for one in self.entries.values() if one.group.above is act):
@@ -165,7 +169,12 @@ class Storyboard:
                 if entry.node.get("priority") == "skip":
                     entry.trigger = self._unless_another_runs(entry)
                 written += self._executed(entry, until)
-        return written
+                for name in entry.names if entry.effect.once_there else ():
+                    happened = Trigger(f"happened({name})")
+                    done = entry.effect.once_there
+                    comes.append(timeline_entry(entry.node, f"{name}_once_there", happened, done, until))
+        # What other events order of who comes in the same step counts more.
+        return comes + written
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
         written, node, effect = [], entry.node, entry.effect
@@ -177,9 +186,6 @@ class Storyboard:
                 # It is played again once it is over and its own trigger holds.
                 trigger = both(Trigger(self._played(entry, entry.names[number - 1])), trigger)
             written.append(timeline_entry(node, name, trigger, effect.do, until))
-            if effect.once_there:
-                happened = Trigger(f"happened({name})")
-                written.append(timeline_entry(node, f"{name}_once_there", happened, effect.once_there, until))
             for order, (actor, reached) in enumerate(effect.reached.items()):
                 held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
                 when = Trigger(" and ".join([f"happened({name})", reached, *self._still_ordered(entry, name, actor)]))
@@ -211,8 +217,8 @@ class Storyboard:
             if any(one is other for other in others):
                 running += [f"(happened({name}) and not ({self._played(one, name)}))" for name in one.names]
                 if earlier and one.trigger.condition:
-                    running.append(f"({_fires(one.trigger)} and not happened({one.names[0]}))")
-        return Trigger(f"{_fires(entry.trigger)} and not ({' or '.join(running)})")
+                    running.append(f"({fires(one.trigger)} and not happened({one.names[0]}))")
+        return Trigger(f"{fires(entry.trigger)} and not ({' or '.join(running)})")
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
         """What an overriding event does to others of its maneuver that run: speeds stay as they are, and paths end."""
@@ -233,7 +239,7 @@ class Storyboard:
         written: list[TimelineEntry] = []
         for done, ended in ((held, fast), (stays, timed), (ends, untimed)):
             for running in _joined((part for one in ended for part in self._running(one)), " or "):
-                when = Trigger(f"{_fires(trigger)} and not happened({name}) and ({running})")
+                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({running})")
                 called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
                 written.append(timeline_entry(entry.node, called, when, done, until))
         return written
@@ -245,21 +251,25 @@ class Storyboard:
 
     def _running(self, entry: Entry) -> list[str]:
         """Conditions that an execution of an event is running; where its end is not known, that the first has begun."""
-        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moves):
+        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moved()):
             return [f"happened({entry.names[0]})"]
         return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
 
-    def _overridden(self, entry: Entry) -> list[str]:
-        """Conditions that an event whose changes of speed would go on is ended by one that overrides it."""
+    def _overridden(self, entry: Entry, name: str) -> list[str]:
+        """Conditions that an event whose changes of speed would go on is ended by one that overrides or replaces it.
+
+        They are for its execution of a name.
+        """
         effect = entry.effect
         goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
-        if len(entry.names) > 1 or not goes_on:
+        if not goes_on:
             return []
         others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
-        begun = (
-            f"(happened({entry.names[0]}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
-        )
-        return [begun.format(name) for one in others for name in one.names]
+        if effect.ends and (moved := effect.moved()):
+            # A speed that another event orders instead is never reached.
+            others += [one for one in self.entries.values() if one is not entry and moved <= one.effect.moved()]
+        begun = f"(happened({name}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
+        return list(dict.fromkeys(begun.format(other) for one in others for other in one.names))
 
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
@@ -302,7 +312,8 @@ class Storyboard:
         self._open.append(found[0])
         try:
             if state in _OVER:
-                return self._over(found[0])
+                # What may be repeated ends each time, and an action is complete then.
+                return self._over(found[0], 0 if state == _OVER[0] or kind == "Action" else -1)
             begun = self._begun(found[0])
             if state != "runningState" or (is_single(node) and kind != "Event"):
                 return begun
@@ -343,13 +354,15 @@ class Storyboard:
             self._begins[id(act)] = self._act_begins(act)
         return self._begins[id(act)]
 
-    def _over(self, part: Node) -> Trigger:
+    def _over(self, part: Node, execution: int = -1) -> Trigger:
+        """When a part is over; an event or action, after one of its executions."""
         inside = {id(one) for one in part.walk()}
         inside |= {id(self._entry(part).node)} if part.tag == "Action" else set()
         phrases = []
         for act in self._acts:
             entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
-            ends = ((one, one.names[-1], one.parts.get(id(part), one.effect)) for one in entries)
+            which = execution if part.tag in _REPEATED else -1
+            ends = ((one, one.names[which], one.parts.get(id(part), one.effect)) for one in entries)
             joined = _joined((self._played(*end) for end in ends), " and ")
             if len(joined) > 1:
                 joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
@@ -364,7 +377,7 @@ class Storyboard:
             message = "when a trajectory without times or places is over is not known"
             entry.node.refuse(f"{message}; nor is the end of a relative speed by rate")
         if effect.ends_itself:
-            if effect.moves:
+            if effect.moved():
                 entry.node.refuse("together with a speed, the end of a change of lane by distance is not known")
             phrase = f"over({name})"
         elif effect.lasts > 0.0:
@@ -372,7 +385,7 @@ class Storyboard:
         own = [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
         key = name, id(effect)
         if key not in self._over_marks:
-            overridden = self._overridden(entry)
+            overridden = self._overridden(entry, name)
             # What is over stays over.
             parts = [*own, *overridden] if effect.ends or overridden else []
             marks = [self._mark(entry.node, f"{name}_over", Trigger(one)) for one in _joined(parts, " or ")]
@@ -382,11 +395,6 @@ class Storyboard:
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
-
-
-def _fires(trigger: Trigger) -> str:
-    """Condition of a trigger with its delay."""
-    return f"({trigger.condition})" + (f" delayed {trigger.delay:g} s" if trigger.delay else "")
 
 
 def _left(vehicle: Vehicle) -> dict[str, Any]:

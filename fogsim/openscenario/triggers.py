@@ -254,7 +254,14 @@ class Triggers:
             node.refuse("relativeDistanceType: times are of distances along the road (longitudinal)")
         other = self.positions.vehicles.of(target)
         further = 0.0 if node.flag("freespace") else one.front + other.rear
-        return self._compared(node, f"{signal}({one.called}, {other.called}, {further:g} m)", "s")
+        test = self._compared(node, f"{signal}({one.called}, {other.called}, {further:g} m)", "s")
+        if not _is_denied(node, ("none", "rising") if test[1][0] == ">" else ("none",)):
+            return test
+        # Where there is no such time the condition is false, and not unknown.
+        pair = f"{one.called}, {other.called}"
+        ahead = f"{other.called}.position > {one.called}.position" if further else f"gap({pair}) > 0 m"
+        nears = f"speed_difference({pair})" if signal == "ttc" else f"{one.called}.speed"
+        return (" ".join([ahead, "and", nears, "> 0 m/s and", *test]),)
 
     def collision_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.collision`, with anybody or a vehicle; `collision(X, Y)`."""
@@ -270,6 +277,17 @@ CONDITIONS = handlers(Triggers, "condition")
 def _at_time(time: float) -> Trigger:
     """Trigger at a time [s]."""
     return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
+
+
+def _is_denied(node: Node, harmless: tuple[str, ...]) -> bool:
+    """Whether it matters that a condition is false: to its edge, but for harmless ones, or to an event that skips."""
+    while node.above:
+        node = node.above
+        if node.tag == "Condition" and node.attributes.get("conditionEdge", "none") not in harmless:
+            return True
+        if node.tag == "Maneuver":
+            return any(one.attributes.get("priority") == "skip" for one in node.children)
+    return False
 
 
 def is_single(node: Node) -> bool:
@@ -296,18 +314,23 @@ def both(first: Trigger, then: Trigger) -> Trigger:
 
 def timeline_entry(node: Node, name: str, trigger: Trigger, do: Mapping[str, Any], until: str = "") -> TimelineEntry:
     """An entry of the timeline for an element."""
-    when = f"({trigger.condition}) and {until}" if until else trigger.condition
-    return node, {"name": name, "when": when, **({"delay_s": trigger.delay} if trigger.delay else {}), "do": do}
+    if until:
+        # An act may be stopped while its events wait.
+        trigger = Trigger(f"{fires(trigger)} and {until}")
+    delayed = {"delay_s": trigger.delay} if trigger.delay else {}
+    return node, {"name": name, "when": trigger.condition, **delayed, "do": do}
+
+
+def fires(trigger: Trigger) -> str:
+    """Condition of a trigger with its delay."""
+    return f"({trigger.condition})" + (f" delayed {trigger.delay:g} s" if trigger.delay else "")
 
 
 def _of_one_delay(triggers: list[Trigger]) -> list[Trigger]:
     """Triggers with their delays in their conditions if these differ."""
     if len({one.delay for one in triggers}) <= 1:
         return triggers
-    return [
-        Trigger(f"({one.condition}) delayed {one.delay:g} s") if one.delay and one.condition else one
-        for one in triggers
-    ]
+    return [Trigger(fires(one)) if one.delay and one.condition else one for one in triggers]
 
 
 def _bracketed(condition: str, count: int) -> str:

@@ -237,6 +237,29 @@ def test_the_initial_state_does_not_wait_for_who_comes_later(tmp_path: Path) -> 
     assert int(steps[-1].traffic.lamps[row_of(steps[-1], "Late")]) == 0
 
 
+@pytest.mark.parametrize("events", ["one event", "another actor's event", "an event before"])
+def test_who_comes_does_what_is_ordered_at_that_moment(tmp_path: Path, events: str) -> None:
+    comes, drives = _added("Late", 300), speed(15)
+    story = {"Late": event("come", f'{comes}</Action><Action name="drive">{drives}', after(2.0))}
+    if events != "one event":
+        first = 2.0 if events == "another actor's event" else 1.0
+        story = {"Late": event("drive", drives, after(first)), "Ego": event("come", comes, after(2.0))}
+    steps = run(write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, story, stop=after(7)))
+    x, _, fast = motion_at(steps, 7.0, "Late")
+    assert fast == pytest.approx(15.0)
+    # It comes as fast, or speeds up by 4 m/s².
+    lost = 0.0 if events == "one event" else 0.5 * 15.0**2 / 4.0
+    assert x == pytest.approx(303.7 + 4.9 * 15.0 - lost, abs=1.0)
+
+
+@pytest.mark.parametrize("order", [speed(15), speed(15, linear(2))])
+def test_init_orders_nothing_of_who_comes_in_a_story(tmp_path: Path, order: str) -> None:
+    comes = {"Ego": event("come", _added("Late", 300), after(2.0))}
+    file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO, "Late": order}, comes)
+    with pytest.raises(InputError, match="Late comes in a story, and stands then"):
+        read_openscenario(file)
+
+
 def test_who_leaves_does_not_come_back(tmp_path: Path) -> None:
     goes = event("go", _entity("Late", "<DeleteEntityAction/>"), after(2.0))
     again = event("again", _added("Late", 400), after(3.0)).replace("override", "parallel")

@@ -176,6 +176,65 @@ def test_an_act_that_is_stopped_is_over(tmp_path: Path) -> None:
     assert run(file)[-1].time == pytest.approx(2.2, abs=0.15)
 
 
+def test_what_waits_when_its_act_is_stopped_never_begins(tmp_path: Path) -> None:
+    waits = event("waits", speed(5), group(_faster_than(4, 3.0)))
+    file = _two_cars(tmp_path, event("before", speed(15), group(_faster_than(4, 1.0))) + waits, after(5.0))
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("</Act>", f"<StopTrigger>{after(2.0)}</StopTrigger></Act>"), encoding="utf-8")
+    times = begun(run(file))
+    assert times["before"] == pytest.approx(1.0, abs=0.21)
+    assert "waits" not in times
+
+
+def test_what_is_repeated_ends_each_time(tmp_path: Path) -> None:
+    twice = event("twice", speed(15, IN_TWO_SECONDS), after(1.0), count=2)
+    for kind, name, when, ends in (
+        ("event", "twice", "endTransition", 3.0),
+        ("event", "twice", "completeState", 5.0),
+        ("action", "twice action", "completeState", 3.0),
+    ):
+        steps = run(_two_cars(tmp_path, twice, group(state(kind, name, when))))
+        assert steps[-1].time == pytest.approx(ends, abs=0.41)
+
+
+def test_what_is_repeated_begins_again_once_it_is_overridden(tmp_path: Path) -> None:
+    events = event("up", speed(30, linear(8)), after(1.0), count=2) + event("down", speed(10), after(3.0))
+    times = begun(run(_two_cars(tmp_path, events, after(4.0))))
+    assert (times["down"], times["up_2"]) == pytest.approx((3.0, 3.1), abs=0.21)
+
+
+def test_a_speed_that_another_event_replaces_is_over(tmp_path: Path) -> None:
+    up = event("up", speed(40, RATE), after(1.0))
+    down = event("down", speed(10, linear(1)), after(2.0)).replace("override", "parallel")
+    steps = run(_two_cars(tmp_path, up + down + event("then", speed(12), over("up")), after(5.0)))
+    assert begun(steps)["then"] == pytest.approx(2.0, abs=0.31)
+
+
+def _soon(other: str, edge: str = "none") -> str:
+    """Condition that the ego is less than 3 s behind another vehicle, which it does not have while that is behind."""
+    inside = f'entityRef="{other}" value="3" rule="lessThan" freespace="true" alongRoute="true"'
+    return on(f"<TimeHeadwayCondition {inside}/>", edge=edge)
+
+
+def test_a_time_to_a_vehicle_behind_is_no_time_to_one_ahead(tmp_path: Path) -> None:
+    """It is false, and begins to be true when the vehicle has overtaken."""
+    begin = {"Ego": f"{lane(60)}\n{speed(10)}", "Lead": f"{lane(40, -2)}\n{speed(20)}"}
+    events = event("overtaken", speed(15, linear(1)), group(_soon("Lead", "rising"))).replace("override", "parallel")
+    events += event("behind", speed(21), group(_soon("Lead"), _time(9.0)))
+    events += event("skips", speed(19), after(1.0)).replace("override", "skip")
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}, after(6), 5000.0, TWO_LANES)
+    times = begun(run(file))
+    assert times["skips"] == pytest.approx(1.0, abs=0.21)
+    # The front of Lead is 20 m behind, and its rear must be ahead.
+    assert times["overtaken"] == pytest.approx(24.6 / 10.0, abs=0.31)
+
+
+def test_an_event_skips_many_executions_of_another(tmp_path: Path) -> None:
+    many = event("many", speed(15, linear(2)), after(1.0), count=30)
+    skips = event("skips", speed(5), after(1.5)).replace("override", "skip")
+    assert begun(run(_two_cars(tmp_path, many + skips, after(4.0))))["skips"] == pytest.approx(3.1, abs=0.21)
+
+
 def test_ends_that_are_not_known_are_refused(tmp_path: Path) -> None:
     by_rate = speed(speed_of("Ego"), RATE)
     with pytest.raises(InputError, match="nor is the end of a relative speed by rate"):

@@ -28,6 +28,7 @@ _SIGNAL = {"id": "none", "type": "none", "orientation": "none", "dynamic": "no"}
 """Attributes without which netconvert reads no signal, and what they are when they say nothing."""
 
 _NEAR = 0.1  # Distance from a section's ends at which limits begin there [m]
+_SAME_ARC = 1e-3  # Change of curvature times a spiral's length squared; 0.1 mm at most off an arc [m]
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
 _MOST_SHOWN = 1000  # of its last messages [bytes]
@@ -107,7 +108,19 @@ def _readable(source: Element, path: Path) -> Element:
                 element.remove(speed)
     for road in source.iter("road"):
         _limit_lanes(road, f"{path}: road {shown(road.get('id', '?'))}")
+    for geometry in source.iter("geometry"):
+        for spiral in geometry.findall("spiral"):
+            _straighten(spiral, geometry)
     return source
+
+
+def _straighten(spiral: Element, geometry: Element) -> None:
+    """Make a spiral whose curvature hardly changes an arc: netconvert loses its way on it, and may never end."""
+    # What is no number is netconvert's to report.
+    with contextlib.suppress(KeyError, ValueError):
+        begin, end = (float(spiral.attrib[key]) for key in ("curvStart", "curvEnd"))
+        if abs(end - begin) * float(geometry.attrib["length"]) ** 2 < _SAME_ARC:
+            spiral.tag, spiral.attrib = "arc", {"curvature": repr(0.5 * (begin + end))}
 
 
 def _limit_lanes(road: Element, where: str) -> None:

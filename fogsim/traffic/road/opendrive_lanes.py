@@ -47,6 +47,12 @@ class _RoadLane:
     heights: NDArray[np.float64]
     origins: tuple[str, ...]
 
+    def pieces(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Steps between points (n - 1, 2), and how long they are on the map and, as SUMO counts, on their slope [m]."""
+        steps = np.diff(self.shape, axis=0)
+        flat = np.hypot(steps[:, 0], steps[:, 1])
+        return steps, flat, np.hypot(flat, np.diff(self.heights))
+
 
 @dataclass(frozen=True, slots=True)
 class Spot:
@@ -59,19 +65,18 @@ class Spot:
     @property
     def world(self) -> tuple[float, float, float]:
         """x, y [m] and heading [rad]."""
-        steps = np.diff(self.lane.shape, axis=0)
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        steps, flat, lengths = self.lane.pieces()
         along = self.position * float(lengths.sum()) / self.lane.length
         ends = np.cumsum(lengths)
         piece = min(int(np.searchsorted(ends, along)), len(lengths) - 1)
-        left = along - (ends[piece] - lengths[piece])
-        (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / lengths[piece]
+        left = (along - (ends[piece] - lengths[piece])) * (flat[piece] / lengths[piece])
+        (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / flat[piece]
         return float(x + left * dx - self.offset * dy), float(y + left * dy + self.offset * dx), math.atan2(dy, dx)
 
     @property
     def height(self) -> float:
         """Height of the lane there [m]."""
-        ends = np.cumsum([0.0, *np.hypot(*np.diff(self.lane.shape, axis=0).T)])
+        ends = np.cumsum([0.0, *self.lane.pieces()[2]])
         return float(np.interp(self.position / self.lane.length * ends[-1], ends, self.lane.heights))
 
     def shifted(self, offset: float) -> "Spot":
@@ -249,10 +254,9 @@ class OpenDriveLanes:
         """Points from a place against its lane's direction, straight on until the road ends [m]."""
         found, lane, position, length = [spot.world[:2]], spot.lane, spot.position, 0.0
         while length < _LONGEST_LAPS:
-            steps = np.diff(lane.shape, axis=0)
-            lengths = np.hypot(steps[:, 0], steps[:, 1])
+            steps, flat, lengths = lane.pieces()
             along = np.concatenate([[0.0], np.cumsum(lengths)]) * lane.length / lengths.sum()
-            to_left = np.column_stack([-steps[:, 1], steps[:, 0]]) / lengths[:, None]
+            to_left = np.column_stack([-steps[:, 1], steps[:, 0]]) / flat[:, None]
             points = lane.shape + spot.offset * np.vstack([to_left, to_left[-1:]])
             found += [(float(x), float(y)) for x, y in points[along < position][::-1]]
             length += lane.length
@@ -318,10 +322,9 @@ class OpenDriveLanes:
 
 def _foot(lane: _RoadLane, x: float, y: float) -> tuple[float, Spot]:
     """Distance of a point to a lane [m], and its nearest place on it."""
-    starts, steps = lane.shape[:-1], np.diff(lane.shape, axis=0)
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    to_point = np.array([x, y]) - starts
-    share = np.clip((to_point * steps).sum(axis=1) / lengths**2, 0.0, 1.0)
+    steps, flat, lengths = lane.pieces()
+    to_point = np.array([x, y]) - lane.shape[:-1]
+    share = np.clip((to_point * steps).sum(axis=1) / flat**2, 0.0, 1.0)
     away = np.hypot(*(to_point - share[:, None] * steps).T)
     piece = int(np.argmin(away))
     along = float(lengths[:piece].sum() + share[piece] * lengths[piece])

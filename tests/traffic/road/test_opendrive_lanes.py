@@ -78,6 +78,27 @@ def test_what_says_nothing_stops_no_conversion(tmp_path: Path) -> None:
     assert opendrive_net(file) == opendrive_net(ROAD)
 
 
+@pytest.mark.parametrize("change", [0.0, -7e-17])
+def test_a_spiral_whose_curvature_hardly_changes_is_an_arc(tmp_path: Path, change: float) -> None:
+    """netconvert takes all memory for it, or is metres off."""
+    curvature, file = 0.000833333333, tmp_path / "spiral.xodr"
+    spiral = f'<spiral curvStart="{curvature!r}" curvEnd="{curvature + change!r}"/>'
+    text = ROAD.read_text(encoding="utf-8").replace(f'<arc curvature="{curvature!r}"/>', spiral)
+    assert spiral in text
+    file.write_text(text, encoding="utf-8")
+    assert opendrive_net(file) == opendrive_net(ROAD)
+
+
+def test_places_on_a_hill_are_where_sumo_has_them(tmp_path: Path) -> None:
+    """SUMO counts along the slope."""
+    net, length = tmp_path / "hill.net.xml", 400.0 + 500.0
+    lane = f'<lane id="up_0" index="0" speed="20" length="{length}" shape="0,0,0 400,0,0 800,0,300"/>'
+    net.write_text(f'<net><location netOffset="0,0"/><edge id="up">{lane}</edge></net>', encoding="utf-8")
+    spot = read_opendrive_lanes("", net).at(600.0, -1.0, None)
+    assert (spot.position, spot.offset, spot.height) == pytest.approx((650.0, -1.0, 150.0))
+    assert spot.world == pytest.approx((600.0, -1.0, 0.0))
+
+
 def test_what_is_no_road_and_traffic_on_the_left_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "bad.xodr"
     left = ROAD.read_text(encoding="utf-8").replace('rule="RHT"', 'rule="LHT"')

@@ -108,7 +108,8 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         name = type(self).__name__ if self.spec is None else self.spec.id
         chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
-        before = self._step
+        # None until the next step is complete, so that an interrupted episode does not go on.
+        before, self._step = self._step, None
         command = warned(spread_advice(chosen, self._advice, before.truth.sections), before, before.command)
         after = self._step = self._simulation.advance(command, self._frames)
         self._show(after)

@@ -279,12 +279,14 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             )
         levels = [int(checked_action(actions[agent], self._action_spaces[agent], agent)) for agent in self.agents]
         self._shown = tuple(SHOWN_SPEEDS[level] for level in levels)
+        # None until the step is complete, so that an interrupted episode does not go on.
+        all_agents, self.agents = self.agents, []
         terms = self._move()
-        observed, infos, all_agents = self._observe(), self._infos(terms), self.agents
+        observed, infos = self._observe(), self._infos(terms)
         ending = self._step.ending
         truncated = ending is Ending.TIME
-        if ending is not None:
-            self.agents = []
+        if ending is None:
+            self.agents = all_agents
         return (
             observed,
             dict.fromkeys(all_agents, float(sum(terms.values()))),

@@ -292,7 +292,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             given = np.array(np.unravel_index(int(given - self.action_space.start), self._levels))
         chosen = self._commanded(given)
         self._own = replace(chosen, warning=self._built_in.warning)
-        before = self._step
+        # None until the next step is complete, so that an interrupted episode does not go on.
+        before, self._step = self._step, None
         self._step = self._drive(before)
         self._show()
         terms = task_terms(before, self._step, self._way, self.reward_weights, self._standard)

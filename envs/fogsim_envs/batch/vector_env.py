@@ -33,12 +33,12 @@ from fogsim_envs.batch.layout import (
     SurrogateArrays,
 )
 from fogsim_envs.infos import flat_arrays
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rewards import WeightsOf
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_space
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
 from fogsim_envs.task.observation import task_space
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import split_number
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable

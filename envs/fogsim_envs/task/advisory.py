@@ -24,12 +24,12 @@ from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.rewards import WeightsOf, advice_standard
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
 from fogsim_envs.task.sampling import (
     MOTORWAY,

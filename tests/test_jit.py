@@ -231,3 +231,27 @@ def test_a_kernel_is_compiled_once_for_all_numbers_of_a_type(tmp_path: Path) -> 
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
     done = run_python("literals.py", cwd=tmp_path, environment=kept)
     assert done.stdout.split() == ["50.0", "1"]
+
+
+DISABLED = """
+import numba
+import numpy as np
+from fogsim.core.jit import kernel
+
+@kernel
+def total(values):
+    return np.cumsum(values)[-1]
+
+@numba.njit
+def plain(x):
+    return x
+
+print(total(np.arange(3.0)), hasattr(total, "overloads"), type(plain).__name__, numba.config.DISABLE_JIT)
+"""
+
+
+def test_who_debugs_own_functions_without_compiling_has_the_kernels_compiled(tmp_path: Path) -> None:
+    (tmp_path / "disabled.py").write_text(DISABLED)
+    disabled = {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "NUMBA_DISABLE_JIT": "1"}
+    done = run_python("disabled.py", cwd=tmp_path, environment=disabled)
+    assert done.stdout.split() == ["3.0", "True", "function", "1"]

@@ -17,7 +17,7 @@ from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import Simulation, refuse_copies
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
-from fogsim_envs.rewards import RewardWeights, advice_standard, reward_terms
+from fogsim_envs.rewards import RewardWeights, WeightsOf, advice_standard, reward_terms
 from fogsim_envs.spaces import ImageSize, action_space, command_of, observation_space, observe
 
 Observation = dict[str, NDArray[Any]]
@@ -33,6 +33,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
     """One step is one decision period of a scenario; see `fogsim_envs.advisory.FogAdvisoryEnv` for the spaces."""
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    reward_weights = WeightsOf(RewardWeights)
 
     def __init__(
         self,
@@ -52,7 +53,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._overrides = (*size, *overrides)
         self._scenario = load(self._overrides)
         self._continuous = continuous
-        self._weights = reward_weights or RewardWeights()
+        self.reward_weights = reward_weights
         self._simulation: Simulation | None = None
         self._step: Step | None = None
         self.render_mode = render_mode
@@ -107,11 +108,12 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         name = type(self).__name__ if self.spec is None else self.spec.id
         chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
-        before = self._step
+        # None until the next step is complete, so that an interrupted episode does not go on.
+        before, self._step = self._step, None
         command = warned(spread_advice(chosen, self._advice, before.truth.sections), before, before.command)
         after = self._step = self._simulation.advance(command, self._frames)
         self._show(after)
-        terms = reward_terms(before, after, self._weights, self._standard)
+        terms = reward_terms(before, after, self.reward_weights, self._standard)
         truncated = after.ending is Ending.TIME
         terminated = after.ending is not None and not truncated
         info = {**_info(after), "reward_terms": terms}

@@ -8,10 +8,12 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.scenario import Scenario, override
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.hosting import TIMEOUT, Timeout, begin, checked_timeout, load_first
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.spaces import ImageSize
 
 
+@takes_plain_data
 @checked_parameters
 class FogAdvisoryEnv(AdvisingEnv):
     """Advise a vehicle's speed and lamps in fog that only its camera can judge.

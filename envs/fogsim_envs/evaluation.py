@@ -16,6 +16,7 @@ from fogsim.core.randomness import Seed
 from fogsim.core.registry import make
 from fogsim.errors import InputError, shown
 from fogsim.units import finite_or_none
+from fogsim_envs.actions import checked_action
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.baselines import Info, Policy, baseline, check_baseline, reward_weights
 from fogsim_envs.infos import numbers_of, row_of, word_of
@@ -359,7 +360,8 @@ def _batch_episodes(
         if policies:
             actions = np.stack([envs.single_action_space.sample()] * len(seeds))
             for i in running:
-                actions[i] = policies[i](observations[i], row_of(infos, i))
+                chosen = policies[i](observations[i], row_of(infos, i))
+                actions[i] = checked_action(chosen, envs.single_action_space, env_id)
         else:
             actions = together(observations, infos)
         observations, rewards, terminated, truncated, infos = envs.step(actions)

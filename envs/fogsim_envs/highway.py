@@ -17,6 +17,7 @@ from fogsim.traffic.highway import EGO, HighwayTraffic, OtherRoadsError, is_high
 from fogsim.values import Command, Step
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.hosting import refuse_controller
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.spaces import ImageSize
 
@@ -30,6 +31,7 @@ _END_MARGIN = 5.0
 """The ego has arrived when it is this near to the end of its last lane [m]."""
 
 
+@takes_plain_data
 @checked_parameters
 class FogHighwayEnv(AdvisingEnv):
     """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env.

@@ -153,6 +153,7 @@ class _Host:
         open_standard_streams()
         ours, theirs = Pipe()
         self._connection: Connection[Any, Any] = ours
+        self._owner = os.getpid()
         # A fresh interpreter, not a fork (which a GL context does not survive) and not multiprocessing's spawn (which
         # runs the user's script again). Its own session keeps Ctrl-C for this process; it ends when the pipe does.
         self._child = subprocess.Popen(  # noqa: S603 - our own module
@@ -165,6 +166,12 @@ class _Host:
         self._ask("open", self._scenario, _START_TIMEOUT)
 
     def _ask(self, verb: str, argument: object, least_timeout: float = 0.0) -> object:
+        if self._owner != os.getpid():
+            # Two processes would take each other's answers.
+            raise SimulationError(
+                f"the simulation belongs to the process {self._owner}, and this one was forked from it: make an "
+                "environment in each process, or close() this one here before reset()"
+            )
         try:
             self._connection.send((verb, argument))
             answer = self._hear(None if self._timeout is None else max(self._timeout, least_timeout))
@@ -208,6 +215,9 @@ class _Host:
 
     def close(self) -> None:
         """End the child process; closing twice is allowed."""
+        if self._owner != os.getpid():
+            self._connection.close()
+            return
         # A process that was forked since then keeps the pipe open, so the child does not see it end.
         with contextlib.suppress(OSError):
             self._connection.send(("close", None))

@@ -1,9 +1,11 @@
 """What an agent is rewarded for: named terms, so that users can weigh them again."""
 
 from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 
 from fogsim.advice import ADVISERS
 from fogsim.core.parameters import checked_parameters
+from fogsim.errors import InputError, shown
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
 from fogsim.scenario import Scenario, build
 from fogsim.values import Lamp, Step
@@ -13,6 +15,26 @@ _COMFORTABLE_DECELERATION = 2.0
 
 _REAR_FOG_LAMP_VISIBILITY = 50.0
 """Rear fog lamps are lit below this visibility and not above [m] (German StVO § 17(3))."""
+
+
+W = TypeVar("W")
+
+
+class WeightsOf(Generic[W]):
+    """An environment's attribute ``reward_weights``, in force from the next step; None for the default ones."""
+
+    def __init__(self, kind: type[W]) -> None:
+        self._kind = kind
+
+    def __get__(self, environment: Any, owner: type | None = None) -> W:
+        found: W = environment.__dict__["reward_weights"]
+        return found
+
+    def __set__(self, environment: Any, weights: W | None) -> None:
+        made = self._kind() if weights is None else weights
+        if not isinstance(made, self._kind):
+            raise InputError(f"reward_weights: expected {self._kind.__name__}, got {shown(weights)}")
+        environment.__dict__["reward_weights"] = made
 
 
 @checked_parameters

@@ -30,6 +30,8 @@ from fogsim.core.compiling.code_libraries import KeptCode
 from fogsim.core.compiling.shipped_code import ShippedCache, shipped_cache, why_not_taken
 
 prepare_economy()
+# Else numba reads its variables again while it compiles, where `_CompileSpeedup` has changed one.
+numba.config.reload_config()
 
 # For the class of each array or named tuple that a kernel returns, numba calls this, and goes on whatever comes of it:
 # an exception of a signal's handler in it is lost, or the process is. Nothing is interrupted within a cache in C.
@@ -102,17 +104,19 @@ class _CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
     It pauses garbage collection, which finds little among millions of objects, and skips what numba is spared
-    by `fogsim.core.compiling`.
+    by `fogsim.core.compiling`. ``NUMBA_DISABLE_JIT``, by which users debug functions of their own, does not count.
     """
 
     def __init__(self) -> None:
         self._depth = 0
-        self._collects = False
+        self._collects, self._is_disabled = False, 0
         self._end: Callable[[], None] | None = None
 
     def on_start(self, compiling: Any) -> None:
         """Begin at the outermost kernel."""
         module = compiling.data["dispatcher"].py_func.__module__
+        if self._depth == 0:
+            self._is_disabled, numba.config.DISABLE_JIT = numba.config.DISABLE_JIT, 0
         if self._depth == 0 and module.startswith(f"{_FOGSIM}."):
             self._collects = gc.isenabled()
             gc.disable()
@@ -122,6 +126,8 @@ class _CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     def on_end(self, _: Any) -> None:
         """End where it began."""
         self._depth -= 1
+        if self._depth == 0:
+            numba.config.DISABLE_JIT = self._is_disabled
         if self._depth == 0 and self._end is not None:
             self._end()
             self._end = None
@@ -200,11 +206,11 @@ def kernel(function: F) -> F:
     plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
     try:
         shipped = shipped_cache(plain)
-        compiled: Any = numba.njit(cache=True, **options)(function)
+        compiled = _compiled(function, cache=True, **options)
         KeptCode.take_over(compiled._cache)
     except RuntimeError:
         # numba found no place for its cache
-        compiled = numba.njit(cache=False, **options)(function)
+        compiled = _compiled(function, cache=False, **options)
     finally:
         plain.__qualname__ = name
     compiled.shipped = shipped
@@ -212,7 +218,7 @@ def kernel(function: F) -> F:
 
     def take_in(*types: Any) -> Any:
         # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
-        inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
+        inner = _compiled(function, cache=False, no_cpython_wrapper=True, **options)
         compiled.get_call_template, compiled.get_overload = (
             _without_literals(inner.get_call_template),
             inner.get_overload,
@@ -221,6 +227,15 @@ def kernel(function: F) -> F:
 
     compiled.get_call_template = take_in
     return cast("F", compiled)
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """A function by `numba.njit`, which leaves it as it is where ``NUMBA_DISABLE_JIT`` is set."""
+    before, numba.config.DISABLE_JIT = numba.config.DISABLE_JIT, 0
+    try:
+        return numba.njit(**options)(function)
+    finally:
+        numba.config.DISABLE_JIT = before
 
 
 def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., Any]:

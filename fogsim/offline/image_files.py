@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image, TiffImagePlugin, UnidentifiedImageError
 
 from fogsim.core.files.atomic import write_bytes
 from fogsim.core.files.output_targets import refuse_unwritable
@@ -41,8 +41,10 @@ _OPTIONS: dict[str, list[int]] = {".webp": [getattr(cv2, name) for name in _EXAC
 _CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
 """Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
 
-_LARGEST_VALUE = re.compile(rb"P[56](?:\s+(?:#[^\n]*\n\s*)*\d+){2}\s+(?:#[^\n]*\n\s*)*(\d+)")
-"""Of the header of a PGM or PPM file; pixels are read as they are, whatever it says."""
+_LARGEST_VALUE = re.compile(
+    rb"(?:P[2356](?:\s+(?:#[^\n]*\n\s*)*\d+){2}\s+(?:#[^\n]*\n\s*)*|P7\n(?:(?!ENDHDR)[^\n]*\n)*MAXVAL +)(\d+)"
+)
+"""Of the header of a PGM, PPM or PAM file; pixels are read as they are, whatever it says, but for 8 bits as text."""
 
 _FULL_SCALES = (255, 1023, 4095, 65535)  # of 8, 10, 12 and 16 bits
 
@@ -50,6 +52,7 @@ ANIMATED_FORMATS = ("GIF", "WEBP", "PNG")
 _PARTS = dict.fromkeys(ANIMATED_FORMATS, "frames") | {"TIFF": "pages"}
 """Several images in a file, by Pillow's name of the format; in others (MPO) the first is the photograph."""
 
+_OPACITY, _UNASSOCIATED = (258, 338), (2,)  # TIFF 6.0, BitsPerSample and ExtraSamples
 _ORIENTATION = 0x0112  # EXIF, as below
 _SIDEWAYS = (5, 6, 7, 8)
 _TOP_TO_BOTTOM, _LEFT_TO_RIGHT = (3, 4, 7, 8), (2, 3, 6, 7)
@@ -79,10 +82,9 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     data = read_bytes(path, _MOST_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty")
-    orientation = _checked(path, data)
-    image = None
+    orientation, image = _checked(path, data)
     with _quiet_opencv(), contextlib.suppress(cv2.error, MemoryError):
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if image is None else image
     if image is None:
         raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
     return _upright(np.asarray(image), orientation)
@@ -106,30 +108,39 @@ def _upright(image: NDArray[np.generic], orientation: int) -> NDArray[np.generic
     return np.ascontiguousarray(turned)
 
 
-def _checked(path: Path, data: bytes) -> int:
-    """EXIF's orientation of an image; refuses what OpenCV would silently fill up or cut, or would exhaust memory."""
+def _checked(path: Path, data: bytes) -> tuple[int, NDArray[np.generic] | None]:
+    """EXIF's orientation of an image, and its pixels where OpenCV would change them.
+
+    Refuses what OpenCV would silently fill up or cut, or would exhaust memory.
+    """
+    header = _LARGEST_VALUE.match(data)
+    is_scaled = data[:2] in (b"P2", b"P3") and header is not None and int(header[1]) < _FULL_SCALES[0]
+    if header is not None and int(header[1]) not in _FULL_SCALES and not is_scaled:
+        known = ", ".join(map(str, _FULL_SCALES))
+        raise InputError(f"{path}: expected a largest value of {known} in the header, got {int(header[1])}")
+    pixels = None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(data))
             if image.format in _CHECKED_FORMATS:
                 image.load()
+            if isinstance(image, TiffImagePlugin.TiffImageFile) and image.mode == "RGBA":
+                # OpenCV multiplies colours by an opacity that is not associated with them.
+                is_straight = [image.tag_v2.get(one) for one in _OPACITY] == [(8, 8, 8, 8), _UNASSOCIATED]
+                pixels = np.array(image)[..., (2, 1, 0, 3)] if is_straight else None
             parts, orientation = getattr(image, "n_frames", 1), image.getexif().get(_ORIENTATION, 1)
     except UnidentifiedImageError:
         # OpenCV knows formats that Pillow does not.
-        return 1
+        return 1, None
     except Image.DecompressionBombError as error:
         raise InputError(f"{path}: by its header the image is larger than any camera's: {error}") from error
     except (*IMAGE_FAULTS, MemoryError) as error:
         raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
-    header = _LARGEST_VALUE.match(data)
-    if header is not None and int(header[1]) not in _FULL_SCALES:
-        known = ", ".join(map(str, _FULL_SCALES))
-        raise InputError(f"{path}: expected a largest value of {known} in the header, got {int(header[1])}")
     if parts > 1 and image.format in _PARTS:
         raise InputError(f"{path}: expected one image, got {parts} {_PARTS[image.format]}")
-    # OpenCV turns TIFF by itself.
-    return orientation if isinstance(orientation, int) and image.format != "TIFF" else 1
+    # TIFF is turned as it is read.
+    return orientation if isinstance(orientation, int) and image.format != "TIFF" else 1, pixels
 
 
 class DepthMap(NamedTuple):

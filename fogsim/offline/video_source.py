@@ -119,6 +119,9 @@ _DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
 _STARTS = re.compile(r"Duration:.* start: (-?[\d.]+)(?:(?!Video:)[\s\S])*Video:.* start (-?[\d.]+)")
 """When a file begins and, if it is later, its first video [s]."""
 
+_FROM_ZERO = re.compile(r"Input #0, (?:matroska|asf)[\s\S]*?Duration:.* start: ([\d.]+)")
+"""When a file begins whose duration counts from time 0 [s], as that of a recording in segments."""
+
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _SOUND = re.compile(r"Stream #.*: Audio:")
 _HIGH_RANGE = re.compile(r"Video:.*\b(arib-std-b67|smpte2084)\b")  # ITU-R BT.2100: HLG and PQ
@@ -216,6 +219,8 @@ class VideoFile:
         if duration is not None:
             hours, minutes, rest = duration.groups()
             seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
+            if begin := _FROM_ZERO.search(header_text):
+                seconds -= float(begin[1])
             if starts := _STARTS.search(header_text):
                 seconds -= max(float(starts[2]) - float(starts[1]), 0.0)
         return cls(

@@ -307,14 +307,19 @@ class ClosedLoop:
             self._drivers_fog.enter(self._fog, self._traffic)
         runs_ahead = self._replays and self._timeline.is_idle and not self._fleet.is_there
         collisions: tuple[Collision, ...] = ()
-        while periods > 0 and step.ending is None:
-            begun = self._begin_what_is_due(step)
-            for_all = self._fleet.advised(command, step.equipped)
-            snapshots = self._snapshots(step.index, for_all, periods if runs_ahead else 1)
-            periods -= len(snapshots)
-            for snapshot, ending in snapshots:
-                step = self._step = self._next_step(step, snapshot, ending, command, begun)
-                collisions += step.collisions
+        try:
+            while periods > 0 and step.ending is None:
+                begun = self._begin_what_is_due(step)
+                for_all = self._fleet.advised(command, step.equipped)
+                snapshots = self._snapshots(step.index, for_all, periods if runs_ahead else 1)
+                periods -= len(snapshots)
+                for snapshot, ending in snapshots:
+                    step = self._step = self._next_step(step, snapshot, ending, command, begun)
+                    collisions += step.collisions
+        except BaseException:
+            # The traffic may be ahead of the last step.
+            self._step = None
+            raise
         return step if collisions == step.collisions else dataclasses.replace(step, collisions=collisions)
 
     def _snapshots(

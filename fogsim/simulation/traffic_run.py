@@ -153,15 +153,18 @@ class TrafficRun:
 
         Returns what `start` does.
         """
-        if self._step is None or self._step.ending is not None:
+        last = self._step
+        if last is None or last.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
         checked_command(command)
         if not self._drivers_fog.is_entered and command.is_for_others:
             # In clear air no one has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
-        begun = self._begin_what_is_due(self._step)
-        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
-        return self._complete_step(self._step.index + 1, command, begun)
+        # Until the next step is complete: after an interruption the traffic may be ahead of the last one.
+        self._step = None
+        begun = self._begin_what_is_due(last)
+        advance_traffic(self._traffic, self._drivers_fog, self._periods, last.index, command)
+        return self._complete_step(last.index + 1, command, begun)
 
     def _begin_what_is_due(self, step: TrafficStep) -> tuple[Begun, ...]:
         """Let begin what the timeline asks for after a step."""

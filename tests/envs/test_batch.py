@@ -174,6 +174,12 @@ def test_episodes_of_an_evaluation_do_not_depend_on_each_other() -> None:
     assert fogsim_envs.evaluate(Recurrent(), BATCH, [0, 1]).mean == fogsim_envs.evaluate("none", BATCH, [0, 1]).mean
 
 
+@pytest.mark.parametrize("action", [[3.7, 1.2], [[5, 1]], 1, [True, False], [5, 1, 1], "advise", None])
+def test_actions_of_a_policy_are_those_of_the_other_tasks(action: Any) -> None:
+    with pytest.raises(InputError, match=rf"action of {BATCH}: no member of MultiDiscrete"):
+        fogsim_envs.evaluate(lambda *_: action, BATCH, [0, 1])
+
+
 def test_who_is_struck_is_not_at_fault() -> None:
     envs, rng, found = made(200), np.random.default_rng(0), set[tuple[str, str]]()
     envs.reset(seed=0)

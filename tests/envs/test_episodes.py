@@ -11,6 +11,7 @@ import pytest
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.scenario import Scenario, catalogue, load_scenario
 from fogsim_envs.batch import RuleConstants
+from fogsim_envs.rewards import RewardWeights
 from fogsim_envs.task import FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 
@@ -82,6 +83,9 @@ def test_paths_survive_the_json_of_an_environment() -> None:
         again = gymnasium.make(type(env.spec).from_json(env.spec.to_json()))
         assert again.unwrapped._source._scenarios == (str(file),)
         assert copy.deepcopy(env).spec == env.spec
+    env = gymnasium.make("fogsim/FogAdvisory-v0", scenario=file, reward_weights=RewardWeights(progress=2.0))
+    again = gymnasium.make(type(env.spec).from_json(env.spec.to_json()))
+    assert again.unwrapped.reward_weights == RewardWeights(progress=2.0)
 
 
 def test_what_may_be_drawn_may_be_arrays() -> None:

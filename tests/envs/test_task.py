@@ -346,7 +346,7 @@ def test_a_collision_in_any_frame_of_a_decision_period_counts(fast: gymnasium.En
     own = env(_own=Command(), _driver=driver, _completed=lambda one: one, _is_measured=False)
     after = FogAdvisoryV1Env._drive(own, step)
     assert (after.time, fault(after)) == (frames[-1].time, "ego")
-    task = {"_weights": RewardWeights(), "_standard": DEFAULT_STANDARD, "_show": lambda _: None}
+    task = {"reward_weights": RewardWeights(), "_standard": DEFAULT_STANDARD, "_show": lambda _: None}
     spaces = {"spec": None, "action_space": action_space(continuous=False), "_continuous": False}
     left = iter(frames)
     *_, info = AdvisingEnv.step(env(_step=step, **task, **spaces), NO_ADVICE)

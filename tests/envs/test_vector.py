@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import TimeLimit
 
 from fogsim.errors import SimulationError
+from fogsim.values import Command
 from fogsim_envs.vector import make_vector
 
 POLE = "CartPole-v1"
@@ -85,3 +86,27 @@ def test_episodes_follow_one_another_as_gymnasium_defines(mode: AutoresetMode) -
             assert np.array_equal(found, expected)
             assert np.array_equal(ends, others)
             assert info.keys() == same.keys()
+
+
+@pytest.mark.parametrize("name", ["fogsim/FogAdvisoryFast-v2", "fogsim/FogAdvisory-v0", "fogsim/FogHighway-v0"])
+def test_an_interrupted_episode_does_not_go_on(name: str) -> None:
+    env = gymnasium.make(name, **({} if "Fast" in name else {"image_size": (32, 16)}))
+
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    env.reset(seed=1)
+    env.step([5, 0])
+    loop: Any = env.unwrapped._simulation  # type: ignore[attr-defined]
+    loop = getattr(loop, "_loop", loop)
+    loop._next_step = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        env.step([5, 0])
+    del loop._next_step
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+        env.step([5, 0])
+    with pytest.raises(SimulationError, match="call start"):
+        loop.advance(Command())
+    env.reset(seed=1)
+    env.step([5, 0])
+    env.close()

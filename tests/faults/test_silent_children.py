@@ -68,6 +68,27 @@ def test_neither_the_working_directory_nor_forks_touch_a_child(tmp_path: Path, m
     assert loop._child.returncode == 0
 
 
+def test_a_fork_neither_asks_nor_ends_a_child_of_its_parent() -> None:
+    loop = HostedLoop(BLIND)
+    loop.start(1)
+    fork = os.fork()
+    if not fork:
+        code = 1
+        try:
+            with pytest.raises(SimulationError, match=f"belongs to the process {os.getppid()}"):
+                loop.advance(Command())
+            loop.close()
+            loop.start(1)
+            loop.advance(Command())
+            loop.close()
+            code = 0
+        finally:
+            os._exit(code)
+    assert os.waitpid(fork, 0)[1] == 0
+    assert loop.advance(Command()).index == 1
+    loop.close()
+
+
 class _Pipe:
     """Asks for one thing, and keeps what is said."""
 

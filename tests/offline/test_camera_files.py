@@ -166,6 +166,13 @@ def test_sound_after_the_last_frame_is_no_damage(tmp_path: Path, ending: str) ->
     assert "cut off or damaged" in list(find_source(cut).pictures())[-1].error
 
 
+@pytest.mark.parametrize(("ending", "codec"), [("mkv", "mjpeg"), ("webm", "vp8"), ("wmv", "wmv2"), ("mp4", "mpeg4")])
+def test_a_later_segment_of_a_recording_is_no_damage(tmp_path: Path, ending: str, codec: str) -> None:
+    source = find_source(made(tmp_path / f"segment.{ending}", "-output_ts_offset", "60", "-c:v", codec))
+    assert source.count == 3
+    assert [one.error for one in source.pictures()] == [""] * 3
+
+
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
 def test_a_stream_that_was_cut_off_says_so(tmp_path: Path, codec: str) -> None:
     whole, stream, cut = (tmp_path / name for name in ("whole.mp4", "stream.ts", "cut.ts"))

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from fogsim.errors import InputError
 from fogsim.offline.image_files import IMAGE_ENDINGS, Pixels, read_image, refuse_unwritable_image, write_image
@@ -90,6 +91,30 @@ def test_the_largest_value_of_a_pgm_is_a_full_scale(tmp_path: Path, most: int, i
         return
     with pytest.raises(InputError, match=f"expected a largest value of 255, 1023, 4095, 65535 .*, got {most}"):
         read_image(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "most", "is_read"),
+    [("P2\n2 1\n{}", 100, True), ("P3 2 1 {}", 255, True), ("P2 2 1 {}", 4095, True), ("P2 2 1 {}", 16383, False)]
+    + [("P7\nWIDTH 2\nHEIGHT 1\nDEPTH 1\nMAXVAL {}\nENDHDR", most, most == 255) for most in (100, 255)],
+)
+def test_the_largest_value_of_other_headers(tmp_path: Path, header: str, most: int, is_read: bool) -> None:
+    path, values = tmp_path / "grey.pnm", b"d1" if "P7" in header else b" ".join([b"100", b"49"] * 3)
+    path.write_bytes(header.format(most).encode() + b"\n" + values + b"\n")
+    if is_read:
+        assert read_image(path).ravel()[0] == (255 if most == 100 else 100)
+        return
+    with pytest.raises(InputError, match=f"expected a largest value of 255, 1023, 4095, 65535 .*, got {most}"):
+        read_image(path)
+
+
+@pytest.mark.parametrize("compression", ["raw", "tiff_lzw"])
+def test_colours_of_a_tiff_are_as_they_are_whatever_their_opacity(tmp_path: Path, compression: str) -> None:
+    path, turned = tmp_path / "image.tif", Image.Exif()
+    for turned[0x0112] in (1, 3):
+        Image.fromarray(TRANSPARENT).save(path, compression=compression, exif=turned)
+        expected = TRANSPARENT if turned[0x0112] == 1 else TRANSPARENT[::-1, ::-1]
+        assert np.array_equal(read_image(path)[..., (2, 1, 0, 3)], expected)
 
 
 def test_they_are_read(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -153,6 +154,21 @@ def test_a_missing_heading_leaves_the_others(folder: Path) -> None:
     (folder / "turned.csv").write_text("\n".join(rows), "utf-8")
     heading = load_track(folder / "turned.csv").heading
     assert np.degrees(heading) == pytest.approx([60.0] + [50.0] * IMAGES, abs=1e-3)
+
+
+def test_times_without_a_zone_are_no_clock_times_of_this_computer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (track := tmp_path / "track.csv").write_text(
+        "time,lat,lon,heading_deg\n2026-03-29T02:59:59,48,11,0\n2026-03-29T03:00:00,48,11,0\n", "utf-8"
+    )
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    try:
+        assert load_track(track).time.tolist() == [0.0, 1.0]
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 def test_rows_before_a_receiver_has_its_position_are_passed_over(folder: Path) -> None:

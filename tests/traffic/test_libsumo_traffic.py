@@ -138,3 +138,9 @@ def test_what_cannot_be_begun_is_told_and_leaves_nothing_running(tmp_path: Path)
     other = libsumo_traffic(SETUP)
     other.start(1)  # nothing is left running
     other.close()
+
+
+def test_a_locale_in_which_sumo_reads_no_numbers_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("locale.localeconv", lambda: {"decimal_point": ","})
+    with pytest.raises(SimulationError, match=r"writes 0,5, .* locale\.setlocale\(locale\.LC_NUMERIC, 'C'\)"):
+        libsumo_traffic(SETUP).start(1)

@@ -33,11 +33,12 @@ from fogsim_envs.batch.layout import (
     SurrogateArrays,
 )
 from fogsim_envs.infos import flat_arrays
+from fogsim_envs.plain_arguments import takes_plain_data
+from fogsim_envs.rewards import WeightsOf
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_space
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FAST_FOG, FAST_SCENARIO
 from fogsim_envs.task.observation import task_space
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import split_number
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable
@@ -75,6 +76,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+    reward_weights = WeightsOf(TaskWeights)
     _measured_errors = MEASURED
 
     def __init__(
@@ -118,8 +120,7 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
                 f"scenario_distribution.drivers: expected those of {', '.join(DRIVERS)}, which the kernel has, got "
                 f"{own[0]!r}; fogsim/FogAdvisoryFast-v2 takes others"
             )
-        self.reward_weights = reward_weights or TaskWeights()
-        self._weights = np.array([getattr(self.reward_weights, name) for name in TERMS])
+        self.reward_weights = reward_weights
         table = SurrogateTable.load(self._measured_errors if surrogate is None else Path(surrogate))
         self._table = SurrogateArrays(*(getattr(table, name) for name in SurrogateArrays._fields))
         self._rule = rule or RuleConstants()
@@ -200,7 +201,8 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
             raise gymnasium.error.ResetNeeded("no episode has begun: call reset() before step()")
         ego = self._episodes.ego
         ego["advised"], ego["lamps"] = self._commanded(checked_action(actions, self.action_space, type(self).__name__))
-        advance(self._episodes, self._weights, self._table, self._rule)
+        weights = np.array([getattr(self.reward_weights, name) for name in TERMS])
+        advance(self._episodes, weights, self._table, self._rule)
         if len(self._over):
             self._begin(self._over)
         rewards, ending = self._episodes.terms.sum(axis=1), ego["ending"]

@@ -34,7 +34,7 @@ from fogsim_envs.corridor.observation import (
 from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
 from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout, refuse_copies
 from fogsim_envs.infos import flat_numbers
-from fogsim_envs.rewards import advice_standard
+from fogsim_envs.rewards import WeightsOf, advice_standard
 from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import Defaults, EpisodeChoice, EpisodeSource
 
@@ -136,6 +136,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         "is_parallelizable": True,
     }
     render_mode = None
+    reward_weights = WeightsOf(CorridorWeights)
 
     def __init__(
         self,
@@ -148,7 +149,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
-        self._timeout, self._weights = timeout, reward_weights or CorridorWeights()
+        self._timeout, self.reward_weights = timeout, reward_weights
         own = _default_scenarios() if scenario is None else ()
         self._source = EpisodeSource(
             scenario, None, fog_distribution, tuple(overrides), split, own, Defaults(_CORRIDOR_FOG)
@@ -278,12 +279,14 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             )
         levels = [int(checked_action(actions[agent], self._action_spaces[agent], agent)) for agent in self.agents]
         self._shown = tuple(SHOWN_SPEEDS[level] for level in levels)
+        # None until the step is complete, so that an interrupted episode does not go on.
+        all_agents, self.agents = self.agents, []
         terms = self._move()
-        observed, infos, all_agents = self._observe(), self._infos(terms), self.agents
+        observed, infos = self._observe(), self._infos(terms)
         ending = self._step.ending
         truncated = ending is Ending.TIME
-        if ending is not None:
-            self.agents = []
+        if ending is None:
+            self.agents = all_agents
         return (
             observed,
             dict.fromkeys(all_agents, float(sum(terms.values()))),
@@ -298,7 +301,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         sections = tuple(section.stretch for section in self._step.truth.sections)
         command = Command(stretches=stretch_advices(sections, self._shown, Display.MESSAGE_SIGN))
-        reward = CorridorReward(self._weights, self._standard)
+        reward = CorridorReward(self.reward_weights, self._standard)
         for _ in range(self._frames):
             if self._step.ending is not None:
                 break

@@ -24,12 +24,12 @@ from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
-from fogsim_envs.rewards import advice_standard
+from fogsim_envs.rewards import WeightsOf, advice_standard
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import first_valid_estimate, leading_estimate, task_observation, task_space
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
 from fogsim_envs.task.sampling import (
     MOTORWAY,
@@ -137,6 +137,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    reward_weights = WeightsOf(TaskWeights)
     _default_motorway, _defaults = MOTORWAY, MOTORWAY_DEFAULTS
     _observed_estimate = staticmethod(leading_estimate)
 
@@ -169,7 +170,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         )
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._is_measured, self._measured = metrics, RunMetrics()
-        self.reward_weights = reward_weights or TaskWeights()
+        self.reward_weights = reward_weights
         self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
         self._simulation: Simulation | None = None
@@ -291,7 +292,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             given = np.array(np.unravel_index(int(given - self.action_space.start), self._levels))
         chosen = self._commanded(given)
         self._own = replace(chosen, warning=self._built_in.warning)
-        before = self._step
+        # None until the next step is complete, so that an interrupted episode does not go on.
+        before, self._step = self._step, None
         self._step = self._drive(before)
         self._show()
         terms = task_terms(before, self._step, self._way, self.reward_weights, self._standard)

@@ -18,11 +18,11 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.section import Method
 from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT, Timeout
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env, FogAdvisoryV2Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.sampling import Defaults
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, EstimatorSurrogate, SurrogateTable

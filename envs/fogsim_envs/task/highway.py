@@ -23,10 +23,10 @@ from fogsim_envs.highway import (
     one_frame_clocks,
 )
 from fogsim_envs.hosting import TIMEOUT, Timeout
+from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
-from fogsim_envs.task.plain_arguments import takes_plain_data
 from fogsim_envs.task.rewards import TaskWeights
 
 _HIGHWAY_FOG = FogDistribution(ahead=(100.0, 500.0), reach=1000.0, bank_length=(300.0, 800.0))

@@ -5,7 +5,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -154,7 +154,9 @@ def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
 
 def _instant(where: str, text: str) -> float:
     try:
-        return datetime.fromisoformat(text).timestamp()
+        moment = datetime.fromisoformat(text)
+        # Without a zone, not that of this computer, whose clock may be put forward on the way.
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     except (ValueError, OverflowError) as error:
         raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {shown(text)}") from error
 

@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import io
+import locale
 import os
 import sys
 import tempfile
@@ -38,6 +39,15 @@ def load_libsumo() -> ModuleType:
     return module
 
 
+def _refuse_commas() -> None:
+    if (point := locale.localeconv()["decimal_point"]) != ".":
+        raise SimulationError(
+            f"SUMO cannot read numbers such as 0.5 where a process has set a locale that writes 0{point}5, as "
+            "locale.setlocale(locale.LC_ALL, '') and some user interfaces do: call "
+            "locale.setlocale(locale.LC_NUMERIC, 'C') after them"
+        )
+
+
 class LibsumoLink:
     """SUMO inside this process, through libsumo; one at a time."""
 
@@ -58,6 +68,7 @@ class LibsumoLink:
             return self._begin(arguments)
 
     def _begin(self, arguments: Sequence[str]) -> Api:
+        _refuse_commas()
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
             self._make_room(sumo)

@@ -23,7 +23,7 @@ _SKY_ROWS, _NEAREST = 5, 20.0
 """Rows of sky that are compared with, and least depth at which a road is taken to end [m]."""
 
 _HALF_WIDTH, _NARROWEST, _MOST_COLUMNS = 4.0, 8.0, 80
-"""Half the width that is read of a row, of which a vehicle hides less than half [m], least of it, and most pixels [px].
+"""Half the width that is read of a row: a vehicle hides less than half of that [m]; least of it, and most pixels [px].
 """
 
 

@@ -11,7 +11,9 @@ from matplotlib.figure import Figure
 
 from fogsim.errors import printable
 from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.guess import LaneCheck
 from fogsim.offline.results import ENDLESS, metres, span_text
+from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, fog_category
 
 _RECENT = 1.0
@@ -45,15 +47,22 @@ class Reading:
 
 
 class Clip:
-    """Readings of each method over a clip."""
+    """Readings of each method over a clip, and what contradicts the height of the camera, if one is given."""
 
-    def __init__(self, methods: tuple[str, ...]) -> None:
+    def __init__(self, methods: tuple[str, ...], camera: Camera | None = None) -> None:
+        self._lanes = None if camera is None else LaneCheck(camera)
         self._readings: dict[str, list[Reading]] = {method: [] for method in methods}
 
     def add(self, result: FrameEstimates) -> None:
         """Add the estimates of an image."""
+        if self._lanes is not None and result.picture.image is not None:
+            self._lanes.add(result.picture.image)
         for estimate in result.estimates:
             self._readings[estimate.method].append(Reading.of(result.picture.time, estimate))
+
+    def remarks(self) -> Iterator[str]:
+        """What the images say against the calibration."""
+        return iter(()) if self._lanes is None else self._lanes.remarks()
 
     def lines(self) -> Iterator[str]:
         """Summary as text."""

@@ -1,7 +1,7 @@
 """A calibration of an unknown camera from its images, and how uncertain it is."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -365,6 +365,39 @@ def _lane_over_height(lines: RoadSegments) -> float | None:
         sure = near & (lines.length >= _SHORTEST_LINE * lines.length[near].max())
         sides.append(float(offset[sure].min()))
     return sum(sides)
+
+
+_NARROWEST_LANE, _WIDEST_GAP = 2.3, 8.0
+"""Least width of a lane, and most distance of the lines that are found next to a camera, some missed between them [m]:
+2.35 to 7.6 on photographs of pool 0 of `benchmarks/photograph_pictures.py`, but 1.85 where one has a bright repair."""
+
+
+class LaneCheck:
+    """Whether the lines next to a camera are as far apart as those of lanes, from a few images of a clip."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera, self._seen = camera, 0
+        self._widths = list[float]()
+
+    def add(self, image: Pixels) -> None:
+        """Look at an image: at the first, the second, the fourth and so on."""
+        self._seen += 1
+        if self._seen & (self._seen - 1):
+            return
+        lines = _road_lines(image, self._camera.response)
+        width = None if lines is None else _lane_over_height(lines)
+        if width is not None:
+            self._widths.append(width * self._camera.mount_height)
+
+    def remarks(self) -> Iterator[str]:
+        """What contradicts the camera's height."""
+        if not self._widths or _NARROWEST_LANE <= (width := float(np.median(self._widths))) <= _WIDEST_GAP:
+            return
+        side, height = "low" if width < _NARROWEST_LANE else "high", self._camera.mount_height
+        yield (
+            f"the lines next to the camera are {width:.1f} m apart if it is {height:.3g} m above the road: if "
+            f"they bound a lane, mount_height_m is too {side}, and visibilities are, too, by the same factor"
+        )
 
 
 def _median_row(points: list[VanishingPoint]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from other_cameras import CAMERA, KINDS, draw, views
 from fogsim.estimators import make
 from fogsim.values import Observation
 
-SOLVED = sorted(set(KINDS) - {"clahe", "wet", "dirt"})
+SOLVED = sorted(set(KINDS) - {"clahe", "wet", "dirt", "wall"})
 """Kinds that are always read, with intervals that hold."""
 
 
@@ -43,6 +43,13 @@ def test_a_wet_road_is_none_of_dense_fog():
         found = estimate(draw("wet", visibility, 0))
         assert not found.valid
         assert "wet" in str(found.diagnostics["reason"])
+
+
+def test_a_wall_across_the_road_is_not_taken_for_the_sky():
+    reasons = [estimate(draw("wall", 250.0, seed)).diagnostics.get("reason", "") for seed in range(3)]
+    assert all("something across the way" in str(reason) for reason in reasons), reasons
+    # Hardly seen in fog this dense, it is none.
+    assert all(estimate(draw("wall", 60.0, seed)).valid for seed in range(3))
 
 
 @pytest.mark.parametrize("view", ["arch", "bonnet", "tower", "trees", "wall"])

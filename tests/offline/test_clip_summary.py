@@ -2,11 +2,13 @@
 
 import io
 import os
+from dataclasses import replace
 
 import pytest
 
 from fogsim.offline.clip_summary import Clip
 from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.input_paths import find_source
 from fogsim.offline.source import Picture
 from fogsim.values import Estimate
 
@@ -29,3 +31,14 @@ def test_an_answer_without_a_number_or_a_reason_counts_as_none() -> None:
     assert "at the end     no estimate: no reason given" in text
     assert "valid          0 of 3 frames" in text
     assert "nan" not in text
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (1.0 / 1.8, "too low"), (1.8, ""), (3.0, "too high")])
+def test_lanes_of_an_impossible_width_say_that_the_height_is_wrong(drive, factor: float, said: str) -> None:
+    """Where a line is missed, lanes seem twice as wide: only what is beyond that counts."""
+    clip = Clip((), replace(drive.camera, mount_height=factor * drive.camera.mount_height))
+    for picture in find_source(drive.folder / "images").pictures():
+        clip.add(FrameEstimates(picture, ()))
+    remarks = list(clip.remarks())
+    assert len(remarks) == bool(said)
+    assert all(f"mount_height_m is {said}" in remark for remark in remarks)

@@ -113,6 +113,13 @@ def glaring(light: Light) -> np.ndarray:
     return plain(replace(light, linear=light.linear + veil))
 
 
+def walled(light: Light) -> np.ndarray:
+    """A wall of a third of the sky's light across the road, 65 m ahead and higher than the image."""
+    behind = light.below[:, 0] < CAMERA.mount_height / 65.0
+    wall = light.linear[0, 0] - 0.65 * light.mirrored[np.argmin(behind)]
+    return plain(replace(light, linear=np.where(behind[:, None], wall, light.linear)))
+
+
 def convex(share: float) -> Callable[[np.ndarray], np.ndarray]:
     """Skies that are level above 0.16 rad and darken down to the horizon by a share a 120th of a radian."""
     return lambda above: (1.0 - share) ** (-120.0 * np.minimum(np.maximum(above, 0.0), 0.16))
@@ -145,6 +152,7 @@ KINDS = {
     "bonnet": Kind(bonnet),
     "dirt": Kind(dirty),
     "glare": Kind(glaring),
+    "wall": Kind(walled),
     "convex sky 1": Kind(sky=convex(0.01), airlight=0.35),
     "convex sky 2": Kind(sky=convex(0.02), airlight=0.25),
     "convex sky 3": Kind(sky=convex(0.03), airlight=0.2),

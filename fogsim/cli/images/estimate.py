@@ -236,7 +236,7 @@ def _estimate(
 
     source, camera = straightened(images, calibration)
     watch = _watch(mapped, source, camera)
-    clip, rows = Clip(methods), _Rows(source, methods, outputs)
+    clip, rows = Clip(methods, camera if night is None else None), _Rows(source, methods, outputs)
     is_interrupted = False
     try:
         _each(source, camera, methods, outputs, rows, clip, watch, night, calibration.deviations)
@@ -245,6 +245,7 @@ def _estimate(
     if rows.are_summed_up and rows.count:
         for line in clip.lines():
             _say(printable(line, in_one_line=True))
+    print_remarks("uncertain", clip.remarks())
     if watch is not None:
         _show_signs(watch, quiet=outputs.as_json or outputs.as_csv)
     if is_interrupted:

@@ -11,6 +11,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.day.evidence_kernels import evidence_grid
+from fogsim.vision.day.road_end import UNSEEN_END, RoadEnd, road_end
 from fogsim.vision.day.row_data import RowBins, chances_of, curves_of, free_depth, near_horizon, read_rows, row_bins
 from fogsim.vision.day.row_kernels import (
     AIRLIGHT,
@@ -89,6 +90,7 @@ class DayFit:
     images: int = 1  # Images of the drive up to this one
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
     farthest: float = math.inf  # Depth of the farthest rows that surely are below the horizon [m]
+    end: RoadEnd = UNSEEN_END
 
     @property
     def response_shift(self) -> float:
@@ -139,7 +141,7 @@ def fit_day(
     doubt = _contradiction(rows, camera, horizon, claimed)
     fit = replace(_weighed(rows, camera, horizon, chances, earlier), doubt=doubt, free=free)
     farthest = camera.row_distance / near_horizon(horizon.standard_deviation)
-    fit = replace(fit, farthest=min(free, farthest))
+    fit = replace(fit, farthest=min(free, farthest), end=road_end(pixels, rows, camera, horizon))
     if earlier is None:
         return fit
     tried = _left(earlier, chances)[0]

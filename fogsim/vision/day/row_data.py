@@ -280,7 +280,7 @@ _NOISE, _OF_SCATTER, _OF_SLOPE = 0.45 / 255.0, 0.25, 0.15
 _CONTRAST_NOISE = 3.0
 """Contrast that noise makes across a row, in deviations of its pixels [-]."""
 
-_CLIPPED = 0.988
+CLIPPED = 0.988
 """Signal from which on a bin counts as clipped [-]."""
 
 _BRIGHTEST = 0.92
@@ -315,7 +315,7 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
         for table in (curves.light, curves.slope)
     )
     noise = np.sqrt(_NOISE**2 + (_OF_SCATTER * scatter) ** 2 + (_OF_SLOPE * by_row) ** 2)
-    clipped = signal > _CLIPPED
+    clipped = signal > CLIPPED
     level = np.maximum(np.quantile(light, _BRIGHTEST, axis=1), _LEAST_LEVEL)
     contrast = np.stack([across, _CONTRAST_NOISE * np.hypot(1.5 * noise, 1.5 / 255.0)]) * slope[0] / level[0]
     cuts = _cuts(bins, camera, horizon)

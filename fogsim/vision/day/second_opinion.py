@@ -34,12 +34,9 @@ _OWN_LANE = 0.2
 """Columns to either side of the way ahead that do not count, over the image's: vehicles have dark windows above bright
 bodies [-]."""
 
-_DARKER, _BRIGHTER = 0.8, 0.15
+_DARKER, _BRIGHTER, _LEAST_ROWS = 0.8, 0.15, 3
 """Light over the airlight below which something stands there, and by how much the ground before it must be brighter to
-show that it stands farther away [-]."""
-
-_LEAST_ROWS = 3
-"""Rows of ground that show that."""
+show that it stands farther away [-], in how many rows."""
 
 _MOST_FAR = 0.2
 """Share of the image's width in which things show that fog would hide, from which on there is no such fog [-]."""
@@ -118,8 +115,9 @@ _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
 
-_SLACK = 1.15
-"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
+_SLACK, _THIN = 1.15, 400.0
+"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-], and lower end of
+those that what stands across the way does not change much, chosen as `RoadEnd`'s constants [m]."""
 
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
@@ -130,7 +128,7 @@ method [-]."""
 
 _EVEN_SURFACES, _USUAL_SURFACES, _MOSTLY = 2, 3, 0.5
 """How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; the next lies in
-shade; and the probability from which on something is likelier than not [-]."""
+shade, and one is hidden; and the probability from which on something is likelier than not [-]."""
 
 _DENSEST = 13.5
 """Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
@@ -145,15 +143,14 @@ _SUSPECTED = 0.2
 _HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
-_LEAST_CONTRAST = 0.08
-"""Least contrast of far road to near road over the sky for fog to show [-]."""
-
-_DARK = 6.0 / 255.0
-"""Light of the brightest rows below which it is no day, over full scale [-]."""
+_LEAST_CONTRAST, _DARK = 0.08, 6.0 / 255.0
+"""Least contrast of far road to near road over the sky for fog to show [-], and light of the brightest rows below which
+it is no day, over full scale [-]."""
 
 FAR_ROAD = "far road is hardly brighter: there is little fog, a road as bright as it, or something before the near road"
 CONTRAST = "contrast shows where the fog of the road's brightness would leave none, or something hangs before the road"
 DISAGREE = "how the road fades and how its image brightens disagree"
+WALLED = "something across the way hides road and sky, as a wall does, or the stated pitch is wrong"
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +176,7 @@ class DayVerdict:
     is_stated: bool = True  # Whether the response may be the stated one; also where the road is not sure, or uneven
     airlight_deviation: float = 0.0  # Relative deviation of k where the sky is clipped, and the airlight not known [-]
     is_road: bool = True  # Whether a road is likelier than none
+    is_walled: bool = False  # Whether something hides the road that hides its sky too, which then is no airlight
     free: float = math.inf  # Depth up to which the road was read, before what stands in the own lane [m]
     farthest: float = math.inf  # Depth of the farthest rows that were read [m]
 
@@ -226,6 +224,8 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
     is_sure = is_sure and is_sky and low > _DENSEST
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
+    is_hidden = math.isinf(fit.free) and float(fit.surfaces[_USUAL_SURFACES + 1]) > _MOSTLY
+    is_walled = fit.end.is_sharp or (is_hidden and fit.end.is_sky_even)
     # What crosses an uneven road, as a wiper does, is no tone curve, nor is the course of one that sags.
     shows_response = is_even and is_sure and lines is not None
     shift = fit.response_shift if is_fog and shows_response and is_stated else 0.0
@@ -234,7 +234,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
         deviation=half,
         median=extinction_from_visibility(middle),
         interval=(low, math.inf if is_clear else high),
-        reason="" if answers and is_road else _reason(fit, is_road, sky),
+        reason=WALLED if is_walled else "" if answers and is_road else _reason(fit, is_road, sky),
         shows_fog=shows and is_road,
         is_sure=is_sure,
         is_even=is_even and is_stated,
@@ -245,6 +245,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
         is_stated=is_stated or not shows_response,
         airlight_deviation=2.0 * half / (dense + thin) if is_road and is_fog and fit.clipped > _MOSTLY else 0.0,
         is_road=is_road,
+        is_walled=is_walled,
         free=fit.free,
         farthest=fit.farthest,
     )
@@ -338,6 +339,8 @@ class SecondOpinion:
         return verdict
 
     def _weighed(self, own: Estimate, verdict: DayVerdict, free: float, lines: int | None) -> Estimate:
+        if own.valid and lines is not None and verdict.is_walled and own.visibility_interval[0] < _THIN:
+            return refused(own, WALLED)
         if own.valid and verdict.is_stated and verdict.doubt <= MOST_DOUBT and math.isfinite(min(free, verdict.free)):
             # Before what stands in the lane it sees less, but too little of a road that may be wet for either.
             return own if verdict.outside <= _SUSPECTED else _of_day(own, verdict)

@@ -35,6 +35,11 @@ _LAMP, _LAMPS_SHARE, _DARK_SKY = 250.0, 0.004, 140.0
 """Luminance of what may be a lamp in the sky, least share of the sky's pixels that lamps cover [-], and most luminance
 that the sky has in the median where lamps stand out of it [linear grey levels]."""
 
+_UNLIT, _DARK_SIDE, _SIDES, _DARK_SHARE = 0.04, 0.35, 0.2, 0.9
+"""Luminances of the near road and of what is to both sides, over that of the sky ahead, up to which no sky lights them:
+seen out of a tunnel; the part of the columns that are a side, and the least share of both that is so dark [-]. Roads in
+clear air have at least 0.07 on pool 0 of `benchmarks/photograph_pictures.py`, those in drawn tunnels at most 0.016."""
+
 _BEAM = 1.15
 """Luminance of the own lane over that of both sides from which on it may be a beam's [-]."""
 
@@ -101,6 +106,7 @@ _SHOWN = (
     "",
     BRIGHT_ROAD,
     "lamps or a low sun light the sky and the road: this is a method for an even daylight",
+    "something dark hides the sky on all sides and leaves the road unlit, as a tunnel does",
 )
 """What may show that lamps light the road."""
 
@@ -137,6 +143,8 @@ def _lit(
     shining = 0
     for light in sky:
         shining += light >= _LAMP
+    if is_seen and _is_enclosed(image, low, near, over, lane):
+        return 3
     if shining < _LAMPS_SHARE * sky.size or quantile_among(sky, 0.5) >= _DARK_SKY:
         return 0
     return 2 if _has_beam(lane, _row_medians(image, road, strips[1]), _row_medians(image, road, strips[2])) else 0
@@ -149,6 +157,30 @@ def _is_darker(lane: NDArray[np.float64], light: float) -> bool:
     for value in lane:
         dark += value <= light
     return dark > lane.size // 2
+
+
+@kernel
+def _is_enclosed(
+    image: LinearPixels, rows: NDArray[np.int64], near: int, over: tuple[int, int], lane: NDArray[np.float64]
+) -> bool:
+    """Whether the lane and both sides are too dark for the light that shows over the lane to come from a sky.
+
+    Takes `rows` (n,) int64, see `_open_sky`.
+    """
+    if over[1] <= over[0] or not _is_darker(lane, _UNLIT * _LAMP):
+        return False
+    light = quantile_among(_pixels(image, rows[near:], over[0], over[1], 1), _BRIGHT_SHARE)
+    if not _is_darker(lane, _UNLIT * light):
+        return False
+    cols = image.pixels.shape[1]
+    side = int(_SIDES * cols)
+    for first in (0, cols - side):
+        seen, dark = _pixels(image, rows, first, first + side, _SKY_STEP), 0
+        for value in seen:
+            dark += value <= _DARK_SIDE * light
+        if dark < _DARK_SHARE * seen.size:
+            return False
+    return True
 
 
 @kernel

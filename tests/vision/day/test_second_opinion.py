@@ -76,6 +76,13 @@ def test_two_answers_that_exclude_one_another_are_spanned_or_given_up(said):
     assert "disagree" in str(said(OWN, replace(DENSER, is_sure=False))[0].diagnostics["reason"])
 
 
+def test_no_fog_is_believed_before_a_wall_that_hides_the_sky(said):
+    walled = replace(AGREES, is_walled=True)
+    assert "as a wall does" in str(said(OWN, walled)[0].diagnostics["reason"])
+    assert said(OWN, walled, lines=None)[0].valid
+    assert said(THIN, replace(CLEAR, is_walled=True))[0].valid
+
+
 def test_what_the_joint_fit_does_not_know_ends_its_estimate_and_proves_no_other(said):
     assert not said(OWN, replace(FAR, outside=0.9))[0].valid
     assert not said(OWN, replace(SILENT, outside=0.9))[0].valid

@@ -101,6 +101,19 @@ def test_under_a_ceiling_that_is_darker_than_the_road_there_is_no_daylight() -> 
     assert not lit_by_lamps(truck, CAMERA, LeadMeasurement(6.0, 0.0))
 
 
+def test_fog_seen_out_of_a_tunnel_is_not_read() -> None:
+    """Walls and road inside are hardly lit; bands on both sides of a picture leave its road as it is."""
+    road = Road(camera=CAMERA, visibility=100.0, asphalt=90.0)
+    image = photograph(road, scan(road, 0, 2), 0)
+    inside, bands = np.minimum(image, 6), image.copy()
+    inside[70:126, 110:210] = image[70:126, 110:210]
+    bands[:, :60] = bands[:, 260:] = 0
+    assert "as a tunnel does" in lit_by_lamps(inside, CAMERA)
+    for method in ("negru2013", "joint_road", "zhu2015", "huang2015_rough"):
+        assert not make(method, CAMERA).update(Observation(inside)).valid
+    assert not lit_by_lamps(bands, CAMERA)
+
+
 @pytest.mark.parametrize("left", [0, 110, 60])
 def test_a_mirror_or_visor_before_the_sky_is_no_ceiling(left: int) -> None:
     """Sky shows below them, over the lane and to its sides; where they hide it all, the reason says so."""

@@ -62,10 +62,7 @@ _FOGSIM = __package__.partition(".")[0]
 
 
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
-    """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
-
-    Takes `clock` [s].
-    """
+    """At the first run only, explains that the time goes into compiling, and shows its progress (`clock` [s])."""
 
     def __init__(self, print_line: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         self._print, self._clock = print_line, clock

@@ -28,10 +28,7 @@ _SHORTEST, _SHARED, _GRAIN = 15.0, 0.8, 0.02
 
 
 def _curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
-    """(n, 4) float64: start and end [m], ln of the mean extinction, and its standard deviation [ln 1/m, -].
-
-    Takes `farthest` [m].
-    """
+    """(n, 4): start and end up to `farthest` [m], ln of the mean extinction, and its standard deviation."""
     return _cut(np.array(curve.distance), np.array(curve.depth), np.array(curve.standard_deviation), _CUTS, farthest)
 
 

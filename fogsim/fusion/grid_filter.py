@@ -59,10 +59,7 @@ class _Announcements:
         self.announced = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
-        """Take in the estimates of one instant.
-
-        Returns what most images, including most of the last ones, report, if it is to be announced. Takes `time` [s].
-        """
+        """Add the estimates of an instant [s]; return what most images report, if it is to be announced."""
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:
             self._reports.append((time, next((one.denser for one in telling if one.denser is not None), None)))

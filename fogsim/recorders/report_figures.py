@@ -243,10 +243,7 @@ _WARNINGS = {
 
 
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
-    """Draw every figure of the report.
-
-    Returns caption and PNG of each figure (str, bytes). Takes `time_to_collision_threshold` [s].
-    """
+    """Caption and PNG of every figure of the report (`time_to_collision_threshold` [s])."""
 
     def figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None]) -> bytes:
         return figure_over_time(curves.time, curves.collisions, heights, draw)

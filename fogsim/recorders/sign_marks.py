@@ -90,10 +90,7 @@ def looks_of(diagnostic: object) -> tuple[SignLook, ...]:
 def draw_signs(
     draw: ImageDraw.ImageDraw, signs: Iterable[SignLook], scale: float, origin: tuple[int, int], size: tuple[int, int]
 ) -> None:
-    """Mark signs: a thin circle where the map has one, a bright one with its distances where it was detected.
-
-    Takes `origin` [px], `size` [px].
-    """
+    """Mark signs [px]: a thin circle where the map has one, a bright one with its distances where it was detected."""
     written: list[tuple[float, float, float, float]] = []
     for sign in sorted(signs, key=lambda one: one.distance)[:_MOST]:
         u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, _LEAST_RADIUS)

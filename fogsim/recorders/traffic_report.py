@@ -86,10 +86,7 @@ class TrafficReportRecorder(StepReport[TrafficStep]):
 
 
 def _draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
-    """Draw every figure of the report of traffic alone.
-
-    Returns caption and PNG of each figure (str, bytes).
-    """
+    """Caption and PNG of every figure of the report of traffic alone."""
     time, collisions = curves.time, curves.collisions
     return [
         (
@@ -109,10 +106,7 @@ def _draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
 
 
 def _road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
-    """Draw speed over the road, and the visibility there.
-
-    Returns caption and PNG. Takes `along_road` (n, 4).
-    """
+    """Caption and PNG of speed over the road, and of the visibility there (`along_road` (n, 4))."""
     # No one's mean is a line across a stretch that no one was on.
     place, speed, extinction, _ = np.insert(along_road, _breaks(along_road[:, 0]), np.nan, axis=0).T
 

@@ -38,11 +38,9 @@ class AllVehicles:
 
 
 class NearbyVehicles:
-    """Finds the vehicles near the ego; one far away is asked again only when it could have come near.
+    """Finds the vehicles near the ego (`radius` [m]); one far away is asked again only when it could be near.
 
     Nor are distances of those near computed before one of them could be far.
-
-    Takes `radius` [m].
     """
 
     def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:

@@ -92,10 +92,7 @@ class OutputFolder:
         return link
 
     def twice(self) -> list[str]:
-        """Names of files that SUMO has open more than once, for outputs of one name in different folders.
-
-        Returns none where the system does not report open files, and where nothing is kept.
-        """
+        """Names of files that SUMO has open for several outputs; none where the system does not report them."""
         if self._folder is None or not _OPEN_FILES.is_dir():
             return []
         place = str(self._folder.resolve())

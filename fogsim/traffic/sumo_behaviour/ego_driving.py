@@ -115,10 +115,7 @@ class EgoDriving:
         self._planned_from: float | None = None
 
     def apply(self, control: EgoControl | None, present: set[str]) -> bool:
-        """Drive for the next step.
-
-        Returns whether the ego is driven by hand.
-        """
+        """Drive for the next step; return whether the ego is driven by hand."""
         ego, vehicles = self._ego, self._api.vehicle
         if ego is None or ego not in present:
             self._planned_from = None

@@ -89,12 +89,7 @@ class Leaders:
         self._read: tuple[float, dict[str, list[_Spot]]] = (-1.0, {})
 
     def within(self, reach: float) -> Getter:
-        """Getter like SUMO's ``getLeader``, to be called with the vehicle and this reach [m].
-
-        Where lanes are not shared it is SUMO's own.
-
-        Takes `reach` [m].
-        """
+        """Getter like SUMO's ``getLeader``, which it is if lanes are not shared, called with vehicle and reach [m]."""
         if self._spots.is_divided:
             return self.find
         (in_lane,) = vehicle_getters(self._api, self._remote, ("getLeader",), {"getLeader": ("d", reach)})
@@ -116,10 +111,7 @@ class Leaders:
         return self.find(ego, _EGO_REACH) if found and found[0] and is_against(found[0], lane(found[0])) else found
 
     def find(self, vehicle: str, reach: float) -> tuple[str, float] | None:
-        """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none.
-
-        Takes `reach` [m].
-        """
+        """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none."""
         lane = self._lane(vehicle)
         if not lane:
             return None

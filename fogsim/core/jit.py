@@ -307,15 +307,10 @@ def _digest(path: str) -> str:
 
 
 class Bands:
-    """Divides the rows of pictures between this thread and, for large pictures, a second one.
+    """Divides the rows of pictures at a share `middle` between this thread and, for large pictures, a second one.
 
     No thread outlives a call, so that a process may fork between calls. Where the rows are divided depends on the time
     that the bands took before; so what is done to a row must not depend on it, and pictures are the same anywhere.
-
-    Attributes
-    ----------
-    middle : float
-        Share of the rows in the upper band.
     """
 
     def __init__(self) -> None:

@@ -32,20 +32,10 @@ of its distance [-]. What seems to be fog beyond a crest recedes."""
 
 
 class _Announcements:
-    """Follows what estimates say of denser fog ahead.
+    """Follows what estimates say of denser fog ahead, which they must report within a `time` [s] to be `announced`.
 
     A bank stands, or comes nearer as one drives; what one picture takes for fog and the next does not, or elsewhere, is
     none: a vehicle, a crest, the shade of a wood.
-
-    Parameters
-    ----------
-    time : float
-        Window in which estimates must report it [s].
-
-    Attributes
-    ----------
-    announced : bool
-        Whether denser fog is announced.
     """
 
     def __init__(self, time: float) -> None:

@@ -96,13 +96,7 @@ class Fronts(NamedTuple):
 
 
 class Junctions:
-    """Which lanes lie in which junctions: SUMO names those of a junction J ``:J_edge_lane``.
-
-    Attributes
-    ----------
-    of_lane : (n,) intp
-        Number of the junction of each lane so far, `UNKNOWN` for one outside of all.
-    """
+    """Junctions of lanes, `UNKNOWN` for none: SUMO calls the lanes of a junction J ``:J_edge_lane``."""
 
     def __init__(self) -> None:
         self.of_lane: Numbers = np.zeros(0, np.intp)

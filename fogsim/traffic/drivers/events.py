@@ -109,18 +109,7 @@ class _ScriptedActions:
 
 
 class Script:
-    """Plays events; remembers which have begun.
-
-    Parameters
-    ----------
-    events : iterable of Event
-        What is scripted.
-
-    Attributes
-    ----------
-    lamps : Lamps
-        Lamps that are not the vehicles' own.
-    """
+    """Plays events; remembers which have begun, and which lamps are not the vehicles' own."""
 
     def __init__(self, events: Iterable[Event]) -> None:
         self.lamps = Lamps()

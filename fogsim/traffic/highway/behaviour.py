@@ -280,13 +280,7 @@ def control_drivers(
     advice_deceleration: float,
     sight: DriverSight | None = None,
 ) -> DriverControl:
-    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `DriverControl`.
-
-    Parameters
-    ----------
-    fleet, setup, events, seed, advice_deceleration, sight
-        See `DriverControl`.
-    """
+    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `DriverControl`."""
     control = DriverControl(fleet, setup, events, seed, advice_deceleration, sight)
     # On this one road, not in the library: other environments of the process go on as they are.
     fleet.environment.road.act = control

@@ -66,13 +66,7 @@ class OtherRoadsError(SimulationError):
 
 
 def is_highway_environment(environment: object) -> bool:
-    """Whether something is one of highway-env's environments.
-
-    Parameters
-    ----------
-    environment : object
-        Anything.
-    """
+    """Whether something is one of highway-env's environments."""
     return isinstance(environment, AbstractEnv)
 
 

@@ -25,20 +25,7 @@ _LONGEST = 25.0
 
 
 class _LaneSpots:
-    """Where vehicles are across their edge, in SUMO's measure of lanes.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-
-    Attributes
-    ----------
-    is_divided : bool
-        Whether vehicles share lanes side by side (SUMO's sublane model).
-    """
+    """Where vehicles are across their edge, in SUMO's measure of lanes; `is_divided` in its sublane model."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self.is_divided = float(api.simulation.getOption("lateral-resolution")) > 0.0

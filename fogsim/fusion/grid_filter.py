@@ -194,25 +194,9 @@ class GridFilter:
         return self.update(estimates, time)
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
-        """Take in the estimates of one instant.
+        """Learn from the estimates of one instant [s]; those of the same instant in two calls count as in one.
 
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            From any estimators; invalid ones and such with numbers that are not finite are left out.
-        time : float
-            The instant [s], not before that of the last call. Estimates of the same instant in two calls count as in
-            one.
-
-        Returns
-        -------
-        Belief
-            240 cells of ln k, its arrays its own.
-
-        Raises
-        ------
-        InputError
-            If the time is not finite or goes backward.
+        Invalid estimates and such with numbers that are not finite are left out. InputError if the time goes backward.
         """
         self._advance(time)
         denser = self._announcements.update(estimates, time)

@@ -23,13 +23,7 @@ class NoFusion:
         self._log_extinction.flags.writeable = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:  # noqa: ARG002 - the protocol's parameters
-        """Say what is believed, always the same; see `Fusion.update`.
-
-        Parameters
-        ----------
-        estimates, time
-            See `Fusion.update`.
-        """
+        """Say what is believed, always the same; see `Fusion.update`."""
         return Belief(self._log_extinction, np.full(CELLS, 1.0 / CELLS))
 
     def reset(self) -> None:

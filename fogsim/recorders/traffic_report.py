@@ -65,13 +65,7 @@ class TrafficCurves:
 
 
 class TrafficReportRecorder(StepReport[TrafficStep]):
-    """Writes the report of traffic alone.
-
-    Parameters
-    ----------
-    information : RunInformation
-        The run.
-    """
+    """Writes the report of traffic alone."""
 
     def __init__(self, information: RunInformation) -> None:
         super().__init__(information)

@@ -43,6 +43,9 @@ def parse_options(
     for name, (default, meaning, *choices) in options.items():
         flag = f"-{name}" if len(name) == 1 else f"--{name.replace('_', '-')}"
         allowed: dict[str, Any] = {"choices": list(choices[0])} if choices else {}
+        usual = default if isinstance(default, list) else [default]
+        if not isinstance(default, bool | type) and usual not in ([""], allowed.get("choices")):
+            meaning += f" ({' '.join(map(str, usual))})".replace("%", "%%")
         if isinstance(default, bool):
             parser.add_argument(flag, action="store_true", help=meaning)
         elif isinstance(default, type):

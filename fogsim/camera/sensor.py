@@ -89,10 +89,7 @@ class CameraSensor:
 
     @property
     def share_of_longest_exposure(self) -> float:
-        """Time of the next exposure relative to the longest, 1 where it is fixed [-].
-
-        0 before the first picture of a run, whose exposure is found only with its light.
-        """
+        """Next exposure time over the longest [-]: 1 if fixed, 0 before the first picture, whose light sets it."""
         if self._auto is None:
             return 1.0
         return 0.0 if self._saturation is None else min(1.0, self._auto.ungained / self._saturation)

@@ -131,10 +131,7 @@ event.register("numba:compile", _CompileSpeedup())
 
 
 class CompilerProcess:
-    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it.
-
-    The first wait begins with work of one's own: what the other process would compile last.
-    """
+    """Another process that compiles kernels of some modules; whoever finds one of them not compiled waits for it."""
 
     def __init__(self) -> None:
         self._is_over: Callable[[], bool] | None = None
@@ -230,9 +227,9 @@ def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., An
 
 
 def _look_elsewhere(compiled: Any) -> None:
-    """Let a kernel that was never compiled here be looked for in what came with the installation.
+    """Look for a kernel that was never compiled here among those that came with the installation.
 
-    One that another process compiles meanwhile is looked for on the disk again when that has ended.
+    If another process is compiling it, it is looked for on the disk again once that has ended.
     """
     load, module, shipped = compiled._cache.load_overload, compiled.py_func.__module__, compiled.shipped
 
@@ -248,10 +245,7 @@ def _look_elsewhere(compiled: Any) -> None:
 
 
 def _fingerprint(function: FunctionType) -> str:
-    """Digest of all that may be compiled into a function besides its own module.
-
-    What its module defines further down may be called, too: so all counts that the module has imported.
-    """
+    """Digest of all that may be compiled into a function besides its own module: everything that module imports."""
     seen = function.__globals__
     return _digest_of(text for name in seen for text in _compiled_in(name, seen[name], seen))
 
@@ -349,10 +343,7 @@ class Bands:
 
 
 def processors() -> int:
-    """Number of processors that this process may use: one where it is a worker, next to others that draw too.
-
-    Ray sets ``OMP_NUM_THREADS`` for its workers, and so do others that share out a machine.
-    """
+    """Processors that this process may use: 1 for a worker (``OMP_NUM_THREADS=1``) next to others that draw."""
     if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
         return 1
     if hasattr(os, "sched_getaffinity"):

@@ -40,8 +40,5 @@ def safe_speed(distance: float, reaction_time: float, deceleration: float, grade
 
 
 def decelerated_speed(speed: float, target: float, deceleration: float, step_length: float) -> float:
-    """Speed after one step [s] of slowing down to a target [m/s]; ``inf`` for a target of ``inf``, which is no limit.
-
-    A target above the speed is given back: speeding up is left to the vehicle's own acceleration.
-    """
+    """Speed after one step [s] of braking to a target [m/s]; a target above the speed, also ``inf``, is returned."""
     return target if math.isinf(target) else max(target, speed - deceleration * step_length)

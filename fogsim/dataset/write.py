@@ -194,10 +194,7 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
 
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of each file that a scenario's traffic and methods read, by name.
-
-    Files of the same name in different folders share an entry.
-    """
+    """SHA-256 of the files that a scenario's traffic and methods read, by name; same names share an entry."""
     setup = build.traffic_setup(scenario)
     # A road by template has files that no key names.
     files = [*([] if setup.net is None else [setup.net]), *setup.routes, *setup.additional]

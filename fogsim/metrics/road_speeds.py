@@ -44,7 +44,7 @@ class _Squares(NamedTuple):
 class RoadSpeeds:
     """Speeds along a road: the ego's way, passed to `update`, or else the route that spans name.
 
-    What is on an ego's way is known only when it has driven it: until then others' speeds wait in small squares.
+    Only afterwards is it known what was on the ego's way: until then, others' speeds are kept in small squares.
     """
 
     def __init__(self) -> None:

@@ -142,10 +142,7 @@ class RunDirectory:
         write_json(self.file("metrics"), metrics)
 
     def finish(self, manifest: Mapping[str, object]) -> None:
-        """Write the manifest, with the names of the files, and replace all earlier results by the new ones.
-
-        If rows are left that could not be made into a table, the earlier results and the folder of the new ones stay.
-        """
+        """Write the manifest and replace all earlier results; if rows are left over, both old and new ones stay."""
         finish_folder(self.path, manifest)
 
     def close(self) -> None:

@@ -21,10 +21,7 @@ CLOSING_LIMIT = 5.0
 
 
 class VideoRecorder:
-    """Writes a video (H.264, yuv420p): the camera's image with a panel of what is known and done (`frame_period` [s]).
-
-    A run without steps leaves no video.
-    """
+    """Writes a video (H.264, yuv420p), camera and panel, every `frame_period` [s]; none of a run without steps."""
 
     def __init__(
         self, path: Path, frame_period: float, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture

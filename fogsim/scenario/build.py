@@ -115,10 +115,7 @@ def _script(scenario: ScenarioFile) -> Script:
 
 
 def input_files(scenario: ScenarioFile) -> tuple[Path, ...]:
-    """Files that traffic and methods of a scenario read, and those that these name; InputError if SUMO's are missing.
-
-    Modules of methods are not among them.
-    """
+    """Files that traffic and methods (not their modules) read, or that these name; InputError if SUMO's are missing."""
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     files = [folder / path for path in named]
@@ -133,10 +130,7 @@ def input_files(scenario: ScenarioFile) -> tuple[Path, ...]:
 
 
 def named_files(scenario: ScenarioFile) -> tuple[Path, ...]:
-    """Files that parameters of methods and options of SUMO name, as seen from the scenario's folder.
-
-    Those that YAML files among them name in turn, such as the beams of a file of lamps, follow.
-    """
+    """Files that parameters and SUMO's options name, and those that YAML files among them name in turn."""
     folder = scenario.directory
     found = list(_files(_free_texts(deciding(scenario)), folder, Path()))
     for path in [one for one in found if one.suffix in (".yaml", ".yml")]:

@@ -78,7 +78,7 @@ def measure_lead(
 ) -> LeadMeasurement | None:
     """Measurement of the vehicle ahead; None if nothing is in view (`own_speed` [m/s], `bearing` [rad]).
 
-    Two numbers are drawn in every call, with a leader or without, so that what comes later never depends on it.
+    Every call draws two numbers, leader or not, so that what comes later never depends on it.
     """
     distance_noise, speed_noise = rng.standard_normal(2).tolist()
     if leader is None or share_of_reach <= 0.0 or leader.gap > share_of_reach * sensor.reach:

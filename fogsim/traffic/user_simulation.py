@@ -50,9 +50,9 @@ class _AttachedLink:
 
 
 class AttachedTraffic(SumoTraffic):
-    """SUMO traffic whose steps its owner commands: `obey` before each, `look` after it.
+    """SUMO traffic whose owner commands the steps: `obey` before each, `look` after it.
 
-    Of the setup's files only a network is used. SimulationError if no microscopic simulation runs there.
+    Only the setup's network is used. SimulationError if no microscopic simulation is running.
     """
 
     def __init__(self, setup: TrafficSetup, api: Api) -> None:

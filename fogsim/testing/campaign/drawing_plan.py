@@ -359,10 +359,7 @@ def _drawn_from(
 
 
 def _margins(results: Sequence[CaseResult]) -> NDArray[np.float64] | None:
-    """Margins of cases; None if all are unknown.
-
-    Unknown ones are 0 if the case failed, and otherwise the largest of the known.
-    """
+    """Margins of cases, None if all are unknown; unknown ones are 0 for a failure, or else the largest known."""
     margins = [margin_of(one) for one in results]
     known = [one for one in margins if one is not None]
     if not known:

@@ -63,10 +63,7 @@ def burning_head_lamps(lamps: int) -> float:
 
 @functools.lru_cache(maxsize=1024)
 def rear_intensity(lamps: int) -> float:
-    """Luminous intensity of the brightest rear lamp that is lit [cd].
-
-    Of two alike each is seen by itself, so that one that fails changes nothing as long as the other one burns.
-    """
+    """Luminous intensity of the brightest lit rear lamp [cd]; one of a pair counts like both."""
     kinds = _kinds_that_burn(lamps)
     third = THIRD_STOP_LAMP if burning(lamps, Side.MIDDLE) else 0.0
     return max(next((intensity for lamp, intensity in _REAR_LAMPS if kinds & lamp), 0.0), third)

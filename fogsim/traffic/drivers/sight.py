@@ -149,10 +149,7 @@ class DriverSight:
 
 
 def inherent_contrast(paint: tuple[float, float, float], airlight_share: float = AIRLIGHT_SHARE) -> float:
-    """Contrast of a vehicle's rear to the airlight, 0 … 1.
-
-    A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
-    """
+    """Contrast of a rear to the airlight, 0 … 1: a third is dark glass and tyres, the rest paint under half the sky."""
     reflectance = luminance_of(paint) * 2.0 / 3.0
     return max(0.0, 1.0 - _VERTICAL_ILLUMINANCE * reflectance / airlight_share)
 

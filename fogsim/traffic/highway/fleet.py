@@ -51,10 +51,7 @@ class Fleet:
         return float(1.0 / self.environment.config["simulation_frequency"])
 
     def name(self, vehicle: Any) -> str:
-        """Id of a vehicle or obstacle for the whole run: its kind and its place in the order of naming.
-
-        Those on the road at the beginning are named first, in the environment's own order.
-        """
+        """Id of a vehicle or obstacle for the whole run: its kind, and its place in the environment's order."""
         return self._names.setdefault(vehicle, f"{type(vehicle).__name__} {len(self._names)}")
 
     def known(self) -> frozenset[str]:

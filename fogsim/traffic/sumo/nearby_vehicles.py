@@ -40,7 +40,7 @@ class AllVehicles:
 class NearbyVehicles:
     """Finds the vehicles near the ego (`radius` [m]); one far away is asked again only when it could be near.
 
-    Nor are distances of those near computed before one of them could be far.
+    Distances of those near are computed only once one of them could be far.
     """
 
     def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
@@ -56,10 +56,7 @@ class NearbyVehicles:
         self._all_near_until = -math.inf
 
     def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        """Ids of those near in SUMO's order, the ego among them, and their positions (n, 3) [m].
-
-        As long as they are the same vehicles, the ids are the same object.
-        """
+        """Ids near the ego, with its own, in SUMO's order (the same object if alike), and positions (n, 3) [m]."""
         roster = self._roster
         roster.update()
         here = self._position(self._ego)

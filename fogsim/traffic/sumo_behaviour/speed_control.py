@@ -359,10 +359,7 @@ class SumoDesiredSpeeds:
         return np.array([allowed if UNKNOWN < allowed < top else self._allowed(v) for v, allowed, top in both])
 
     def _allowed(self, vehicle: str) -> float:
-        """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given.
-
-        Off the lanes it is ``inf``.
-        """
+        """What the road allows a driver [m/s], whatever top speed the vehicle was given; ``inf`` off the lanes."""
         allowed = float(self._allowed_speed(vehicle))
         if allowed == UNKNOWN:
             return math.inf

@@ -15,10 +15,7 @@ from fogsim.values import Stretch
 
 
 class _Piece(NamedTuple):
-    """An edge, also one inside a junction, and the positions along a road at which it begins and ends [m].
-
-    Those who overtake on the oncoming lane are on one of the opposite edges.
-    """
+    """An edge or way inside a junction, its ends along a road [m], and the oncoming edges on which others overtake."""
 
     edge: str
     start: float

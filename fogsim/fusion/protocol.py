@@ -48,11 +48,9 @@ class Fusion(Protocol):
         InputError
             If the instant is not finite or lies before the last one.
         """
-        ...
 
     def reset(self) -> None:
         """Forget everything."""
-        ...
 
 
 @runtime_checkable
@@ -80,11 +78,9 @@ class LocatedFusion(Protocol):
         InputError
             If the instant is not finite or lies before the last one.
         """
-        ...
 
     def reset(self) -> None:
         """Forget everything."""
-        ...
 
 
 class DatedFusion:

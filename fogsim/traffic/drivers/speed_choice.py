@@ -101,7 +101,6 @@ class SpeedChoice(Protocol):
 
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter (`visibility` [m])."""
-        ...
 
 
 def speed_share(choice: SpeedChoice, visibility: float) -> float:

@@ -98,12 +98,10 @@ class RoadTemplate(Protocol):
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
         """The road (`cuts` [m])."""
-        ...
 
     @property
     def free_length(self) -> float:
         """How far from its beginning the ego's way may be cut [m]."""
-        ...
 
 
 ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(

@@ -38,7 +38,7 @@ from fogsim.scenario import Scenario, build, resolved
 from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.units import finite_or_none
-from fogsim.values import Camera, CameraPose, Ending, Observation, Step
+from fogsim.values import Camera, CameraPose, Ending, Step
 
 _CATEGORIES = [
     {"id": int(kind), "name": kind.name.lower(), "supercategory": "sign" if kind is SemanticClass.SIGN else "vehicle"}
@@ -63,7 +63,7 @@ def _frame_record(step: Step) -> dict[str, Any]:
         "lead_distance_m": None if observation.lead is None else observation.lead.distance,
         "camera": {
             "true": _calibration(truth.camera),
-            "told": _calibration(_assumed_camera(observation)),
+            "told": _calibration(getattr(observation.frame, "camera", None)),
             "pose": _pose(truth.pose),
         },
         "signs": [
@@ -151,10 +151,6 @@ def _coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) 
         "images": images,
         "annotations": annotations,
     }
-
-
-def _assumed_camera(observation: Observation) -> Camera | None:
-    return getattr(observation.frame, "camera", None)
 
 
 def _calibration(camera: Camera | None) -> dict[str, Any] | None:

@@ -170,7 +170,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             pictures=self._pictures(),
             signs=self._signs(),
             most_signs=_MOST_SIGNS,
-            footer=_footnotes(information.seed),
+            footer={"seed": str(information.seed), **{k: v or "not installed" for k, v in versions().items()}},
             label=_label,
             value=shown_metric,
             jpeg=_jpeg,
@@ -205,7 +205,3 @@ class ReportRecorder(StepReport[Step]):
 
     def _signs(self) -> Sequence[SignRow]:
         return self._book.rows
-
-
-def _footnotes(seed: int) -> Mapping[str, str]:
-    return {"seed": str(seed), **{name: version or "not installed" for name, version in versions().items()}}

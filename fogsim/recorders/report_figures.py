@@ -87,9 +87,6 @@ class Curves:
         self.collisions.extend(map(step.time_of, step.collisions))
         self.warning.append(step.command.warning)
         self.ahead.add(step)
-        self._add_estimates(step)
-
-    def _add_estimates(self, step: Step) -> None:
         for estimate in step.estimates:
             points = self.estimates.setdefault(estimate.method, [])
             if estimate.valid and math.isfinite(estimate.visibility):

@@ -22,7 +22,7 @@ def write_sign_map(
     path: Path, signs: SignMap, name: str, geographic: Callable[[float, float], LonLat] | None = None
 ) -> None:
     """Write a sign map as a GeoJSON FeatureCollection of points (`geographic` [m], [deg])."""
-    place = geographic or _as_they_are
+    place = geographic or (lambda x, y: (x, y))
     write_json(
         path,
         {
@@ -32,10 +32,6 @@ def write_sign_map(
             "features": [_feature(sign, place) for sign in signs.signs],
         },
     )
-
-
-def _as_they_are(x: float, y: float) -> LonLat:
-    return x, y
 
 
 def _feature(sign: Sign, place: Callable[[float, float], LonLat]) -> dict[str, object]:

@@ -72,7 +72,7 @@ class NearbyVehicles:
         come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])
-        position = self._positions(self._near)
+        position = positions_of(self._near, self._position)
         if has_jumped or come_near or roster.time >= self._all_near_until:
             position = self._drop_far(position, here)
         return self._near, position
@@ -126,9 +126,6 @@ class NearbyVehicles:
         if not new:
             return due
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
-
-    def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        return positions_of(vehicles, self._position)
 
 
 def positions_of(vehicles: Sequence[str], position: Callable[[str], Sequence[float]]) -> NDArray[np.float64]:

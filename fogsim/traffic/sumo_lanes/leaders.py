@@ -145,12 +145,11 @@ class Leaders:
             lanes = range(1 if edge.startswith(":") else int(self._api.edge.getLaneNumber(edge)))
             nearest = sorted(lanes, key=lambda other: abs(other - int(number)))
             candidates = [lane] if edge.startswith(":") else [f"{edge}_{other}" for other in nearest]
-            ways = (self._way_of(link) for one in candidates for link in self._links(one) if _leads_to(link, following))
+            links = (link for one in candidates for link in self._links(one))
+            there = (link for link in links if link[0].rpartition("_")[0] == following)
+            ways = ((*inner_lanes(self._links, link[4]), link[0]) for link in there)
             known = self._ways[lane, following] = next(ways, ())
         return known
-
-    def _way_of(self, link: Sequence[str]) -> tuple[str, ...]:
-        return (*inner_lanes(self._links, link[4]), link[0])
 
     def _from(self, edge: str, station: float) -> Iterator[_Spot]:
         """Vehicles on an edge whose fronts are past a station [m], in their order."""
@@ -174,11 +173,6 @@ class Leaders:
             # SUMO counts from where the oncoming lane begins.
             station = float(self._lane_length(lane)) - station
         return _Spot(vehicle, lane, is_against, station, self._spots.across(vehicle, lane), *size)
-
-
-def _leads_to(link: Sequence[str], edge: str) -> bool:
-    """Whether a link of a lane leads to an edge."""
-    return link[0].rpartition("_")[0] == edge
 
 
 class Courses:

@@ -66,9 +66,6 @@ class CrossingWay:
         left, others_left = self.link.direction == "l", other.link.direction == "l"
         if left != others_left:
             return left
-        return self._comes_before(other)
-
-    def _comes_before(self, other: "CrossingWay") -> bool:
         return clockwise_from_north(self.source) < clockwise_from_north(other.source)
 
     def is_opposite(self, other: "CrossingWay") -> bool:

@@ -13,8 +13,6 @@ kind of drive and fusion:
 
 ``reported`` gives the field filter what a vehicle 300 m ahead measures (deviation 10 %, every second, a second late).
 Constants were chosen on pool 0 (other seeds, banks and cameras); pool 1 is what is reported.
-
-    python benchmarks/belief.py [--json] [--docs] [--pool 1]
 """
 
 import math

@@ -3,8 +3,6 @@
 Each broken device takes the place of the sound one in the shipped scenarios that expect something and may use it, the
 shortest first, until one fails. The sound device comes first, and must pass them all. The exit code is 1 if it does
 not, or if a broken one fails nowhere.
-
-    python benchmarks/broken_devices.py [--json] [--docs] [--all] [-j 2] [--devices …] [--scenarios FILES …]
 """
 
 import math

@@ -11,8 +11,6 @@ is off by 0.1° (standard deviation).
 Of the frames in fog: `valid`, `median/p95` of |V_est − V| / V [%], `hold` (90 % intervals that contain the truth) and
 `wrong` (more than 1.5 times off with an interval that excludes the truth). `false` counts clear frames whose answer has
 an upper end: below 1000 m, in views that are no lane anywhere. No constant is chosen on the frames of pool 1.
-
-    python benchmarks/camera_kinds.py [--images 4] [--pool 1] [--methods joint_road …] [--kinds film …] [--docs]
 """
 
 import itertools

@@ -5,8 +5,6 @@ compiled. Processor time says more than wall time on a machine that does other w
 kernels the runs kept.
 
 It measures the FogSim of the Python that runs it: away from the checkout, that of an environment with a wheel.
-
-    python benchmarks/cold_start.py [--json] [--repeat 3] [--scenario motorway_fog_bank ...]
 """
 
 import os

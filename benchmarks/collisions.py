@@ -10,9 +10,6 @@ as they enter, and complies without delay). Protocols:
 - ``full_road``: the scenario's own demand. The road has filled for 180 s when the ego comes and advice begins, for all
   on it and for all who enter; after 160 s the run ends.
 
-    python benchmarks/collisions.py [--json] [--docs] [--seeds 8] [--visibility 20 40 60]
-                                    [--protocol from_the_beginning full_road] [--speed-choice observed unaffected]
-
 Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the mean over seeds.
 """
 

@@ -2,8 +2,6 @@
 
 Mean return with its 95 % interval and its terms over the same episodes of the split "test" for each policy, and what
 was gained over dark signs in the same episodes, too; half an hour for 30 episodes.
-
-    python benchmarks/corridor.py [--episodes 6] [--json] [--policy rule …]
 """
 
 from collections.abc import Callable

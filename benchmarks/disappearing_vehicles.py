@@ -14,8 +14,6 @@ levels. For each visibility:
 ``ms``           median time of an update
 
 Constants were chosen on pool 0 (other cameras and vehicles); pool 1 is what is reported.
-
-    python benchmarks/disappearing_vehicles.py [--json] [--docs] [--pool 1]
 """
 
 import math

@@ -7,8 +7,6 @@ denser fog is then announced by two successive frames in place of most of eleven
 the metrics `fog_warning_lead_m` and `false_fog_warnings`. The constants of `fogsim.advice.warning` were chosen on other
 seeds (101 to 106, and 301 to 308 of even fog).
 
-    python benchmarks/driver_warnings.py [--json] [--docs] [--seeds 10] [--drives 3] [--keep FILE]
-
 `--keep FILE` writes what is measured to a file as it comes; a later call goes on from there.
 """
 

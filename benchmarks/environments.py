@@ -5,8 +5,6 @@ that resets take between two steps is not counted. highway-fast-v0, which draws 
 the same process, so that what else the machine does slows both: their ratio holds where speeds do not.
 
 An id that makes vectors only is one of 256 environments, whose steps are counted each, and whose resets are by one.
-
-    python benchmarks/environments.py [--json] [--env ID …] [--kwargs JSON] [--steps 100] [--repeat 3] [--resets 5]
 """
 
 import argparse

@@ -12,9 +12,6 @@ of 90 % intervals of k that hold the truth, of valid ones. `class_share` is the 
 zhu2015's four classes, `class_off_edge_share` that of frames whose visibility is more than 5 % from an edge (100, 300,
 1000 m). `ms` is the fastest at 688×515, on one core.
 
-    python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--cameras 4] [--scenes 12] [--draws 4]
-        [--workers 2] [--surface dry] [--repairs 0.05] [--keep FILE]
-
 `--surface` and `--repairs` are the scenario's `pavement`: roads that brighten towards the horizon, and change along it.
 `--keep FILE` writes what is measured to a file as it comes; a later call with the same arguments goes on from there.
 """

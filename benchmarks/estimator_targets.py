@@ -13,8 +13,6 @@ is the share of estimates that count, `coverage` the share of their 90 % interva
 row. The worst group is that of a cell's cameras, airlights, visibilities, paints or changes with the largest 95th
 percentile. Several fogs are laid on one drawing: a cell of 120 images at `--images 24` has 24 drawings.
 
-    python benchmarks/estimator_targets.py [--json] [--docs] [--images 24] [--seed 0] [--keep FILE]
-
 `--keep FILE` writes what is measured to a file as it comes; a later call with the same seed goes on from there, also
 with more images.
 """

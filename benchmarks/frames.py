@@ -11,9 +11,6 @@ camera's own low beam and everyone's lamps light it; `photons` is the day with t
 2.5 m a frame, over 50 m and again from the start. Repetitions of all cases alternate, and each record has the median of
 the repetitions' medians, the fastest frame, and each stage's median; on a machine that does other work too, only the
 fastest says something.
-
-    python benchmarks/frames.py [--json] [--docs] [--renderer cpu ...] [--light night ...] [--size 640x480 ...]
-        [--samples 2 ...] [--frames 60] [--repeat 5]
 """
 
 import itertools

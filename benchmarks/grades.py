@@ -7,9 +7,6 @@ with the end. Bends of 400 and 800 m to either side are drawn by a renderer that
 kind of road and method: frames, share of valid ones, median of the error of V_met [%] with its sign, median and 95th
 percentile of its amount, and how often the 90 % interval held the truth. ``belief`` is what the grid filter makes of
 all of them on the drive.
-
-    python benchmarks/grades.py [--json] [--docs] [--visibility 100 --visibility 500 …] [--seed 1] [--duration 180]
-                                [--drawings 4]
 """
 
 import math

@@ -5,8 +5,6 @@ The closed loop runs on the motorway or in the town of `traffic.py`, in fog of 1
 median processor time of a frame, and `exponent` the slope of its logarithm by that of the size over the line: 0 does
 not grow, 1 grows in proportion. Most of a frame does not depend on any of them, so that exponents of large sizes, from
 the last two levels, are given too.
-
-    python benchmarks/growth.py [--docs] [--lines vehicles …] [--frames 40]
 """
 
 import math

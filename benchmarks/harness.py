@@ -43,15 +43,18 @@ def parse_options(
     for name, (default, meaning, *choices) in options.items():
         flag = f"-{name}" if len(name) == 1 else f"--{name.replace('_', '-')}"
         allowed: dict[str, Any] = {"choices": list(choices[0])} if choices else {}
+        usual = default if isinstance(default, list) else [default]
+        said = not isinstance(default, bool | type) and usual not in ([""], allowed.get("choices"))
+        allowed["help"] = meaning + (f" ({' '.join(map(str, usual))})" if said else "").replace("%", "%%")
         if isinstance(default, bool):
-            parser.add_argument(flag, action="store_true", help=meaning)
+            parser.add_argument(flag, action="store_true", **allowed)
         elif isinstance(default, type):
-            parser.add_argument(flag, type=default, help=meaning, **allowed)
+            parser.add_argument(flag, type=default, **allowed)
         elif isinstance(default, list):
             lists[name] = default
-            parser.add_argument(flag, type=type(default[0]), nargs="+", action="extend", help=meaning, **allowed)
+            parser.add_argument(flag, type=type(default[0]), nargs="+", action="extend", **allowed)
         else:
-            parser.add_argument(flag, type=type(default), default=default, help=meaning, **allowed)
+            parser.add_argument(flag, type=type(default), default=default, **allowed)
     given = parser.parse_args()
     for name, default in lists.items():
         if getattr(given, name) is None:

@@ -8,9 +8,6 @@ in it, and refused by who has come within 10 m of the crossing before it begins 
 Of all seeds together: accepted gaps at the quantiles 0 (smallest), 15 % and 50 % [s], the largest refused one [s], the
 share of gaps below 5 s that are accepted, collisions in 1000 crossings with the mean of their impact speeds [m/s], and
 vehicles of the first road that brake harder than 4.5 m/s², in 1000 crossings.
-
-    python benchmarks/junctions.py [--json] [--docs] [--visibility inf 60 20] [--seeds 5] [--minutes 30]
-        [--drivers sumo unaffected observed]
 """
 
 import argparse

@@ -8,9 +8,6 @@ radar's noisy range. An error is |V_est − V| / V after the last
 frame, of estimates that are valid and see fog; `bias_pct` is the median of (V_est − V) / V, `coverage` the share of
 90 % intervals of k that hold the truth, `ms` the fastest mean time of a frame. `airlight`, `camera` and `vehicle` are
 "all" in the first records, then each in turn is distinguished over visibilities from 50 to 300 m.
-
-    python benchmarks/lead_accuracy.py [--json] [--docs] [--methods …] [--cameras 3] [--vehicles 5] [--others]
-        [--step 2.5]
 """
 
 import argparse

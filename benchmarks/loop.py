@@ -7,9 +7,6 @@ With --against, another version (a commit, whose files are extracted to build/ag
 take each step in turn, in two processes of one thread. Their ratio of processor time holds on a busy machine too.
 Ratios below 1 mean that this version is faster; against itself it shows the noise. Stages are timed by a profiler,
 which slows Python down but not kernels: compare a stage with itself in the other version, not stages with each other.
-
-    python benchmarks/loop.py [--json] [--peer | --against COMMIT] [--size 160x120 --size 640x480]
-                              [--method shipped --method negru2013] [--steps 60] [--repeat 3]
 """
 
 import argparse

@@ -6,9 +6,6 @@ which the traffic is read in each step. In clear air (V_met infinite) every vehi
 are in SUMO alone: ``same`` compares the files of floating car data (place, speed, acceleration, lane, angle; in each
 second, with 12 digits after the point).
 
-    python benchmarks/networks.py [--json] [--seconds 600] [--visibilities inf 100 30] [--networks grid rail …]
-        [--step 0.2] [--per-hour 1500] [--one-process]
-
 ``collisions`` are pairs of vehicles, ``teleports`` those that SUMO takes out of jams and blockades, ``cpu_s`` the time
 of the run. The exit code is 1 if a run fails, or if one in clear air is not the same. Traffic of the netgenerate
 networks: ``--per-hour`` vehicles.

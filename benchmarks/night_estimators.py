@@ -8,8 +8,6 @@ with the beam's pattern known or not. All are 640×480 pixels. Errors are |V_est
 `bounded` answers have a bound in place of a value; `holds`: share of 90 % intervals and bounds that hold the truth;
 `lower`, `upper`: medians of their ends. Constants were chosen on `--pool 0`; what is reported is of `--pool 1`, where
 one beam is not among those of pool 0.
-
-    python benchmarks/night_estimators.py [--json] [--docs] [--pool 1] [--images 40] [--part all]
 """
 
 import functools

@@ -11,8 +11,6 @@ error of an estimate decides; the last line leaves these out.
 were chosen: other visibilities of four scenarios and seed 100. `valid` is the share of images with an estimate,
 `bounded` that with a bound alone, `ratio` the median of estimated over true visibility, `holds` and `belief holds` the
 shares of 90 % intervals of images and of informed beliefs that hold the truth.
-
-    python benchmarks/night_lamps.py [--json] [--docs] [--seeds 3] [--policy gallen2014] [--choose]
 """
 
 from collections.abc import Iterator

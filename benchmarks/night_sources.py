@@ -3,8 +3,6 @@
 For docs/explanation/night.md: a threshold is calibrated on one pool of scenes and fog counted on another, also at
 exposures and strengths of lamps that the calibration did not see. Constants were chosen on ``--pool 1`` and 2; what is
 reported is of 7.
-
-    python benchmarks/night_sources.py [--json] [--docs] [--pool 7] [--count 120] [--small]
 """
 
 import math

@@ -4,8 +4,6 @@ Nothing is prepared: calibrations of the camera are made on the first run. Error
 estimates, V the visibility ahead; `coverage` is the share of them whose 90 % interval holds V. `gallen2014_halo` shows
 whether there is fog and gives a bound, not a visibility: `bounds` is the share of frames with a bound and no estimate,
 `bounds_hold` the share of those that hold V, 10 % aside.
-
-    python benchmarks/paper_methods.py [--json] [--docs] [--seeds 3]
 """
 
 from harness import Row, lines_of, mean, parse_options, publish

@@ -10,8 +10,6 @@ Constants are to be chosen on pool 0; pool 1, other roads and other cameras, is 
 Errors are |V_est − V| / V of valid estimates in %; an infinite estimate is an error of 999 %. `bias` is the median of
 ln(V_est / V) in %, `coverage` the share of 90 % intervals of k that hold the truth, `valid` the share of pictures with
 an estimate.
-
-    python benchmarks/photograph_roads.py [--json] [--docs] [--pool 1] [--images 60] [--methods joint_road …]
 """
 
 import math

@@ -6,8 +6,6 @@ of valid estimates [%]; `held` is the share of 90 % intervals that hold the trut
 valid.
 
 Constants were chosen on pool 0, whose drives are others; pool 1 is what is reported.
-
-    python benchmarks/photon_fog.py [--json] [--docs] [--pool 1] [--drives 4] [--droplets moderate_radiation …]
 """
 
 from collections.abc import Iterator

@@ -8,8 +8,6 @@ The first quarter of the resets is not counted (libraries load, caches fill, the
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
 separates a leak from scattered free memory.
 
-    python benchmarks/resets.py [--json] [--resets 200] [--size 64x48] [--part environment …]
-
 The soak test is ``python benchmarks/resets.py --resets 1000``.
 """
 

@@ -15,10 +15,7 @@ photon and read noise, 8 bits, sRGB, the airlight at 200 of 255 levels of light)
 
 Methods: ``foggy``, the picture as it is; ``planar`` with the extinction that joint_road estimates in the same picture;
 ``planar, k known``; ``dark_channel``; ``tarel2009``. Constants were chosen on pool 0 (other visibilities, vehicles,
-camera, places); pool 1 is what is reported.
-
-    OMP_NUM_THREADS=1 python benchmarks/restoration.py [--json] [--docs] [--pool 1] [--step 0.1] [--vehicles 3]
-        [--visibilities 60 …] [--picture docs/pictures/restoration.jpg]
+camera, places); pool 1 is what is reported. Run it with OMP_NUM_THREADS=1, for the times of one core.
 """
 
 import argparse

@@ -7,8 +7,6 @@ the camera on in whose middle a report is. Then come dusk, and the bank of highw
 1500 and 2700 m, 1 km elsewhere. The time is that of drawing, taking and reading an image by day [ms].
 
 Mount, view and position of the cameras were chosen on ``motorway_fog_bank``, which is not among the roads.
-
-    python benchmarks/roadside_cameras.py [--docs] [--seeds 3]
 """
 
 import math

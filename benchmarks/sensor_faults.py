@@ -5,9 +5,6 @@ for five. `valid` is the share of frames in which the method says something, `er
 these, `outside` their share whose 90 % interval of k does not hold the truth. `low` … `high` is the 90 % interval of
 the belief at the fault's end by this method alone, over all seeds from the lowest to the highest; a method is `fooled`
 if the belief of any seed leaves the truth out.
-
-    python benchmarks/sensor_faults.py [--json] [--docs] [--faults …] [--methods …] [--seeds 3] [--visibility 150]
-        [--seconds 5]
 """
 
 import argparse

@@ -8,9 +8,6 @@ and Gruyer 2015); `recall_half_pct` is the share detected between 0.4 and 0.5 of
 the map's regions, a frame, that are no sign: `with` one standing there, and where the map is wrong and there is none
 (`without`). Times are of one processor: projection, detection and registration of three signs, and a whole frame.
 Constants were chosen with `--pool 0`; what is reported is of `--pool 1`.
-
-    python benchmarks/sign_detector.py [--json] [--docs] [--pool 1] [--draws 12] [--pictures fogsim painted]
-        [--kinds stop …] [--visibilities 50 …] [--distances 10 …] [--frames 20]
 """
 
 import argparse

@@ -7,8 +7,6 @@ share of signs is missing, moved by 15 m along the road, turned by 40° or of an
 of every valid estimate, `final` of the last one of a drive; `coverage` is the share of 90 % intervals of k that hold
 the truth, `bounds` the share of bounds that do. Constants were chosen on `--pool 0`; what is reported is of `--pool
 1`.
-
-    python benchmarks/sign_estimators.py [--json] [--docs] [--pool 1] [--drives 8] [--wrong 0 0.2] [--visibilities 60 …]
 """
 
 import itertools

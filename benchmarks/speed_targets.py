@@ -2,8 +2,6 @@
 
 It runs loop.py, frames.py, traffic.py and cold_start.py, about 10 minutes on a quiet machine. Ratios are of processor
 time, which other work disturbs little; only the first run is wall time.
-
-    python benchmarks/speed_targets.py [--json] [--docs] [--then c4d9aa66] [--repeat 2]
 """
 
 import json

@@ -11,8 +11,6 @@ Drives on straight and graded motorways and in a city, in traffic, in fog from 5
 
 ``ms`` is the time of one estimate, ``ms_rig`` how much longer a step takes with a second camera than without. Constants
 were chosen on pool 0 (other seeds, rigs and visibilities); pool 1 is what is reported.
-
-    python benchmarks/stereo.py [--json] [--docs] [--pool 1]
 """
 
 import math

@@ -4,9 +4,6 @@ Episodes of fogsim/FogAdvisory-v2 are run with frames, half of them by the built
 the first estimator that answers are compared with those that the surrogate draws for the same fog, light and times: by
 the share of valid estimates, and by the largest distance between the two distributions of ln(estimated / true k)
 (Kolmogorov-Smirnov), for each light and each class of visibility with 30 estimates or more.
-
-    python benchmarks/surrogate.py [--json] [--episodes 60] [--split test]
-    python benchmarks/surrogate.py --fit          # writes the table again, from episodes of the split "train"
 """
 
 import itertools

@@ -5,8 +5,6 @@ fogged with one visibility (see `estimator_scenes.py`). Each is read twice by a 
 camera's pitch stated 0.1° too high or too low, its focal length stated 10 % too long, or its mount 10 % too high.
 ``median_pct`` is the median of the change of V_met, ``median_size_pct`` and ``p95_size_pct`` the median and the 95th
 percentile of its size [%]; ``valid_share`` the share of pictures in which both readings are valid.
-
-    python benchmarks/told_calibration.py [--json] [--methods …] [--visibilities 100 400] [--cameras 4] [--scenes 6]
 """
 
 import argparse

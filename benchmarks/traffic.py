@@ -13,8 +13,6 @@ either kind, which other work on the machine disturbs least. ``ms_state`` is the
 
 The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share. The town needs SUMO's
 netgenerate and netconvert (eclipse-sumo); without them only the motorway is measured.
-
-    python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10]
 """
 
 import dataclasses

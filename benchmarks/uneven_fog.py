@@ -12,8 +12,6 @@ The drives in clear air (V_met 2000 m and more; `--clear` minutes of them) count
 `joint_road` reports denser fog, so that after one drive in each haze on each road it drives without the others.
 
 Constants were chosen on pool 0 (other seeds, visibilities and camera); pool 1 is what is reported.
-
-    python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 75] [--only bank] [--docs]
 """
 
 import math

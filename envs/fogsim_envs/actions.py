@@ -16,12 +16,10 @@ ActionSpace = spaces.Discrete | spaces.MultiDiscrete | spaces.Box
 
 
 def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArray[Any]:
-    """An action as an array of its space's shape and type.
+    """An action as an array of its space's shape and type, the caller's own.
 
     Members are taken as libraries give them: numbers, lists and tuples, and arrays of any type of numbers, as far as
     nothing is lost (3.0 is a level, 3.5 is none).
-
-    Returns of the space's shape and type: () for a `Discrete`. It is the caller's own.
     """
     if not isinstance(space, ActionSpace):
         raise InputError(f"action of {name}: {space} has no check; expected a Discrete, MultiDiscrete or Box")

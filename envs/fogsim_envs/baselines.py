@@ -79,10 +79,7 @@ class _BuiltInRule(_Unremembering):
 
 
 class _Oracle(_Unremembering):
-    """Knows the sight ahead, and takes the speed at which each metre costs least by the reward's weights.
-
-    It knows nothing of what others will do, so it is no upper bound.
-    """
+    """Knows the sight ahead and minimises the reward's cost a metre; blind to what others will do: no upper bound."""
 
     def __init__(self, action_space: spaces.Space[Any], weights: TaskWeights | None = None) -> None:
         super().__init__(action_space)

@@ -31,6 +31,8 @@ from fogsim.values import Command, FogField, RoadNetwork, SignMap, Step
 from fogsim_envs.highway import Visibility, highway_config, highway_scenario
 from fogsim_envs.spaces import LAMP_MODES, ImageSize, observation_space, observe
 
+__all__ = ["FogCameraWrapper"]
+
 _COMMAND = Command(lamps=LAMP_MODES[0])
 
 

@@ -22,10 +22,7 @@ _DATA_SET = re.compile(r"([-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")
 def record_demonstrations(
     name: str, env_id: str, episodes: Annotated[int, Range(1, math.inf)], data_set: str, **arguments: Any
 ) -> Any:
-    """Run a baseline and keep its episodes.
-
-    Returns the data set.
-    """
+    """Run a baseline, and keep its episodes as a data set."""
     if _DATA_SET.fullmatch(data_set) is None:
         raise InputError(f"data_set: expected an id such as 'fogsim/advisory/rule-v1', got {shown(data_set)}")
     minari = _import_minari()

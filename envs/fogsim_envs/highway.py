@@ -142,34 +142,13 @@ def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
 
 
 def highway_config(environment: Any) -> Mapping[str, Any]:
-    """Configuration of a highway-env environment without wrappers.
-
-    Parameters
-    ----------
-    environment : object
-        The environment.
-    """
+    """Configuration of a highway-env environment without wrappers."""
     config: Mapping[str, Any] = environment.config
     return config
 
 
 def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Sequence[str]) -> Scenario:
-    """Scenario of a highway-env environment in homogeneous fog.
-
-    Parameters
-    ----------
-    config : mapping
-        The environment's configuration.
-    visibility : float
-        Meteorological visibility [m].
-    overrides : sequence of str
-        ``key.path=value`` each.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit.
-    """
+    """Scenario of a highway-env environment in homogeneous fog of a visibility [m]; InputError if overrides misfit."""
     duration = [f"duration_s={float(config['duration'])!r}"] if "duration" in config else []
     fog = f"fog.visibility_m={float(visibility)!r}"
     margin = f"traffic.stop_before_end_m={_END_MARGIN!r}"

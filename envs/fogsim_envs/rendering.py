@@ -58,10 +58,7 @@ class StepRenderer:
         self._drawn: tuple[Step, NDArray[np.uint8]] | None = None
 
     def show(self, step: Step, rate: float) -> None:
-        """Show a step that was just made if there is a window; it stands there as long as the step takes.
-
-        Takes `rate` [1/s].
-        """
+        """Show a step that was just made, if there is a window, for as long as the step takes (`rate` [1/s])."""
         if self._mode == "human":
             self._window.show(self._picture(step), rate)
 

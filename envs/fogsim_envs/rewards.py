@@ -63,10 +63,7 @@ def advice_standard(scenario: Scenario) -> SafetyStandard:
 def reward_terms(
     before: Step, after: Step, weights: RewardWeights, standard: SafetyStandard = DEFAULT_STANDARD
 ) -> dict[str, float]:
-    """Weighted terms of the reward for one decision period.
-
-    Returns terms by name; the reward is their sum.
-    """
+    """Weighted terms, by name, whose sum is the reward for one decision period."""
     ego = after.traffic.ids[after.ego]
     speed = float(after.traffic.speed[after.ego])
     driven = after.route_position - before.route_position

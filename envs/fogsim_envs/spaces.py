@@ -56,13 +56,7 @@ LAMP_MODES = (
 
 
 def observation_space(camera: Camera) -> spaces.Dict:
-    """Space of observations with images of a camera's size and bit depth.
-
-    Parameters
-    ----------
-    camera : Camera
-        The calibration of the ego's camera.
-    """
+    """Space of observations with images of a camera's size and bit depth."""
     pixels = np.uint8 if camera.bits == 8 else np.uint16
     return spaces.Dict(
         {
@@ -84,13 +78,7 @@ def action_space(continuous: bool, levels: tuple[int, int] = ACTION_LEVELS) -> s
 
 
 def observe(step: Step) -> dict[str, NDArray[Any]]:
-    """Observation of a step: only what the vehicle itself has. Every array is the caller's own.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    """
+    """Observation of a step: only what the vehicle itself has. Every array is the caller's own."""
     signs, mask = observed_signs(step)
     return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": _state(step)}
 

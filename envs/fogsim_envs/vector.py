@@ -41,10 +41,7 @@ def make_vector(
     autoreset_mode: AutoresetMode | Literal["NextStep", "SameStep", "Disabled"] = AutoresetMode.NEXT_STEP,
     **kwargs: Any,
 ) -> AsyncVectorEnv:
-    """Make a vector environment that reports lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
-
-    Takes `timeout` [s].
-    """
+    """Make a vector environment that reports lost processes, unlike `gymnasium.make_vec` in its mode ``async``."""
     limit, make = checked_timeout(timeout), functools.partial(_wrapped, id, tuple(wrappers), kwargs)
     # A GL context does not survive a fork.
     context = context or ("forkserver" if "OpenGL" in sys.modules else None)

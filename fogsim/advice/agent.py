@@ -85,16 +85,7 @@ class _TrainedAgent:
     """A network that drives: ``onnx:policy.onnx`` has its weights, and the spaces as the shapes of input and output.
 
     It is given `AGENT_STATE`, entries of ``state`` of ``fogsim/FogDrive-v1``, and gives the first entry of its
-    continuous action, clipped to −1 … 1. It keeps nothing between calls.
-
-    Parameters
-    ----------
-    name : str
-        Name of the method.
-    network : OnnxNetwork
-        Its network.
-    time_limit : float or None
-        Limit of each call [s].
+    continuous action, clipped to −1 … 1. It keeps nothing between calls, each within `time_limit` [s].
     """
 
     def __init__(self, name: str, network: OnnxNetwork, time_limit: float | None) -> None:
@@ -103,20 +94,7 @@ class _TrainedAgent:
         self._outputs = guarded_call(functools.partial(network.outputs), self._who, None, time_limit)
 
     def control_by_belief(self, observation: Observation, belief: Belief) -> Control:
-        """Drive; see `BeliefController.control_by_belief`.
-
-        Parameters
-        ----------
-        observation : Observation
-            Sensor readings of the vehicle.
-        belief : Belief
-            What is believed about the fog.
-
-        Raises
-        ------
-        MethodError
-            If the network fails, or does not give a number.
-        """
+        """Drive; see `BeliefController.control_by_belief`."""
         (found,) = self._outputs(clipped(agent_state(observation, belief))[None])
         if found.size != 1 or not np.isfinite(found).all():
             raise MethodError(f"{self._who}: expected {_OUTPUT}; got {found.tolist()} at {observation.time:g} s")

@@ -57,18 +57,7 @@ class OsiController:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def control(self, observation: Observation) -> Control:
-        """Send what was measured and wait for the request; see `Controller.control`.
-
-        Parameters
-        ----------
-        observation : Observation
-            Sensor readings of the vehicle.
-
-        Raises
-        ------
-        MethodError
-            If no MotionRequest comes in time, or one that FogSim cannot honour.
-        """
+        """Send what was measured and wait for the request; MethodError without one in time that FogSim can honour."""
         message = self._sensor_data(observation)
         try:
             self._socket.settimeout(self._timeout)

@@ -20,13 +20,11 @@ def harmonised_speeds(
     largest_step: float,
     deceleration: float,
 ) -> tuple[float, ...]:
-    """Advised speeds, lowered where the next section downstream is advised much less.
+    """Advised speeds [m/s], lowered where the next section downstream (of `lengths` [m]) is advised much less.
 
     A section shows no more than the next one and a step, and no more than √(v² + 2 a d), from which a steady
     deceleration a along its length d comes down to the next one's v. Motorways do the same: Dutch gantries by 20
     km/h (90, 70, 50), I-77 in Virginia by at most 15 mph from sign to sign (VTRC 19-R6, 2018).
-
-    Takes `speeds` [m/s], `lengths` [m], `limits` [m/s], `largest_step` [m/s], `deceleration` [m/s²].
     """
     shown, down = list(speeds), speeds[-1] if speeds else math.inf
     for place in reversed(range(len(shown) - 1)):

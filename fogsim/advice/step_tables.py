@@ -136,13 +136,7 @@ class VirginiaI77(PresentedAdviser):
     minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = field(default=30.0 * _MPH, kw_only=True)
 
     def speed_at(self, visibility: float) -> float:
-        """Speed from which one stops in sight; see `PresentedAdviser.speed_at`.
-
-        Parameters
-        ----------
-        visibility : float
-            Meteorological visibility [m].
-        """
+        """Speed from which one stops in sight; see `PresentedAdviser.speed_at`."""
         if visibility >= _I77_VISIBILITY:
             return math.inf
         in_sight = safe_speed(visibility, REACTION_TIME, DECELERATION)

@@ -49,10 +49,7 @@ _FADING = 10.0
 def choose_warning(
     belief: Belief, observation: Observation, time: float, previous: Command
 ) -> tuple[DriverWarning | None, WarningMemory]:
-    """Choose the warning to give.
-
-    Returns the warning, and what to remember. Takes `time` [s].
-    """
+    """The warning to give at a `time` [s], and what to remember."""
     before = previous.warning_memory
     cautious = belief.known_visibility(_CAUTIOUS)
     late = before.visibility * math.exp(-max(time - before.time, 0.0) / _FADING)
@@ -73,14 +70,12 @@ def choose_warning(
 
 
 def is_fog_in_the_way(belief: Belief, speed: float) -> bool:
-    """Whether denser fog is announced, or a driver will likely see less far than it takes to stop.
+    """Whether denser fog is announced, or a driver will likely see less far than it takes to stop (`speed` [m/s]).
 
     The fog counts that is seen, and that at all places which the vehicle reaches within `TAKE_OVER_TIME`, as far as the
     belief knows of them. Where one sees less far than it takes to stop, the confidence of an image of an obstacle at
     that distance, e^(−2kd) of huang2015 (section 4.3.2), is below e^(−2 ln 20) = 1/400: no detector finds it, and the
     driver has to take over (section 1.2).
-
-    Takes `speed` [m/s].
     """
     needed = stopping_sight_distance(speed, REACTION_TIME, DECELERATION)
     if belief.denser is not None and visibility_from_extinction(belief.denser.extinction) < _EDGE * needed:

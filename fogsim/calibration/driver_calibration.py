@@ -280,10 +280,7 @@ def _excess(model: _SpeedModel, found: Floats, session: NDArray[np.intp]) -> Flo
 
 
 def _fitted_shares(passages: Passages, following: NDArray[np.bool_], clear: Floats) -> dict[str, Interval]:
-    """Shares of the kinds of drivers among those who follow in fog, with intervals from resampled vehicles.
-
-    Headways cannot distinguish `careful` from `out_of_sight`: these keep their ratio in `OBSERVED_MIXTURE`.
-    """
+    """Shares of drivers' kinds among followers in fog, with intervals; `careful` to `out_of_sight` is assumed."""
     kinds = ("in_sight", "unaffected", "careful")
     own = np.quantile(clear, (np.arange(_CLEAR_HEADWAYS) + 0.5) / _CLEAR_HEADWAYS)
     sight = DriverSight(DAY_ILLUMINANCE)

@@ -126,10 +126,7 @@ def measure_operating_range(
     seed: int = 0,
     watch: Watch = lambda *_: None,
 ) -> OperatingRange:
-    """Drive up to signs in fog of each visibility, and see from how far they are detected.
-
-    Takes `diameter` [m], `visibilities` [m], `step` [m].
-    """
+    """Drive up to signs of a `diameter` [m] in fog of each visibility [m], and see from how far they are detected."""
     for name, value, least in (("approaches", approaches, 4), ("step", step, 0.5), ("diameter", diameter, 0.1)):
         if not value >= least:
             raise InputError(f"{name}: expected at least {least}, got {value}")

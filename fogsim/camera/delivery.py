@@ -21,10 +21,7 @@ class Delivered(NamedTuple):
 
 
 class FrameDelivery:
-    """The way of the pictures out of a camera.
-
-    Where no new frame arrives, the last one is still there, with the time that it bears. Before the first it is black.
-    """
+    """The way of pictures out of a camera: without a new one the last stays, with its time; before the first, black."""
 
     def __init__(self) -> None:
         self.reset()

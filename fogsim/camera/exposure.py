@@ -50,10 +50,7 @@ def _develop(
     end: int,
     out: NDArray[np.uint8] | NDArray[np.uint16],
 ) -> None:
-    """Pixel values of the samples from `begin` to before `end`.
-
-    Takes `luminance` (samples,) [cd/m²], `response` (levels,) uint8, `out` (samples,) uint8.
-    """
+    """Pixel values `out` of the samples (samples,) from `begin` to before `end`; `luminance` [cd/m²]."""
     gain, shot_variance, read_variance = exposure.gain, exposure.shot_variance, exposure.read_variance
     black_level = exposure.black_level
     top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
@@ -126,10 +123,7 @@ def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) 
 
 @kernel
 def _luminance_samples(image: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
-    """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block.
-
-    Takes `image` (rows, cols, 3) [cd/m²], `out` [cd/m²].
-    """
+    """Luminance [cd/m²] of every stride-th pixel of every stride-th row, from the middle of the first block."""
     rows, cols = out.shape
     for row in range(rows):
         line = image[row * stride + stride // 2]
@@ -168,12 +162,10 @@ class Sensor:
 
 
 def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rng: np.random.Generator) -> Pixels:
-    """Take an image.
+    """Take an image (rows, cols, 3) of pixel values 0 … 2^bits − 1 from a radiance of that shape [cd/m²].
 
     Photon noise is drawn as normal with the Poisson distribution's variance, which at the tens of electrons and more
     that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons). No draw is further than 4.5 σ from the mean.
-
-    Returns pixel values 0 … 2^bits − 1 (rows, cols, 3) uint8. Takes `radiance` (rows, cols, 3) [cd/m²].
     """
     table = response_table(response, sensor.bits)
     out = np.empty(radiance.shape, dtype=table.dtype)
@@ -199,10 +191,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
 
 
 def unexposed(camera: Camera) -> Pixels:
-    """What a camera hands out before its first exposure: a black picture, read-only.
-
-    Returns zeros (rows, cols, 3) uint8.
-    """
+    """What a camera hands out before its first exposure: a black picture (rows, cols, 3) uint8, read-only."""
     shape = (camera.height, camera.width, 3)
     black: Pixels = np.zeros(shape, np.uint8) if camera.bits == 8 else np.zeros(shape, np.uint16)
     black.setflags(write=False)
@@ -211,10 +200,7 @@ def unexposed(camera: Camera) -> Pixels:
 
 @cache
 def response_table(response: Response, bits: int = 8) -> Pixels:
-    """Pixel value for exposure in even steps from 0 to saturation.
-
-    Returns read-only.
-    """
+    """Pixel value for exposure in even steps from 0 to saturation, read-only."""
     exposure = np.linspace(0.0, 1.0, _RESPONSE_STEPS[bits] + 1)
     levels = np.round((2**bits - 1) * respond(exposure, response))
     table: Pixels = levels.astype(np.uint8) if bits == 8 else levels.astype(np.uint16)
@@ -256,30 +242,22 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
 
 
 def wanted_saturation(luminance: float, auto: AutoExposure) -> float:
-    """Saturation luminance that puts a metered luminance at the target, as far as the camera's limits allow [cd/m²].
-
-    Takes `luminance` [cd/m²].
-    """
+    """Saturation that puts a metered luminance at the target, as far as the camera's limits allow [cd/m²]."""
     return min(max(luminance / auto.target, auto.darkest), auto.brightest)
 
 
 def followed(saturation: float, wanted: float, auto: AutoExposure, period: float) -> float:
-    """Saturation luminance one frame later: of first order in its logarithm, as photographers' stops are [cd/m²].
-
-    Takes `saturation`, `wanted` [cd/m²], `period` [s].
-    """
+    """Saturation one frame (`period` [s]) later: of first order in its logarithm, as photographers' stops [cd/m²]."""
     share = -math.expm1(-period / auto.time_constant) if auto.time_constant > 0 else 1.0
     return float(saturation * (wanted / saturation) ** share)
 
 
 def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
-    """Sensor at an exposure.
+    """Sensor at an exposure (`saturation` [cd/m²]).
 
     Exposure time makes no noise. Where even the longest is too short the signal is amplified, and the fewer electrons
     that then fill a pixel's range make it noisier. What the read-out adds after the amplifier counts for ever less
     electrons, as EMVA 1288 cameras show.
-
-    Takes `saturation` [cd/m²].
     """
     share, noise = min(1.0, saturation / auto.ungained), sensor.read_noise
     if sensor.gained_read_noise is not None:

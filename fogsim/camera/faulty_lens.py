@@ -64,10 +64,7 @@ def scattered_blots(camera: Camera, coverage: float, diameter: float, rng: np.ra
 
 
 def passed_light(camera: Camera, blots: Blots) -> NDArray[np.float32]:
-    """Share of each pixel's light that passes between blots; those that lie over one another do so by chance.
-
-    Returns 0 … 1.
-    """
+    """Share of each pixel's light that passes between blots, 0 … 1; where they overlap, it is by chance."""
     passed = np.ones((camera.height, camera.width))
     for blot in _blot_pixels(camera, blots):
         passed[blot.rows, blot.columns] *= 1.0 - blot.hidden
@@ -94,10 +91,7 @@ def _pixels(first: float, last: float, count: int) -> slice:
 
 
 def shared_area(distance: Floats, one: float, other: float) -> Floats:
-    """Area that two circles share.
-
-    Returns In that unit squared (…). Takes `distance` (…).
-    """
+    """Area that two circles share, in the unit of their radii and distance squared (…)."""
     smaller = min(one, other)
     d = np.clip(distance, abs(one - other) + 1e-12, one + other)
     # Two sectors less the kite of both middles and both crossings.

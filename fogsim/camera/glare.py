@@ -23,10 +23,7 @@ class Places(NamedTuple):
 
 @kernel
 def _count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
-    """Count the values above a limit, by row and in all. A sum of integers, so that compilers emit vector instructions.
-
-    Takes `lines` (rows, 3 · cols), `counts` (rows,) int32.
-    """
+    """Count values above a limit, by row and in all; a sum of integers lets compilers emit vector instructions."""
     total = 0
     for row in range(lines.shape[0]):
         line, found = lines[row], np.int32(0)
@@ -54,10 +51,7 @@ def _share_among_cells(
     columns: Places,
     grid: NDArray[np.float32],
 ) -> None:
-    """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place.
-
-    Takes `grid` (grid rows, 3 · grid cols).
-    """
+    """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place."""
     for row in range(lines.shape[0]):
         if counts[row] == 0:
             continue
@@ -82,10 +76,7 @@ def _coarsen_grid(
     columns: Places,
     coarse: NDArray[np.float32],
 ) -> None:
-    """Add each cell's light to the four cells around it in a coarser grid.
-
-    Takes `fine` (rows, 3 · cols), `coarse` (coarse rows, 3 · coarse cols).
-    """
+    """Add each cell's light to the four cells around it in a coarser grid; both (rows, 3 · cols)."""
     strip = np.zeros(coarse.shape[1], np.float32)
     for row in range(fine.shape[0]):
         line = fine[row]
@@ -108,10 +99,7 @@ def _coarsen_grid(
 def _blur_grid(
     grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]
 ) -> None:
-    """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost.
-
-    Takes `grid`, `out` (rows, 3 · cols), `taps` (2 n + 1,).
-    """
+    """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost."""
     reach = taps.shape[0] // 2
     strip = np.empty(grid.shape[1] + 6 * reach, np.float32)
     for row in range(grid.shape[0]):
@@ -159,10 +147,7 @@ def _interpolate_columns(
     columns: Places,
     wide: NDArray[np.float32],
 ) -> None:
-    """Interpolate the rows of a grid at the columns of a finer one.
-
-    Takes `grid` (rows, 3 · cols), `wide` (rows, 3 · finer cols).
-    """
+    """Interpolate the rows of a grid (rows, 3 · cols) at the columns of a finer one."""
     places, shares = columns.at, columns.share
     for row in range(grid.shape[0]):
         line, out = grid[row], wide[row]
@@ -183,10 +168,7 @@ def _add_interpolated_rows(
     end: int,
     out: NDArray[np.float32],
 ) -> None:
-    """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid.
-
-    Takes `lines`, `out` (rows, 3 · cols), `wide` (coarse rows, 3 · cols).
-    """
+    """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid."""
     for row in range(begin, end):
         line, upper, lower, sums = lines[row], wide[rows.at[row]], wide[rows.at[row] + 1], out[row]
         down = rows.share[row]
@@ -205,10 +187,7 @@ def _spread_core(
     gain: np.float32,
     out: NDArray[np.float32],
 ) -> None:
-    """Take the scattered light from the bright pixels and give the part `gain` of it to those next to them.
-
-    Takes `taps` (2 n + 1,), `out` (rows, 3 · cols).
-    """
+    """Take the scattered light from bright pixels and give the part `gain` of it to those next to them."""
     reach, size = taps.shape[0] // 2, lines.shape[1]
     light = np.zeros(size, np.float32)
     strip = np.empty(size + 6 * reach, np.float32)
@@ -287,11 +266,7 @@ class LensGlare:
         self._bands = Bands()
 
     def scatter(self, radiance: NDArray[np.float32], saturation: float) -> NDArray[np.float32]:
-        """Luminance with what the lens scatters.
-
-        Returns the image itself where nothing is brighter than `BRIGHT` times saturation (rows, cols, 3). Takes
-        `radiance` (rows, cols, 3) [cd/m²], `saturation` [cd/m²].
-        """
+        """Luminance with what the lens scatters (rows, cols, 3) [cd/m²]; the image itself if nothing is bright."""
         lines = np.ascontiguousarray(radiance, dtype=np.float32).reshape(radiance.shape[0], -1)
         counts, limit = np.empty(lines.shape[0], np.int32), np.float32(BRIGHT * saturation)
         if self._share == 0 or _count_bright(lines, limit, counts) == 0:

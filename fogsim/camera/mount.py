@@ -37,10 +37,7 @@ def mounted_pose(
     grade: float = 0.0,
     body_pitch: float = 0.0,
 ) -> CameraPose:
-    """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis.
-
-    Takes `front_bumper` (3,) [m], `heading` [rad], `setback` [m], `grade` [rad], `body_pitch` [rad].
-    """
+    """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis; lengths in m, angles in rad."""
     forward, up = math.cos(grade), math.sin(grade)
     along = setback * forward + camera.mount_height * up
     x = float(front_bumper[0]) - along * math.cos(heading)

@@ -38,11 +38,7 @@ def supersampled(camera: Camera, side: int) -> Camera:
 
 
 def averaged(radiance: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Mean luminance of each pixel's samples.
-
-    Returns linear luminance per channel of the pixels [cd/m²]; the samples themselves where there is one a pixel (rows,
-    cols, 3). Takes `radiance` (side · rows, side · cols, 3) [cd/m²].
-    """
+    """Mean of each pixel's samples (side · rows, side · cols, 3) [cd/m²]; these themselves if there is one a pixel."""
     if side == 1:
         return radiance
     rows, cols = radiance.shape[0] // side, radiance.shape[1] // side
@@ -93,19 +89,13 @@ class CameraSensor:
 
     @property
     def share_of_longest_exposure(self) -> float:
-        """Time of the next exposure relative to the longest, 1 where it is fixed [-].
-
-        0 before the first picture of a run, whose exposure is found only with its light.
-        """
+        """Next exposure time over the longest [-]: 1 if fixed, 0 before the first picture, whose light sets it."""
         if self._auto is None:
             return 1.0
         return 0.0 if self._saturation is None else min(1.0, self._auto.ungained / self._saturation)
 
     def take(self, radiance: NDArray[np.float32], rng: np.random.Generator) -> Pixels:
-        """Take a picture at the exposure that the pictures before have set.
-
-        Returns pixel values (rows, cols, 3) uint8. Takes `radiance` (rows, cols, 3) [cd/m²].
-        """
+        """Picture (rows, cols, 3) uint8 at the exposure that the pictures before have set (`radiance` [cd/m²])."""
         if self._shading is not None:
             radiance = radiance * self._shading
         # Metered without glare: how bright a lamp must be to scatter light depends on the exposure.
@@ -125,12 +115,10 @@ class CameraSensor:
 
 
 def lens_shading(camera: Camera, strength: float) -> NDArray[np.float32]:
-    """Light that each pixel gets, relative to the optical axis: 1 − strength · (1 − cos⁴ θ).
+    """Light that each pixel (rows, cols) gets, over that on the optical axis: 1 − strength · (1 − cos⁴ θ).
 
     cos⁴ of the angle θ to the optical axis is the natural vignetting of a thin lens; designs of lenses and correction
     in the camera take part of it back.
-
-    Returns greater than 0, 1 on the axis (rows, cols).
     """
     u0, v0 = camera.principal_point
     across = (np.arange(camera.width) - u0) / camera.focal_length

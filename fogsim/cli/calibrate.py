@@ -8,13 +8,15 @@ import typer
 from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, print_remarks, stderr, stdout
-from fogsim.cli.progress import progress_bar
+from fogsim.cli.progress import measuring_bar
 from fogsim.core.interruption import interruptible
 from fogsim.errors import InputError, printable
 
 calibrate = typer.Typer(
     no_args_is_help=True, help="Measure what a method needs to know about a camera, or fit drivers to measurements."
 )
+
+_ENDED = "interrupted after {}; nothing is written"
 
 
 @calibrate.callback()
@@ -39,22 +41,9 @@ def calibrate_signs_command(
     from fogsim.offline.camera_file import load_camera
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
-    known, done = load_camera(camera), 0
-    with progress_bar(stderr) as progress:
-        task = progress.add_task("signs: a first run compiles for some seconds", total=approaches)
-
-        def watch(steps: int, _: int) -> None:
-            nonlocal done
-            done = steps
-            progress.update(task, completed=steps, description=f"signs: {steps} of {approaches} approaches")
-
-        try:
-            with interruptible():
-                measured = measure_operating_range(known, sign_diameter, approaches=approaches, seed=seed, watch=watch)
-        except KeyboardInterrupt:
-            progress.stop()
-            stderr.print(f"interrupted after {done} of {approaches} approaches; nothing is written", soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
+    known = load_camera(camera)
+    with measuring_bar("signs", approaches, "approaches", _ENDED) as watch:
+        measured = measure_operating_range(known, sign_diameter, approaches=approaches, seed=seed, watch=watch)
     write_bytes(out, (measured.as_json() + "\n").encode())
     if as_json:
         typer.echo(json.dumps(json.loads(measured.as_json())))
@@ -91,22 +80,9 @@ def calibrate_halos_command(
     from fogsim.offline.camera_file import load_camera
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
-    known, done = load_camera(camera), 0
-    with progress_bar(stderr) as progress:
-        task = progress.add_task("halos: a first run compiles for some seconds", total=scenes)
-
-        def watch(steps: int, _: int) -> None:
-            nonlocal done
-            done = steps
-            progress.update(task, completed=steps, description=f"halos: {steps} of {scenes} scenes")
-
-        try:
-            with interruptible():
-                measured = measure_halo_threshold(known, scenes, glare=lens_glare, seed=seed, watch=watch)
-        except KeyboardInterrupt:
-            progress.stop()
-            stderr.print(f"interrupted after {done} of {scenes} scenes; nothing is written", soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
+    known = load_camera(camera)
+    with measuring_bar("halos", scenes, "scenes", _ENDED) as watch:
+        measured = measure_halo_threshold(known, scenes, glare=lens_glare, seed=seed, watch=watch)
     write_bytes(out, (measured.as_json() + "\n").encode())
     if as_json:
         typer.echo(json.dumps(json.loads(measured.as_json())))

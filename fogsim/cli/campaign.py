@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stdout
+from fogsim.cli.progress import tally_bar
 from fogsim.cli.scenario_options import CaseValues, CodeNotice, MethodTimeout, Settings, with_timeout
 from fogsim.errors import InputError
 
@@ -87,15 +87,9 @@ def campaign_command(
         may_import=CodeNotice(),
     )
     try:
-        with progress_bar(stderr, stays=True) as progress:
-            task = progress.add_task(STARTING, total=campaign.budget)
-
-            def show(done: int, failed: int) -> None:
-                failures = f", {failed} failed" if failed else ""
-                progress.update(task, completed=done, description=f"{done} of {campaign.budget} cases{failures}")
-
+        with tally_bar(campaign.budget, "cases") as show:
             found = run_campaign(campaign, out, _engine(engine, address, processes, campaign.odd), show)
-            progress.update(task, description="searching the smallest failing case")
+            show(len(found.results), instead="searching the smallest failing case")
             # One case after another: a cluster would be connected to for each.
             smallest = smallest_failing(campaign, found, out, _engine(_CampaignEngine.LOCAL, None, 1))
     except KeyboardInterrupt:

@@ -113,10 +113,7 @@ def _quietly(work: Callable[..., None], *arguments: Any) -> None:
 
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
-    """Render the first frames of a scenario with each of the given settings.
-
-    For its metrics, all vehicles are in one junction.
-    """
+    """Render the first frames of a scenario with each of the settings, all vehicles in one junction for its metrics."""
     from fogsim.metrics import RunMetrics
     from fogsim.scenario import load_scenario
     from fogsim.simulation.loop import run

@@ -50,8 +50,8 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
                 _end(process)
                 return
             message = {"size": (scenario.camera.width, scenario.camera.height), **methods}
-            is_over = partial(_has_ended, process)
-            stack.enter_context(COMPILER_PROCESS.compiles(is_over, _PACKAGES, partial(_read_last, message)))
+            read = partial(_read_last, message)
+            stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, _PACKAGES, read))
             _send(process, message)
 
         yield send
@@ -70,10 +70,6 @@ def _started() -> "subprocess.Popen[bytes] | None":
     except OSError:
         # Too little memory or too many processes: this one compiles alone, as on a single processor.
         return None
-
-
-def _has_ended(process: "subprocess.Popen[bytes]") -> bool:
-    return process.poll() is not None
 
 
 def _read_last(wanted: Mapping[str, Any]) -> None:

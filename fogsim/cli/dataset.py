@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.printing import INTERRUPTED, escape, stdout
+from fogsim.cli.progress import tally_bar
 from fogsim.cli.scenario_options import (
     EgoId,
     HomogeneousVisibility,
@@ -32,16 +32,8 @@ def dataset_command(
     from fogsim.dataset import write_dataset
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
-    with progress_bar(stderr, stays=True) as progress:
-        task = progress.add_task(STARTING, total=frames)
-        done = write_dataset(
-            loaded,
-            out,
-            frames,
-            seed=seed,
-            every=every,
-            watch=lambda n: progress.update(task, completed=n, description=f"{n} of {frames} frames"),
-        )
+    with tally_bar(frames, "frames") as show:
+        done = write_dataset(loaded, out, frames, seed=seed, every=every, watch=show)
     stdout.print(f"{done.frames} frames, {done.written} of them new: {escape(done.directory)}", soft_wrap=True)
     if not done.complete:
         stdout.print("Interrupted; the same command continues it.")

@@ -18,9 +18,9 @@ _LARGEST = 2**63 - 1
 
 
 def check_values(app: typer.Typer) -> None:
-    """Make every command refuse numbers outside ``min`` and ``max`` of their option, NaN included, and empty paths.
+    """Make every command refuse empty paths, and numbers outside ``min`` and ``max`` of their option, NaN included.
 
-    An empty string, as from an unset shell variable, would otherwise be the current directory.
+    An empty string, as from an unset shell variable, would be the current directory.
     """
     for command in app.registered_commands:
         for parameter in signature(command.callback or check_values).parameters.values():

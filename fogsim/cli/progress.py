@@ -6,8 +6,12 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from fogsim.cli.printing import INTERRUPTED, stderr
+from fogsim.core.interruption import interruptible
 
 if TYPE_CHECKING:
     from fogsim.values import TrafficStep
@@ -52,6 +56,43 @@ def counting_bar(console: Console, description: str) -> Iterator[Callable[[int, 
     with progress_bar(console) as progress:
         task = progress.add_task(description, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def tally_bar(total: int, what: str) -> Iterator[Callable[..., None]]:
+    """Bar that stays, called with the numbers of finished and of failed items, and perhaps another description."""
+    with progress_bar(stderr, stays=True) as progress:
+        task = progress.add_task(STARTING, total=total)
+
+        def show(done: int, failed: int = 0, instead: str = "") -> None:
+            failures = f", {failed} failed" if failed else ""
+            progress.update(task, completed=done, description=instead or f"{done} of {total} {what}{failures}")
+
+        yield show
+
+
+@contextlib.contextmanager
+def measuring_bar(name: str, total: int | None, what: str, ended: str) -> Iterator[Callable[[int, int], None]]:
+    """Bar that is called with the number of finished steps and their total; Ctrl-C ends the command.
+
+    It then prints `ended`, with how far it came in place of ``{}``.
+    """
+    so_far = f"0 {what}" if total is None else f"0 of {total} {what}"
+    with progress_bar(stderr) as progress:
+        task = progress.add_task(f"{name}: a first run compiles for some seconds", total=total)
+
+        def watch(done: int, total: int) -> None:
+            nonlocal so_far
+            so_far = f"{done} of {total} {what}"
+            progress.update(task, completed=done, total=total, description=f"{name}: {so_far}")
+
+        try:
+            with interruptible():
+                yield watch
+        except KeyboardInterrupt:
+            progress.stop()
+            stderr.print(ended.format(so_far), soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 class SimulationProgress:

@@ -112,10 +112,7 @@ class NotPassedError(Exception):
 
 @pytest.fixture
 def fogsim_run(request: pytest.FixtureRequest) -> Callable[..., CaseResult]:
-    """Run one case of a scenario in this process: ``fogsim_run("a.fog.yaml", case="run=3")``.
-
-    Returns its `fogsim.testing.CaseResult`; paths are relative to the test's file.
-    """
+    """`CaseResult` of a case run here: ``fogsim_run("a.fog.yaml", case="run=3")``, relative to the test's file."""
     from fogsim.testing import check_one_case
 
     def run(scenario: str | Path, *settings: str, case: str = "", seed: int | None = None) -> CaseResult:

@@ -9,9 +9,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import progress_bar
-from fogsim.core.interruption import interruptible
+from fogsim.cli.printing import escape, stderr, stdout
+from fogsim.cli.progress import measuring_bar
 from fogsim.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -58,23 +57,9 @@ def reproduce_command(
 
 
 def _evaluated(name: str, evaluation: "Evaluation", *, quick: bool, table: str | None) -> "Reproduction":
-    """Run an evaluation under a bar; Ctrl-C ends the command in one line."""
-    steps = "0 steps"
-    with progress_bar(stderr) as progress:
-        task = progress.add_task(f"{name}: a first run compiles for some seconds", total=None)
-
-        def watch(done: int, total: int) -> None:
-            nonlocal steps
-            steps = f"{done} of {total} steps"
-            progress.update(task, completed=done, total=total, description=f"{name}: {steps}")
-
-        try:
-            with interruptible():
-                return evaluation(quick=quick, table=table, watch=watch)
-        except KeyboardInterrupt:
-            progress.stop()
-            stderr.print(f"interrupted: {name} after {steps}; nothing of it is printed or written", soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
+    ended = f"interrupted: {name} after {{}}; nothing of it is printed or written"
+    with measuring_bar(name, None, "steps", ended) as watch:
+        return evaluation(quick=quick, table=table, watch=watch)
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, counting_bar, progress_bar
+from fogsim.cli.progress import counting_bar, tally_bar
 from fogsim.cli.scenario_options import CodeNotice, MethodTimeout, with_timeout
 from fogsim.errors import InputError
 
@@ -66,15 +66,13 @@ def study_command(
     directory = out or Path("runs", loaded.name)
     failed: list[str] = []
     try:
-        with progress_bar(stderr, stays=True) as progress:
-            task = progress.add_task(STARTING, total=len(loaded.runs))
+        with tally_bar(len(loaded.runs), "runs") as show:
 
-            def show(done: int, message: str | None) -> None:
+            def watch_runs(done: int, message: str | None) -> None:
                 failed.extend([message] if message else [])
-                failures = f", {len(failed)} failed" if failed else ""
-                progress.update(task, completed=done, description=f"{done} of {len(loaded.runs)} runs{failures}")
+                show(done, len(failed))
 
-            rows = run_study(loaded, directory, **runner, watch=show)
+            rows = run_study(loaded, directory, **runner, watch=watch_runs)
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished runs are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None

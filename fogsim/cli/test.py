@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, counting_bar, progress_bar
+from fogsim.cli.progress import counting_bar, tally_bar
 from fogsim.cli.scenario_options import CaseValues, CodeNotice, Maps, MethodTimeout, Settings, with_timeout
 
 if TYPE_CHECKING:
@@ -118,26 +118,16 @@ def _run(tests: "Sequence[FogTest]", out: Path, processes: int, *, exit_first: b
     from fogsim.testing.execution import check_outcome
     from fogsim.testing.session import run_cases
 
-    total = sum(len(test.runs) for test in tests)
-    with progress_bar(stderr, stays=True) as progress:
-        task = progress.add_task(STARTING, total=total)
-
-        def show(done: int, failed: int) -> None:
-            failures = f", {failed} failed" if failed else ""
-            progress.update(task, completed=done, description=f"{done} of {total} runs{failures}")
-
-        engine = ProcessPool(processes, check_outcome)
+    engine = ProcessPool(processes, check_outcome)
+    with tally_bar(sum(len(test.runs) for test in tests), "runs") as show:
         return run_cases(tests, out, engine, first_failure_ends=exit_first, watch=show)
 
 
 def _evidence(outcomes: "Sequence[FileOutcome]", out: Path, processes: int) -> "Kept":
     from fogsim.testing.artefacts import keep_artefacts
 
-    with progress_bar(stderr) as progress:
-        task = progress.add_task("videos and plots of what did not pass", total=None)
-        return keep_artefacts(
-            outcomes, out, processes, lambda done, total: progress.update(task, completed=done, total=total)
-        )
+    with counting_bar(stderr, "videos and plots of what did not pass") as watch:
+        return keep_artefacts(outcomes, out, processes, watch)
 
 
 def _print_outcome(outcome: "FileOutcome", settings: Sequence[str]) -> None:

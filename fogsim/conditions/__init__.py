@@ -21,12 +21,11 @@ from fogsim.conditions.possibility import (
     outcomes,
     pointless_parts,
     vehicles_in,
-    vehicles_of,
 )
 from fogsim.conditions.signal import Kind, Need, Place, Signal
 from fogsim.conditions.signals import SIGNALS
-from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Quantity, Reference, signals_of
-from fogsim.conditions.watching import Watch, shown_value
+from fogsim.conditions.syntax import Comparison, Condition, Edge, Quantity, Reference, signals_of
+from fogsim.conditions.watching import Watch
 
 __all__ = [
     "EGO",
@@ -40,9 +39,7 @@ __all__ = [
     "ExpectationWatch",
     "Finding",
     "FindingVerdict",
-    "Flag",
     "Happened",
-    "Held",
     "History",
     "Kind",
     "Limits",
@@ -63,8 +60,6 @@ __all__ = [
     "parse_condition",
     "parse_signal",
     "pointless_parts",
-    "shown_value",
     "signals_of",
     "vehicles_in",
-    "vehicles_of",
 ]

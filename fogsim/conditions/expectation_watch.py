@@ -33,10 +33,7 @@ Sight = tuple[float, float | None, str]
 
 
 class ExpectationWatch:
-    """Watches every clause of what is expected of a run.
-
-    Verdicts are of the truth, which no estimator and no adviser sees.
-    """
+    """Judges every clause of what is expected of a run by the truth, which no estimator and no adviser sees."""
 
     def __init__(self, clauses: Iterable[Clause]) -> None:
         self._history = History()

@@ -53,10 +53,7 @@ def compared(value: Value, relation: str, operand: Value) -> bool | None:
 
 
 def passed(before: tuple[Value, Value], now: tuple[Value, Value], how: str) -> bool | None:
-    """Whether a signal ``falls below``, ``rises above``, ``becomes`` or ``changes`` between steps; None if unknown.
-
-    Takes the signal and its operand, which may be another signal, at either step.
-    """
+    """Whether a signal, against its operand at either step, ``falls below``, ``changes`` …; None if unknown."""
     if how == "changes":
         earlier, later = _without_count(before[0]), _without_count(now[0])
         return None if earlier is None or later is None else earlier != later

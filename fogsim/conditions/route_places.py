@@ -139,18 +139,12 @@ def extent_of(place: RoutePlace, traffic: TrafficState, row: int) -> Extent:
 
 
 def gap_between(one: Extent, other: Extent) -> float:
-    """Gap from one vehicle to another along the route, bumper to bumper [m].
-
-    Positive for a vehicle ahead in the direction of the route, negative for one behind, 0 where they overlap.
-    """
+    """Gap from one vehicle to another along the route, bumper to bumper [m]: negative behind, 0 if they overlap."""
     return max(other.begin - one.end, 0.0) or min(other.end - one.begin, 0.0)
 
 
 def time_to_meet(one: Extent, other: Extent) -> float:
-    """Time until two vehicles overlap along the route at constant speeds [s].
-
-    ``inf`` if they do not approach; 0 while they overlap.
-    """
+    """Time until two vehicles overlap at constant speeds [s]: 0 while they do, ``inf`` if they do not approach."""
     gap = gap_between(one, other)
     approach = math.copysign(1.0, gap) * (one.velocity - other.velocity)
     return 0.0 if gap == 0.0 else abs(gap) / approach if approach > 0.0 else math.inf

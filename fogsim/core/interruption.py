@@ -49,15 +49,10 @@ def _handle_signals(handler: _Handler) -> None:
 
 
 class ProgramSignals:
-    """The first signal as KeyboardInterrupt, for a program, from `listen` on; the next ends the program at once.
+    """The first signal, `last`, as KeyboardInterrupt, for a program, from `listen` on; the next ends it at once.
 
     So does the first one while a module is imported, which may take the exception for its own failure, or where the
     exception is lost, or what it ends takes too long; `Interruption` gives more time, and lets imports finish.
-
-    Attributes
-    ----------
-    last : int or None
-        The signal that came.
     """
 
     def __init__(self) -> None:

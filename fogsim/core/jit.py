@@ -64,10 +64,7 @@ _FOGSIM = __package__.partition(".")[0]
 
 
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
-    """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
-
-    Takes `clock` [s].
-    """
+    """At the first run only, explains that the time goes into compiling, and shows its progress (`clock` [s])."""
 
     def __init__(self, print_line: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         self._print, self._clock = print_line, clock
@@ -140,10 +137,7 @@ event.register("numba:compile", _CompileSpeedup())
 
 
 class CompilerProcess:
-    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it.
-
-    The first wait begins with work of one's own: what the other process would compile last.
-    """
+    """Another process that compiles kernels of some modules; whoever finds one of them not compiled waits for it."""
 
     def __init__(self) -> None:
         self._is_over: Callable[[], bool] | None = None
@@ -248,9 +242,9 @@ def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., An
 
 
 def _look_elsewhere(compiled: Any) -> None:
-    """Let a kernel that was never compiled here be looked for in what came with the installation.
+    """Look for a kernel that was never compiled here among those that came with the installation.
 
-    One that another process compiles meanwhile is looked for on the disk again when that has ended.
+    If another process is compiling it, it is looked for on the disk again once that has ended.
     """
     load, module, shipped = compiled._cache.load_overload, compiled.py_func.__module__, compiled.shipped
 
@@ -266,10 +260,7 @@ def _look_elsewhere(compiled: Any) -> None:
 
 
 def _fingerprint(function: FunctionType) -> str:
-    """Digest of all that may be compiled into a function besides its own module.
-
-    What its module defines further down may be called, too: so all counts that the module has imported.
-    """
+    """Digest of all that may be compiled into a function besides its own module: everything that module imports."""
     seen = function.__globals__
     return _digest_of(text for name in seen for text in _compiled_in(name, seen[name], seen))
 
@@ -325,15 +316,10 @@ def _digest(path: str) -> str:
 
 
 class Bands:
-    """Divides the rows of pictures between this thread and, for large pictures, a second one.
+    """Divides the rows of pictures at a share `middle` between this thread and, for large pictures, a second one.
 
     No thread outlives a call, so that a process may fork between calls. Where the rows are divided depends on the time
     that the bands took before; so what is done to a row must not depend on it, and pictures are the same anywhere.
-
-    Attributes
-    ----------
-    middle : float
-        Share of the rows in the upper band.
     """
 
     def __init__(self) -> None:
@@ -372,10 +358,7 @@ class Bands:
 
 
 def processors() -> int:
-    """Number of processors that this process may use: one where it is a worker, next to others that draw too.
-
-    Ray sets ``OMP_NUM_THREADS`` for its workers, and so do others that share out a machine.
-    """
+    """Processors that this process may use: 1 for a worker (``OMP_NUM_THREADS=1``) next to others that draw."""
     if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
         return 1
     if hasattr(os, "sched_getaffinity"):

@@ -34,19 +34,11 @@ def stopping_sight_distance(
 
 
 def safe_speed(distance: float, reaction_time: float, deceleration: float, grade: float = 0.0) -> float:
-    """Largest speed from which one stops within a distance, the inverse of `stopping_sight_distance` [m/s].
-
-    Takes `distance` [m].
-    """
+    """Largest speed from which one stops within a distance [m], the inverse of `stopping_sight_distance` [m/s]."""
     braking = deceleration + GRAVITY * grade
     return braking * (math.sqrt(reaction_time**2 + 2 * distance / braking) - reaction_time)
 
 
 def decelerated_speed(speed: float, target: float, deceleration: float, step_length: float) -> float:
-    """Speed after one step of slowing down to a target [m/s]; ``inf`` for a target of ``inf``, which is no limit.
-
-    A target above the speed is given back: speeding up is left to the vehicle's own acceleration.
-
-    Takes `speed`, `target` [m/s], `deceleration` [m/s²], `step_length` [s].
-    """
+    """Speed after one step [s] of braking to a target [m/s]; a target above the speed, also ``inf``, is returned."""
     return target if math.isinf(target) else max(target, speed - deceleration * step_length)

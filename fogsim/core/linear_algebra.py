@@ -20,10 +20,7 @@ _ROUNDS = 50
 
 
 def majority(values: Sequence[float], weights: Sequence[float], clusters: int = _CLUSTERS) -> NDArray[np.bool_]:
-    """Which values are in the weightiest of some clusters, by weighted k-means on a line.
-
-    Returns all of them, where there are no more than clusters: there is no majority among three (n,) bool.
-    """
+    """Which values (n,) are in the weightiest of some clusters, by weighted k-means on a line; all of a few values."""
     x, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
     if len(x) <= clusters:
         return np.ones(len(x), dtype=bool)
@@ -57,10 +54,7 @@ _LEAST_PIVOT = 1e-14
 
 
 def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """Product of two matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
-
-    Takes `left` (…, n), `right` (n,).
-    """
+    """Product of matrices and vectors, as ``left @ right``; the last axis of `left` (…, n) is summed."""
     if right.ndim == 1:
         return np.asarray((left * right).sum(axis=-1))
     kind = left.dtype if left.dtype == right.dtype else np.result_type(left, right)
@@ -88,8 +82,6 @@ def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
     What it says nothing of, or nothing next to the others, has zeros in its row and column (a generalised inverse).
     Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
-
-    Takes `matrix` (n, n).
     """
     count = len(matrix)
     swept, left = matrix.copy(), np.ones(count, np.bool_)

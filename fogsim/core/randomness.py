@@ -31,20 +31,7 @@ class Streams:
 
 
 def spawn_streams(seed: int, vehicle: str = "") -> Streams:
-    """Spawn the named streams of one run from its seed.
-
-    Parameters
-    ----------
-    seed : int
-        Any non-negative integer; the same seed gives the same run, bit for bit.
-    vehicle : str
-        Id of an equipped vehicle that has streams of its own; empty for the ego.
-
-    Raises
-    ------
-    ValueError
-        If the seed is negative.
-    """
+    """Spawn the named streams of one run from its seed, those of an equipped `vehicle` other than the ego by its id."""
     root = np.random.SeedSequence([seed, *vehicle.encode()] if vehicle else seed)
     traffic, _, camera, sensors, driver, faults, gps, reports, scatterometer = root.spawn(9)
     patches = np.random.SeedSequence(seed).spawn(2)[1]

@@ -38,7 +38,7 @@ from fogsim.scenario import Scenario, build, resolved
 from fogsim.simulation.controlled_driving import own_policy
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.units import finite_or_none
-from fogsim.values import Camera, CameraPose, Ending, Observation, Step
+from fogsim.values import Camera, CameraPose, Ending, Step
 
 _CATEGORIES = [
     {"id": int(kind), "name": kind.name.lower(), "supercategory": "sign" if kind is SemanticClass.SIGN else "vehicle"}
@@ -63,7 +63,7 @@ def _frame_record(step: Step) -> dict[str, Any]:
         "lead_distance_m": None if observation.lead is None else observation.lead.distance,
         "camera": {
             "true": _calibration(truth.camera),
-            "told": _calibration(_assumed_camera(observation)),
+            "told": _calibration(getattr(observation.frame, "camera", None)),
             "pose": _pose(truth.pose),
         },
         "signs": [
@@ -153,10 +153,6 @@ def _coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) 
     }
 
 
-def _assumed_camera(observation: Observation) -> Camera | None:
-    return getattr(observation.frame, "camera", None)
-
-
 def _calibration(camera: Camera | None) -> dict[str, Any] | None:
     if camera is None:
         return None
@@ -194,10 +190,7 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
 
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of each file that a scenario's traffic and methods read, by name.
-
-    Files of the same name in different folders share an entry.
-    """
+    """SHA-256 of the files that a scenario's traffic and methods read, by name; same names share an entry."""
     setup = build.traffic_setup(scenario)
     # A road by template has files that no key names.
     files = [*([] if setup.net is None else [setup.net]), *setup.routes, *setup.additional]

@@ -67,10 +67,7 @@ class RecordedDrive:
             logging.getLogger("fogsim").warning("fogsim: %s", self.fault)
 
     def reach(self, time: float, is_outdated: Callable[[], bool]) -> int | None:
-        """Number of the moment at a time [s], or of the last one if the drive ends before; None if outdated meanwhile.
-
-        Takes `is_outdated`, whether it is not asked for any more.
-        """
+        """Number of the moment at a time [s], or of the last one; None if `is_outdated` says so meanwhile."""
         index = round(time / self._config.periods.camera_period)
         while len(self.moments) <= index and not self.is_over:
             if is_outdated():

@@ -28,10 +28,7 @@ _SHORTEST, _SHARED, _GRAIN = 15.0, 0.8, 0.02
 
 
 def _curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
-    """(n, 4) float64: start and end [m], ln of the mean extinction, and its standard deviation [ln 1/m, -].
-
-    Takes `farthest` [m].
-    """
+    """(n, 4): start and end up to `farthest` [m], ln of the mean extinction, and its standard deviation."""
     return _cut(np.array(curve.distance), np.array(curve.depth), np.array(curve.standard_deviation), _CUTS, farthest)
 
 
@@ -150,29 +147,10 @@ class FieldFilter:
     def update_at(
         self, estimates: Sequence[Estimate], time: float, place: float, reports: Sequence[FogReport] = ()
     ) -> Belief:
-        """Take in the estimates of one instant and the reports of others.
+        """Learn from the estimates of one instant [s] at a place [m] and from reports; see `LocatedFusion.update_at`.
 
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            From any estimators; invalid ones contribute only their bounds.
-        time : float
-            The instant [s], not before that of the last call.
-        place : float
-            How far the vehicle has come along its way [m].
-        reports : sequence of FogReport
-            What has come in since the last call; those of the future, beyond what clocks disagree by, too old ones,
-            repeated ones and such that are no numbers are left out.
-
-        Returns
-        -------
-        Belief
-            With its `profile`.
-
-        Raises
-        ------
-        InputError
-            If time or place are not finite, or the time goes backward.
+        Reports of the future, beyond what clocks disagree by, too old or repeated ones, and what is no number do not
+        count.
         """
         if not math.isfinite(place):
             raise InputError(f"field_filter: the place of an update must be finite, got {place!r}")

@@ -32,20 +32,10 @@ of its distance [-]. What seems to be fog beyond a crest recedes."""
 
 
 class _Announcements:
-    """Follows what estimates say of denser fog ahead.
+    """Follows what estimates say of denser fog ahead, which they must report within a `time` [s] to be `announced`.
 
     A bank stands, or comes nearer as one drives; what one picture takes for fog and the next does not, or elsewhere, is
     none: a vehicle, a crest, the shade of a wood.
-
-    Parameters
-    ----------
-    time : float
-        Window in which estimates must report it [s].
-
-    Attributes
-    ----------
-    announced : bool
-        Whether denser fog is announced.
     """
 
     def __init__(self, time: float) -> None:
@@ -59,10 +49,7 @@ class _Announcements:
         self.announced = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
-        """Take in the estimates of one instant.
-
-        Returns what most images, including most of the last ones, report, if it is to be announced. Takes `time` [s].
-        """
+        """Add the estimates of an instant [s]; return what most images report, if it is to be announced."""
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:
             self._reports.append((time, next((one.denser for one in telling if one.denser is not None), None)))
@@ -207,25 +194,9 @@ class GridFilter:
         return self.update(estimates, time)
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
-        """Take in the estimates of one instant.
+        """Learn from the estimates of one instant [s]; those of the same instant in two calls count as in one.
 
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            From any estimators; invalid ones and such with numbers that are not finite are left out.
-        time : float
-            The instant [s], not before that of the last call. Estimates of the same instant in two calls count as in
-            one.
-
-        Returns
-        -------
-        Belief
-            240 cells of ln k, its arrays its own.
-
-        Raises
-        ------
-        InputError
-            If the time is not finite or goes backward.
+        Invalid estimates and such with numbers that are not finite are left out. InputError if the time goes backward.
         """
         self._advance(time)
         denser = self._announcements.update(estimates, time)

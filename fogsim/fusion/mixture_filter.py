@@ -87,22 +87,7 @@ class MixtureFilter:
         place: float,
         reports: Sequence[FogReport] = (),  # noqa: ARG002 - the papers know of none
     ) -> Belief:
-        """Take in the estimates of one instant; see `LocatedFusion.update_at`.
-
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            Valid ones of fog count.
-        time, place : float
-            The instant [s] and the way driven [m].
-        reports : sequence of FogReport
-            They do not count.
-
-        Raises
-        ------
-        InputError
-            If the instant or the place is not finite, or the time goes back.
-        """
+        """Learn from the valid estimates of fog of one instant; see `LocatedFusion.update_at`."""
         if not (math.isfinite(time) and math.isfinite(place)):
             raise InputError(f"mixture_filter: time and place of an update must be finite, got {time!r} and {place!r}")
         if time < self._time:

@@ -23,13 +23,7 @@ class NoFusion:
         self._log_extinction.flags.writeable = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:  # noqa: ARG002 - the protocol's parameters
-        """Say what is believed, always the same; see `Fusion.update`.
-
-        Parameters
-        ----------
-        estimates, time
-            See `Fusion.update`.
-        """
+        """Say what is believed, always the same; see `Fusion.update`."""
         return Belief(self._log_extinction, np.full(CELLS, 1.0 / CELLS))
 
     def reset(self) -> None:
@@ -54,11 +48,9 @@ class Fusion(Protocol):
         InputError
             If the instant is not finite or lies before the last one.
         """
-        ...
 
     def reset(self) -> None:
         """Forget everything."""
-        ...
 
 
 @runtime_checkable
@@ -86,11 +78,9 @@ class LocatedFusion(Protocol):
         InputError
             If the instant is not finite or lies before the last one.
         """
-        ...
 
     def reset(self) -> None:
         """Forget everything."""
-        ...
 
 
 class DatedFusion:

@@ -31,13 +31,11 @@ _SAMPLES = 48
 
 
 class RouteField:
-    """ln k along the way: a level that no one knows, and what varies about it with place and time.
+    """ln k along the way: a level that no one knows, and what varies about it with place [m] and time [s].
 
     What varies has a Matérn covariance over the way, σ² (1 + √3 |Δs| / ℓ) e^(−√3 |Δs| / ℓ), and some grain; it forgets
     itself over a time T. What is learnt is taken in by assumed-density filtering: the exact moments of one function of
     the cells, the logarithm of the mean extinction over a stretch, linearised.
-
-    Takes `length` [m], `steadiness` [s].
     """
 
     def __init__(self, deviation: float, length: float, steadiness: float) -> None:
@@ -78,10 +76,7 @@ class RouteField:
         return 2.0 * self._deviation**2 * -math.expm1(-max(age, 0.0) / self._steadiness)
 
     def leap(self, distance: float = 0.0) -> None:
-        """Doubt what was believed of a place and of all that lies beyond it: there the edge of a bank is.
-
-        Takes `distance` [m].
-        """
+        """Doubt what was believed of a place [m] and of all beyond it, since the edge of a bank is there."""
         first = math.floor((distance - self._rear()) / CELL)
         beyond = np.arange(COUNT) >= first
         self._covariance += self._beforehand * beyond[:, None] * beyond
@@ -99,10 +94,7 @@ class RouteField:
     def learn(
         self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float, share: float = 1.0
     ) -> float:
-        """Update with a measurement of the mean extinction over a stretch; return the probability that it is right [-].
-
-        Takes `start`, `end` [m].
-        """
+        """Update with the mean extinction measured over a stretch [m]; return the probability that it is right [-]."""
         weights = route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
         return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor, share)
 
@@ -114,11 +106,9 @@ class RouteField:
     def learn_at_most(
         self, end: float, value: float, softness: float, wrong: float = 0.0, share: float = 1.0, side: float = 1.0
     ) -> None:
-        """Take in that the mean extinction from the vehicle on is likely no more than a value, for `side` -1 no less.
+        """Learn that the mean extinction up to `end` [m] is likely no more than a value, for `side` -1 no less.
 
         Nothing changes where that is believed already: the errors of bounds that are repeated are alike.
-
-        Takes `end` [m].
         """
         before, shared, variance = self._linearised(0.0, end)
         if variance <= 0.0 or side * before + _BELIEVED * math.sqrt(variance) < side * value:

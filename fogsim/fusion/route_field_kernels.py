@@ -21,10 +21,7 @@ _WEIGHED = 41
 
 @kernel
 def mean_extinction(mean: Floats, weights: Floats) -> tuple[float, Floats]:
-    """Logarithm of the mean extinction over a stretch, and its derivative by each cell's ln k.
-
-    Takes `mean` (n,), `weights` (n,).
-    """
+    """Logarithm of the mean extinction over a stretch, and its derivative by each cell's ln k (n,)."""
     largest, total = mean[0], 0.0
     for i in range(mean.size):
         if weights[i] > 0.0:
@@ -39,10 +36,7 @@ def mean_extinction(mean: Floats, weights: Floats) -> tuple[float, Floats]:
 
 @kernel
 def condition(mean: Floats, covariance: Floats, toward: Floats, moved: float, narrowed: float) -> None:
-    """Take in what is learnt of one linear function of the cells, in place.
-
-    Takes `mean`, `covariance` (n, n), `toward` (n,).
-    """
+    """Learn the value of one linear function `toward` (n,) of the cells: updates `mean` and `covariance` in place."""
     for i in range(mean.size):
         mean[i] += moved * toward[i]
         for j in range(mean.size):
@@ -51,10 +45,7 @@ def condition(mean: Floats, covariance: Floats, toward: Floats, moved: float, na
 
 @kernel
 def _spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
-    """Covariance of all cells with a linear function of them, and its variance.
-
-    Takes `covariance` (n, n), `gradient` (n,).
-    """
+    """Covariance (n,) of all cells with a linear function of them, and its variance."""
     shared, variance = np.zeros(gradient.size), 0.0
     for j in range(gradient.size):
         if gradient[j] != 0.0:
@@ -67,10 +58,7 @@ def _spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
 
 @kernel
 def marginals(covariance: Floats, rear: float, cell: float) -> tuple[Floats, Floats]:
-    """Where the middle of each cell is ahead of the vehicle [m], and the standard deviation of its ln k [-].
-
-    Takes `covariance` (n, n), `rear`, `cell` [m].
-    """
+    """Where the middle of each cell is ahead of the vehicle [m], and the standard deviation of its ln k [-]."""
     middles, deviations = np.empty(len(covariance)), np.empty(len(covariance))
     for i in range(len(covariance)):
         middles[i] = rear + cell * (i + 0.5)
@@ -80,10 +68,7 @@ def marginals(covariance: Floats, rear: float, cell: float) -> tuple[Floats, Flo
 
 @kernel
 def stretch_weights(count: int, cell: float, rear: float, start: float, end: float) -> Floats:
-    """Share of a stretch that lies in each cell; of one beyond all cells or without length, in the nearest.
-
-    Takes `cell`, `rear` [m], `start`, `end` [m].
-    """
+    """Share of a stretch [m] that lies in each cell; of one beyond all cells or without length, in the nearest."""
     weights, total = np.zeros(count), 0.0
     for i in range(count):
         inside = min(rear + (i + 1) * cell, end) - max(rear + i * cell, start)
@@ -98,11 +83,9 @@ def stretch_weights(count: int, cell: float, rear: float, start: float, end: flo
 
 @kernel
 def linearised(mean: Floats, covariance: Floats, weights: Floats) -> tuple[float, Floats, float]:
-    """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance.
+    """Logarithm of the mean extinction over a stretch: mean, covariance (n,) with all cells, and variance.
 
     A mean of exponentials is above the exponential of a mean: to second order by half of what the cells differ.
-
-    Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
     value, gradient = mean_extinction(mean, weights)
     shared, variance = _spread_with(covariance, gradient)
@@ -126,8 +109,6 @@ def learn(
     """Update in place with the mean extinction measured over a stretch; return the probability that it is right.
 
     The deviation is widened by 1 / √`share` for errors that repeat; whether it is wrong is judged without that.
-
-    Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
     before, shared, variance = linearised(mean, covariance, weights)
     total, apart = variance + max(deviation, floor) ** 2, value - before
@@ -166,10 +147,7 @@ def learn_curve(
 
 @kernel
 def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> Floats:
-    """Probability of each of evenly spaced cells by samples, spread evenly between one and the next.
-
-    Takes `samples` (n,).
-    """
+    """Probability of each of evenly spaced cells by samples (n,), spread evenly between one and the next."""
     out, before, j = np.zeros(count), 0.0, 0
     for i in range(count):
         edge = first + (i + 0.5) * step
@@ -207,12 +185,7 @@ def roll(mean: Floats, covariance: Floats, weights: Floats, level: float, rest: 
 
 @kernel
 def extend_factor(covariance: Floats, upper: Floats, row: int) -> None:
-    """Next column of the upper triangular matrix U with UᵀU a covariance (Cholesky), in place.
-
-    What rounding makes negative counts as 0.
-
-    Takes `covariance` (n, n), `upper` (n, n).
-    """
+    """Next column of the upper triangular U (n, n) with UᵀU a covariance (Cholesky), in place; below 0 counts as 0."""
     left = covariance[row].copy()
     for j in range(row):
         share = left[j] / upper[j, j]
@@ -224,10 +197,7 @@ def extend_factor(covariance: Floats, upper: Floats, row: int) -> None:
 
 @kernel
 def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends: Floats, depth: float) -> Floats:
-    """Samples of the mean extinction from the vehicle to where a depth is reached, as logarithms.
-
-    Takes `mean` (n,), `covariance` (n, n), `normals` (n, pairs), `ends` (n,) [m].
-    """
+    """Samples of ln of the mean extinction from the vehicle to where a depth is reached; `normals` (n, pairs)."""
     pairs = normals.shape[1]
     reached, found, apart = np.zeros(2 * pairs), np.zeros(2 * pairs), np.empty(pairs)
     start, waiting, upper = 0.0, 2 * pairs, np.empty_like(covariance)

@@ -113,13 +113,7 @@ class LegalRules:
         return LAWS[self.country].near_lead
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
-
-        Parameters
-        ----------
-        belief, observation, time, previous
-            What is believed and measured, the instant, and lamps lit now.
-        """
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`."""
         law = LAWS[self.country]
         # The paper's rule, by the thresholds of the country.
         fog_lamps = law.rear_fog_below, law.front_fog_below

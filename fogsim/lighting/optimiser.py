@@ -55,13 +55,7 @@ class SightOptimiser:
     quantile: Quantile = CAREFUL
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
-
-        Parameters
-        ----------
-        belief, observation, time, previous
-            What is believed and measured, the instant, and lamps lit now.
-        """
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`."""
         known = belief.known_visibility(self.quantile)
         if known is None:
             return LampChoice(BY_DAY)

@@ -35,22 +35,16 @@ _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 
 
 def headlamp_sight_distance(lamps: Lamp, visibility: float, glare: float = 0.0) -> float:
-    """Distance from the eyes at which a small object on the road reaches visibility level 7 [m].
+    """Distance from the eyes at which a small object on the road reaches visibility level 7, 0 … `FARTHEST` [m].
 
     The largest one up to `FARTHEST`: it is looked for from far away on, since with a cut-off the level is not monotone.
-
-    Returns 0 where it is seen nowhere, `FARTHEST` where it is seen from there on. Takes `visibility` [m], `glare`
-    [cd/m²].
     """
     beams = int(lamps & _BEAMS)
     return _sight_distance(beams, extinction_from_visibility(visibility), glare) if beams else 0.0
 
 
 def own_veil(lamps: Lamp, visibility: float, distance: float) -> float:
-    """Veil that the own lamps make of the fog between a car driver's eyes and the road straight ahead [cd/m²].
-
-    Takes `visibility` [m], `distance` [m].
-    """
+    """Veil that the own lamps make of the fog between a driver's eyes and the road up to a distance [m] [cd/m²]."""
     return float(np.interp(distance, _DISTANCES, _veil(int(lamps & _BEAMS), extinction_from_visibility(visibility))))
 
 

@@ -152,13 +152,7 @@ class Gallen2014:
     quantile: Quantile = CAREFUL
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
-
-        Parameters
-        ----------
-        belief, observation, time, previous
-            What is believed and measured, the instant, and lamps lit now.
-        """
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`."""
         visibility = belief.known_visibility(self.quantile)
         if visibility is None:
             return LampChoice(BY_DAY)
@@ -179,11 +173,5 @@ class AlwaysHigh:
         belief: Belief,  # noqa: ARG002 - the protocol's parameters
         previous: Lamp,  # noqa: ARG002 - the protocol's parameters
     ) -> Lamp:
-        """Choose the lamps to light; see `LightingPolicy.lamps`.
-
-        Parameters
-        ----------
-        belief, previous
-            What is believed about the fog, and lamps lit now.
-        """
+        """Choose the lamps to light; see `LightingPolicy.lamps`."""
         return HIGH_BEAMS

@@ -44,7 +44,7 @@ class _Squares(NamedTuple):
 class RoadSpeeds:
     """Speeds along a road: the ego's way, passed to `update`, or else the route that spans name.
 
-    What is on an ego's way is known only when it has driven it: until then others' speeds wait in small squares.
+    Only afterwards is it known what was on the ego's way: until then, others' speeds are kept in small squares.
     """
 
     def __init__(self) -> None:
@@ -86,22 +86,14 @@ class RoadSpeeds:
         return self._pending[0]
 
     def sums(self) -> NDArray[np.float64]:
-        """Sums over all steps so far, a row for each stretch of road that had vehicles.
-
-        Returns `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego,
-        and of everyone (n, 7).
-        """
+        """Sums over all steps so far (n, 7), `ROAD_COLUMNS` for each stretch of road that had vehicles [m, s, s/m]."""
         everybody, nobody = self._all_vehicles(), np.zeros(3)
         cells = sorted(self._ego.keys() | everybody.keys())
         rows = [(CELL_LENGTH * (c + 0.5), *self._ego.get(c, nobody), *everybody.get(c, nobody)) for c in cells]
         return np.array(rows).reshape(-1, len(ROAD_COLUMNS))
 
     def means(self) -> NDArray[np.float64]:
-        """Means over all vehicles on the road and all steps so far, a row for each stretch that had vehicles.
-
-        Returns middle of the stretch [m], speed as way over time [m/s], extinction [1/m], and time of the vehicles [s]
-        (n, 4).
-        """
+        """Middle [m], speed [m/s], extinction [1/m] and vehicles' time [s] of each stretch with vehicles (n, 4)."""
         place, *_, time, way, extinction = self.sums().T
         met = time > 0.0
         return np.stack((place[met], way[met] / time[met], extinction[met] / time[met], time[met]), axis=1)

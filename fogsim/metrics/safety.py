@@ -82,7 +82,7 @@ class _Approach:
 class Conflict:
     """Surrogate safety of the ego at 5 m/s or more and its leader, moving or standing.
 
-    A slower ego only closes up to a queue, which shows how the traffic simulation's drivers do so, whatever the policy.
+    A slower ego is closing up to a queue, which shows the traffic simulation's drivers, not the policy.
     """
 
     threshold: float  # Time to collision below which the ego counts as exposed [s]

@@ -271,14 +271,10 @@ def _quotient_where(
     defined: ArrayLike, numerator: ArrayLike, denominator: ArrayLike, elsewhere: float
 ) -> NDArray[np.float64]:
     """Divide only where the quotient is defined, so that no division by zero is ever made."""
-    if _are_numbers(defined, numerator, denominator):
+    if all(isinstance(one, float | int | np.bool_) for one in (defined, numerator, denominator)):
         # One vehicle in each step: arrays would cost twice as much.
         number: NDArray[np.float64] = np.divide(numerator, denominator) if defined else np.array(elsewhere)[()]
         return number
     shape = np.broadcast(defined, numerator, denominator).shape
     result = np.full(shape, elsewhere, dtype=np.float64)
     return np.divide(numerator, denominator, out=result, where=np.asarray(defined, dtype=bool))[()]
-
-
-def _are_numbers(*values: object) -> bool:
-    return all(isinstance(value, float | int | np.bool_) for value in values)

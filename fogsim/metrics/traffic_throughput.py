@@ -34,11 +34,7 @@ def _count_passages(
     first: int,
     half_width: float,
 ) -> int:
-    """Count how often vehicles pass sections of a road in its direction.
-
-    Takes `position` (n, 2) [m], `step`, `vehicle` (n,) int, `last` (m, 4) [m], `sections` (s, 4) [m], `read` (k, s)
-    bool, `half_width` [m].
-    """
+    """Count in `read` (k, s) how often vehicles pass sections (s, 4) [m] of a road in its direction."""
     count = 0
     for i in range(len(position)):
         v = vehicle[i]

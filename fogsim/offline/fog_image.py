@@ -128,7 +128,7 @@ def _full_scale(image: Pixels, camera: Camera) -> float:
 def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
     """Pixel values (channels,) of the airlight, three at most, estimated from an image itself.
 
-    The median of the sky, or of its brightest `share`; without sky, the mean of the image's brightest thousandth.
+    It is the median of the sky or of its brightest `share`; without sky, the mean of the brightest thousandth.
     """
     colours = image.reshape(-1, 1 if image.ndim == 2 else image.shape[2])[:, :3].astype(np.float64)
     sky = np.isinf(distance).reshape(-1)

@@ -218,10 +218,7 @@ def refuse_unwritable_image(
 
 
 def write_image(path: Path, image: Pixels) -> None:
-    """Write an image in the format of its suffix, whole or not at all; colours are in OpenCV's order.
-
-    InputError if the format cannot hold its 16 bits, colours or transparency.
-    """
+    """Write an image whole or not at all, blue first; InputError if its format has no 16 bits, colours or opacity."""
     refuse_unwritable_image(path)
     ending, channels = path.suffix.lower(), 1 if image.ndim == 2 else image.shape[2]
     if channels == 4 and ending not in _TRANSPARENT and np.all(image[..., 3] == np.iinfo(image.dtype).max):

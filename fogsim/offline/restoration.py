@@ -207,10 +207,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 def restore_video(
     source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
 ) -> Generator[Restored]:
-    """Restore a video frame by frame; the file has its final name only when complete.
-
-    Frames before the first estimate are kept as they are; InputError if no frame has one.
-    """
+    """Restore a video, whole or not at all; frames before the first estimate stay. InputError if no frame has one."""
     refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
     found, reason, damage = False, "", ""
     with VideoWriter(out) as writer:

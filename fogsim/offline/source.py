@@ -43,31 +43,25 @@ class Source(Protocol):
     @property
     def period(self) -> float:
         """Time from one image to the next [s]."""
-        ...
 
     @property
     def temporal(self) -> bool:
         """Whether each image shows the same drive a moment after the one before."""
-        ...
 
     @property
     def count(self) -> int:
         """Number of images; approximate for a video."""
-        ...
 
     @property
     def description(self) -> str:
         """Short description of the source."""
-        ...
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """The files that are read."""
-        ...
 
     def pictures(self) -> Iterator[Picture]:
         """Read the images."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

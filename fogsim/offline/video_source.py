@@ -30,10 +30,7 @@ _TICKS = 90_000  # a second
 
 
 class VideoWriter:
-    """Writes a video of frames at uneven times; as a context, it names the file only after success.
-
-    `rate_factor` is libx264's constant rate factor, 0 … 51.
-    """
+    """Writes frames at uneven times, whole or not at all; `rate_factor` is libx264's constant rate factor, 0 … 51."""
 
     def __init__(self, out: Path, rate_factor: int = _RATE_FACTOR) -> None:
         self._out, self._rate_factor = out, rate_factor

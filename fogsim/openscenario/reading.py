@@ -202,10 +202,7 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
 
 
 def _vehicles_text(begin: Beginning, driven: str) -> str:
-    """Text of the route file: every vehicle is present from the start, with its initial position and speed.
-
-    The one that is `driven` is driven by its driver throughout.
-    """
+    """Text of the route file: vehicles present from the start; the `driven` one keeps its driver throughout."""
     routed = {*begin.effect.routes, *begin.positions.rerouted}
     lines, ways = ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>"], begin.positions.ways
     for name, vehicle in begin.positions.vehicles.items():

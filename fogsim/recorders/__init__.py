@@ -38,16 +38,16 @@ TrafficRecorderFactory = Callable[[RunInformation], TrafficRecorder]
 RECORDERS: Registry[RecorderFactory] = Registry(
     "recorder",
     {
-        "table": lambda run: TableRecorder(run.directory.table, run.methods),
-        "video": lambda run: VideoRecorder(run.directory.video, run.frame_period),
+        "table": lambda run: TableRecorder(run.directory.file("table"), run.methods),
+        "video": lambda run: VideoRecorder(run.directory.file("video"), run.frame_period),
         "restored_video": lambda run: VideoRecorder(
-            run.directory.restored_video, run.frame_period, draw_restored_picture
+            run.directory.file("restored_video"), run.frame_period, draw_restored_picture
         ),
         "report": ReportRecorder,
-        "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
-        "events": lambda run: EventRecorder(run.directory.events),
-        "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
-        "osi": lambda run: OsiRecorder(run.directory.osi),
+        "trajectories": lambda run: TrajectoryRecorder(run.directory.file("trajectories")),
+        "events": lambda run: EventRecorder(run.directory.file("events")),
+        "openscenario": lambda run: OpenScenarioRecorder(run.directory.file("openscenario"), run.title),
+        "osi": lambda run: OsiRecorder(run.directory.file("osi")),
     },
 )
 """Every recorder of runs about an ego, by name."""
@@ -55,12 +55,12 @@ RECORDERS: Registry[RecorderFactory] = Registry(
 TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
     "recorder of traffic alone",
     {
-        "table": lambda run: StepTable(run.directory.table, traffic_table_columns()),
+        "table": lambda run: StepTable(run.directory.file("table"), traffic_table_columns()),
         "report": TrafficReportRecorder,
-        "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
-        "events": lambda run: EventRecorder(run.directory.events),
-        "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
-        "osi": lambda run: OsiRecorder(run.directory.osi),
+        "trajectories": lambda run: TrajectoryRecorder(run.directory.file("trajectories")),
+        "events": lambda run: EventRecorder(run.directory.file("events")),
+        "openscenario": lambda run: OpenScenarioRecorder(run.directory.file("openscenario"), run.title),
+        "osi": lambda run: OsiRecorder(run.directory.file("osi")),
     },
 )
 """Every recorder of runs without an ego, by name."""

@@ -43,10 +43,7 @@ class _Event(NamedTuple):
 
 
 class EventRecorder(LoggedTable[tuple[object, ...]]):
-    """Writes ``events.parquet``: a row for each event, in the order of time; equal steps give equal bytes.
-
-    Rows are in the log from the step on in which they happened.
-    """
+    """Writes ``events.parquet``, a row for each event in the order of time; equal steps give equal bytes."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, EVENT_COLUMNS, write_event_table)

@@ -113,13 +113,7 @@ def shown_metric(key: str, value: object) -> str:
 
 
 class StepReport(ABC, Generic[AnyStep_contra]):
-    """Writes ``report.html``: metrics, figures and pictures in one file that opens without a network.
-
-    Parameters
-    ----------
-    information : RunInformation
-        The run.
-    """
+    """Writes ``report.html``: metrics, figures and pictures in one file that opens without a network."""
 
     def __init__(self, information: RunInformation) -> None:
         self._information = information
@@ -128,15 +122,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
         self._open = True
 
     def record(self, step: AnyStep_contra, derived: Derived) -> None:
-        """Remember a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        derived : mapping from str to float or None
-            `DERIVED_QUANTITIES` of the step.
-        """
+        """Remember a step, and what was derived from it."""
         self._remember(step, derived)
         self._last = step.time
         self._not_played = step.unplayed.lines
@@ -162,13 +148,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
         return ()
 
     def close(self, complete: bool) -> None:
-        """Write the report; it says so if the run was cut short.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short.
-        """
+        """Write the report; it says so if the run was cut short."""
         if not self._open:
             return
         information, metrics = self._information, self._information.summary()
@@ -190,24 +170,18 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             pictures=self._pictures(),
             signs=self._signs(),
             most_signs=_MOST_SIGNS,
-            footer=_footnotes(information.seed),
+            footer={"seed": str(information.seed), **{k: v or "not installed" for k, v in versions().items()}},
             label=_label,
             value=shown_metric,
             jpeg=_jpeg,
             caption=_caption,
         )
-        write_text(information.directory.report, text)
+        write_text(information.directory.file("report"), text)
         self._open = False
 
 
 class ReportRecorder(StepReport[Step]):
-    """Writes the report of a run about an ego.
-
-    Parameters
-    ----------
-    information : RunInformation
-        The run.
-    """
+    """Writes the report of a run about an ego."""
 
     def __init__(self, information: RunInformation) -> None:
         super().__init__(information)
@@ -231,7 +205,3 @@ class ReportRecorder(StepReport[Step]):
 
     def _signs(self) -> Sequence[SignRow]:
         return self._book.rows
-
-
-def _footnotes(seed: int) -> Mapping[str, str]:
-    return {"seed": str(seed), **{name: version or "not installed" for name, version in versions().items()}}

@@ -87,9 +87,6 @@ class Curves:
         self.collisions.extend(map(step.time_of, step.collisions))
         self.warning.append(step.command.warning)
         self.ahead.add(step)
-        self._add_estimates(step)
-
-    def _add_estimates(self, step: Step) -> None:
         for estimate in step.estimates:
             points = self.estimates.setdefault(estimate.method, [])
             if estimate.valid and math.isfinite(estimate.visibility):
@@ -243,10 +240,7 @@ _WARNINGS = {
 
 
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
-    """Draw every figure of the report.
-
-    Returns caption and PNG of each figure (str, bytes). Takes `time_to_collision_threshold` [s].
-    """
+    """Caption and PNG of every figure of the report (`time_to_collision_threshold` [s])."""
 
     def figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None]) -> bytes:
         return figure_over_time(curves.time, curves.collisions, heights, draw)

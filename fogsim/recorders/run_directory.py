@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from fogsim.core.files.atomic import Reserve, partial_path, write_json
@@ -88,7 +87,7 @@ class RunDirectory:
         if overwrite:
             return
         # Without a manifest, a run was killed when all its results were in place.
-        if self.manifest.exists():
+        if self.file("manifest").exists():
             raise InputError(
                 f"{self.path} contains rows of an unfinished run: {_fate_of_run(self.unfinished)}. "
                 f"fogsim recover {self.path} makes them readable, --overwrite replaces them, --out goes elsewhere"
@@ -140,13 +139,10 @@ class RunDirectory:
     def write_metrics(self, metrics: Mapping[str, object]) -> None:
         """Write ``metrics.json``, after releasing the space reserved for it and the manifest."""
         (self.unfinished / _RESERVE).unlink(missing_ok=True)
-        write_json(self.unfinished / _NAMES["metrics"], metrics)
+        write_json(self.file("metrics"), metrics)
 
     def finish(self, manifest: Mapping[str, object]) -> None:
-        """Write the manifest, with the names of the files, and replace all earlier results by the new ones.
-
-        If rows are left that could not be made into a table, the earlier results and the folder of the new ones stay.
-        """
+        """Write the manifest and replace all earlier results; if rows are left over, both old and new ones stay."""
         finish_folder(self.path, manifest)
 
     def close(self) -> None:
@@ -157,60 +153,12 @@ class RunDirectory:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    @property
-    def manifest(self) -> Path:
-        """What was run, with what, and how it ended."""
-        return self.unfinished / _NAMES["manifest"]
-
-    @property
-    def metrics(self) -> Path:
-        """Summary of the metrics."""
-        return self.unfinished / _NAMES["metrics"]
-
-    @property
-    def table(self) -> Path:
-        """A row per step."""
-        return self.unfinished / _NAMES["table"]
-
-    @property
-    def trajectories(self) -> Path:
-        """A row per vehicle and step."""
-        return self.unfinished / _NAMES["trajectories"]
-
-    @property
-    def events(self) -> Path:
-        """A row per event."""
-        return self.unfinished / _NAMES["events"]
-
-    @property
-    def openscenario(self) -> Path:
-        """The run as an OpenSCENARIO file."""
-        return self.unfinished / _NAMES["openscenario"]
-
-    @property
-    def osi(self) -> Path:
-        """The run as a trace of ASAM OSI's ground truth."""
-        return self.unfinished / _NAMES["osi"]
-
-    @property
-    def video(self) -> Path:
-        """Camera frames, with a panel next to them."""
-        return self.unfinished / _NAMES["video"]
-
-    @property
-    def restored_video(self) -> Path:
-        """The same with half of each frame restored."""
-        return self.unfinished / _NAMES["restored_video"]
-
-    @property
-    def report(self) -> Path:
-        """HTML report."""
-        return self.unfinished / _NAMES["report"]
+    def file(self, result: str) -> Path:
+        """Path of a result, ``manifest``, ``metrics`` or that of a recorder, until the end of the run."""
+        return self.unfinished / _NAMES[result]
 
     def files(self) -> list[str]:
         """Sorted names of the complete result files of a finished run."""

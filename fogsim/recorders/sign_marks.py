@@ -22,7 +22,7 @@ def write_sign_map(
     path: Path, signs: SignMap, name: str, geographic: Callable[[float, float], LonLat] | None = None
 ) -> None:
     """Write a sign map as a GeoJSON FeatureCollection of points (`geographic` [m], [deg])."""
-    place = geographic or _as_they_are
+    place = geographic or (lambda x, y: (x, y))
     write_json(
         path,
         {
@@ -32,10 +32,6 @@ def write_sign_map(
             "features": [_feature(sign, place) for sign in signs.signs],
         },
     )
-
-
-def _as_they_are(x: float, y: float) -> LonLat:
-    return x, y
 
 
 def _feature(sign: Sign, place: Callable[[float, float], LonLat]) -> dict[str, object]:
@@ -90,10 +86,7 @@ def looks_of(diagnostic: object) -> tuple[SignLook, ...]:
 def draw_signs(
     draw: ImageDraw.ImageDraw, signs: Iterable[SignLook], scale: float, origin: tuple[int, int], size: tuple[int, int]
 ) -> None:
-    """Mark signs: a thin circle where the map has one, a bright one with its distances where it was detected.
-
-    Takes `origin` [px], `size` [px].
-    """
+    """Mark signs [px]: a thin circle where the map has one, a bright one with its distances where it was detected."""
     written: list[tuple[float, float, float, float]] = []
     for sign in sorted(signs, key=lambda one: one.distance)[:_MOST]:
         u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, _LEAST_RADIUS)

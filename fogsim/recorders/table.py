@@ -91,12 +91,10 @@ class LoggedTable(ABC, Generic[Held]):
 
 
 class StepTable(LoggedTable[Sequence[object]], Generic[AnyStep_contra]):
-    """Writes ``steps.parquet``: one row a step, columns with units in their names.
+    """Writes ``steps.parquet``: one row a step, columns with units in their names (`clock` [s]).
 
     The metadata of its schema says ``fogsim.complete`` (``true`` or ``false``), ``fogsim.methods`` (comma-separated)
     and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes.
-
-    Takes `clock` [s].
     """
 
     def __init__(

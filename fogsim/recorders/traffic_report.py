@@ -65,13 +65,7 @@ class TrafficCurves:
 
 
 class TrafficReportRecorder(StepReport[TrafficStep]):
-    """Writes the report of traffic alone.
-
-    Parameters
-    ----------
-    information : RunInformation
-        The run.
-    """
+    """Writes the report of traffic alone."""
 
     def __init__(self, information: RunInformation) -> None:
         super().__init__(information)
@@ -86,10 +80,7 @@ class TrafficReportRecorder(StepReport[TrafficStep]):
 
 
 def _draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
-    """Draw every figure of the report of traffic alone.
-
-    Returns caption and PNG of each figure (str, bytes).
-    """
+    """Caption and PNG of every figure of the report of traffic alone."""
     time, collisions = curves.time, curves.collisions
     return [
         (
@@ -109,10 +100,7 @@ def _draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
 
 
 def _road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
-    """Draw speed over the road, and the visibility there.
-
-    Returns caption and PNG. Takes `along_road` (n, 4).
-    """
+    """Caption and PNG of speed over the road, and of the visibility there (`along_road` (n, 4))."""
     # No one's mean is a line across a stretch that no one was on.
     place, speed, extinction, _ = np.insert(along_road, _breaks(along_road[:, 0]), np.nan, axis=0).T
 

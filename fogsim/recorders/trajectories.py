@@ -150,12 +150,10 @@ _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
 
 
 class TrajectoryRecorder(LoggedTable[TrafficStep]):
-    """Writes ``trajectories.parquet``: a row for each vehicle and each person on foot that is read, and each step.
+    """Writes ``trajectories.parquet``: a row for each vehicle and person on foot that is read, and each step.
 
     Rows go by time, and within a time as the traffic lists the vehicles, then persons; equal steps give equal bytes.
     Memory does not grow with the run.
-
-    Takes `clock` [s].
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
@@ -215,10 +213,7 @@ class TrajectoryRecorder(LoggedTable[TrafficStep]):
 
 
 def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnyStep]:
-    """Pass steps on, and write the trajectories of all vehicles in them into a parquet file.
-
-    Yields the steps.
-    """
+    """Pass steps on, and write the trajectories of all vehicles in them into a parquet file."""
     with TrajectoryRecorder(path) as recorder:
         for step in steps:
             recorder.record(step)

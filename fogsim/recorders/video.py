@@ -21,12 +21,7 @@ CLOSING_LIMIT = 5.0
 
 
 class VideoRecorder:
-    """Writes a video (H.264, yuv420p): the camera's image with a panel of what is known and done.
-
-    A run without steps leaves no video.
-
-    Takes `frame_period` [s].
-    """
+    """Writes a video (H.264, yuv420p), camera and panel, every `frame_period` [s]; none of a run without steps."""
 
     def __init__(
         self, path: Path, frame_period: float, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture
@@ -107,10 +102,7 @@ class Encoder:
 def encoder_command(
     path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT), rate_factor: int = 20
 ) -> list[str]:
-    """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play.
-
-    Takes `frame_period` [s], `size` [px].
-    """
+    """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play."""
     rate = Fraction(1.0 / frame_period).limit_denominator(1001)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
     return encoding_command(path, source, rate_factor)

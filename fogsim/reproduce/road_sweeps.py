@@ -46,10 +46,7 @@ _START, _END = 0.0, 500.0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The true camera's view of one instant of a drive without air, its pose, and the sensed vehicle ahead, if any.
-
-    The grade of the pose is the pitch that the vehicle does not know of.
-    """
+    """The true camera's view of one instant without air, its pose with the unknown grade, and the sensed leader."""
 
     view: View
     pose: CameraPose
@@ -148,10 +145,7 @@ Form = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A camera, how much the road's albedo changes along the way [-], and a sensor.
-
-    The true pitch is off the assumed one by 0.1° and sways by 0.05°.
-    """
+    """Camera, change of the road's albedo along the way [-], sensor; the true pitch is 0.1° off and sways by 0.05°."""
 
     name: str
     camera: Camera = CAMERA

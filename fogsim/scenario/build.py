@@ -115,10 +115,7 @@ def _script(scenario: ScenarioFile) -> Script:
 
 
 def input_files(scenario: ScenarioFile) -> tuple[Path, ...]:
-    """Files that traffic and methods of a scenario read, and those that these name; InputError if SUMO's are missing.
-
-    Modules of methods are not among them.
-    """
+    """Files that traffic and methods (not their modules) read, or that these name; InputError if SUMO's are missing."""
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     files = [folder / path for path in named]
@@ -133,10 +130,7 @@ def input_files(scenario: ScenarioFile) -> tuple[Path, ...]:
 
 
 def named_files(scenario: ScenarioFile) -> tuple[Path, ...]:
-    """Files that parameters of methods and options of SUMO name, as seen from the scenario's folder.
-
-    Those that YAML files among them name in turn, such as the beams of a file of lamps, follow.
-    """
+    """Files that parameters and SUMO's options name, and those that YAML files among them name in turn."""
     folder = scenario.directory
     found = list(_files(_free_texts(deciding(scenario)), folder, Path()))
     for path in [one for one in found if one.suffix in (".yaml", ".yml")]:
@@ -175,13 +169,14 @@ _CONDITIONS = ("at_position_m", "at_time_s", "at_gap_to_ego_m")
 def traffic_setup(scenario: ScenarioFile) -> TrafficSetup:
     """What the traffic stage needs to know."""
     traffic, folder, files = scenario.traffic, scenario.directory, traffic_files(scenario)
+    staying = (name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)
     return TrafficSetup(
         net=files.net,
         routes=files.routes,
         additional=files.additional,
         ego=traffic.ego if traffic.has_ego else None,
         step_length=scenario.clocks.traffic_step_s,
-        keep_lane=tuple(dict.fromkeys((*traffic.keep_lane, *_staying_actors(scenario)))),
+        keep_lane=tuple(dict.fromkeys((*traffic.keep_lane, *staying))),
         warm_up_limit=traffic.warm_up_limit_s,
         warm_up=traffic.warm_up_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
@@ -205,11 +200,6 @@ def _option_text(value: OptionValue, folder: Path) -> str:
     if not isinstance(value, str):
         return str(value)
     return ",".join(str(folder / name) if name and (folder / name).is_file() else name for name in value.split(","))
-
-
-def _staying_actors(scenario: ScenarioFile) -> Iterator[str]:
-    """Actors that stay in their lanes."""
-    return (name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)
 
 
 def _switched_lamps(scenario: ScenarioFile) -> Iterator[Event]:

@@ -159,10 +159,7 @@ class Document:
         return origin != str(self.path) and not is_openscenario(Path(origin.rpartition(":")[0]))
 
     def overridden(self, overrides: Iterable[str]) -> "Document":
-        """Copy in which overridden keys, and all below them, have the overrides as origins.
-
-        Blocks around them have both origins.
-        """
+        """Copy in which overridden keys and all below have the overrides as origins, and blocks around them both."""
         origins = dict(self.origins)
         for text in overrides:
             at, origin = _override_path(text), _shown_override(text)
@@ -174,10 +171,7 @@ class Document:
 
 
 def read_scenario_document(path: Path) -> Document:
-    """Read a scenario's YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
-
-    A YAML file with ``scenario: FILE.xosc`` starts from that file and adds or replaces keys.
-    """
+    """Read a scenario's YAML file, which ``scenario: FILE.xosc`` may start from OpenSCENARIO, or an ``.xosc`` file."""
     if is_openscenario(path):
         return _read_openscenario(path)
     document = read_document(path)

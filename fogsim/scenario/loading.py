@@ -281,13 +281,7 @@ def override(
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the traffic step, the camera period and the decision period [s].
-
-    Parameters
-    ----------
-    step, camera, decision : float
-        Those times [s].
-    """
+    """Overrides that set the traffic step, the camera period and the decision period [s]."""
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
     return [f"clocks.{key}_s={float(time)!r}" for key, time in times.items()]
 

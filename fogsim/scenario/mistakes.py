@@ -94,7 +94,7 @@ def _found(schema: object, detail: ErrorDetails, data: object) -> _Found:
     if is_unknown:
         path = (*path, detail["loc"][-1])
     if detail["type"].startswith("union_tag"):
-        path = (*path, _discriminator(detail["ctx"]))
+        path = (*path, str(detail["ctx"]["discriminator"]).strip("'"))
     return _Found(detail, path, is_of_union, tuple(one for one in allowed if _is_model(one)))
 
 
@@ -149,11 +149,6 @@ def _plain_number(path: KeyPath, value: object) -> str:
 def _message(detail: ErrorDetails) -> str:
     message = _WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
     return printable(f"{message[0].lower()}{message[1:]}", in_one_line=True)
-
-
-def _discriminator(context: dict[str, Any]) -> str:
-    """Key by which blocks of a list are distinguished, in pydantic's spelling."""
-    return str(context["discriminator"]).strip("'")
 
 
 def _own_path(schema: object, location: Sequence[str | int], data: object) -> tuple[KeyPath, tuple[Any, ...], bool]:

@@ -34,7 +34,8 @@ from fogsim.core.registry.user_code import import_anything
 from fogsim.errors import InputError, is_name
 from fogsim.scenario.mistakes import MISTAKE, mistakes_in
 from fogsim.scenario.plain_yaml import dotted
-from fogsim.units.quantities import is_quantity, parse_quantity
+from fogsim.units import KMH_PER_MPS
+from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 FARTHEST = 1e6
 """Longest length, and longest time, that a scenario may name [m, s]."""
@@ -204,6 +205,17 @@ def key_descriptions(section: type[BaseModel]) -> dict[str, str]:
 def _classes(module: str) -> dict[str, ast.ClassDef]:
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+def in_si(section: Section, *without: str) -> dict[str, Any]:
+    """Values of a block by its keys without units, in m/s and radians; keys `without` a counterpart are left out."""
+    values = {}
+    for key in type(section).model_fields.keys() - set(without):
+        stem, _, unit = key.rpartition("_")
+        value = getattr(section, key)
+        value = math.radians(value) if unit == "deg" else value / KMH_PER_MPS if unit == "kmh" else value
+        values[stem if unit in UNIT_OF_SUFFIX else key] = value
+    return values
 
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})

@@ -34,10 +34,7 @@ _LONGER, _ASIDE = 1.05, 50.0  # by which SUMO may measure a route longer than it
 
 
 def step_mistake(clocks: Clocks) -> str | None:
-    """Why SUMO cannot make a traffic step, and the nearest possible one; None if it can.
-
-    SUMO would round the step to whole milliseconds, and times and speeds would disagree from then on.
-    """
+    """Why SUMO cannot make a traffic step, which it rounds to whole ms, and the nearest possible; None if it can."""
     step, camera = clocks.traffic_step_s / CLOCK_TICK, clocks.camera_period_s / CLOCK_TICK
     if step > 0.5 and _is_whole(step):
         return None

@@ -40,10 +40,7 @@ def faulty_lead_sensor(sensor: LeadSensor, faults: Iterable[RunningFault]) -> Le
 
 
 def faulty_lead(measured: LeadMeasurement | None, faults: Iterable[RunningFault]) -> LeadMeasurement | None:
-    """What a radar with faults makes of what it measures.
-
-    Returns None if it has lost the vehicle ahead, or there is none.
-    """
+    """What a radar with faults makes of what it measures; None if it has lost the vehicle ahead, or there is none."""
     for fault in faults:
         match fault.kind:
             case LeadDropout(share):
@@ -57,10 +54,7 @@ def faulty_lead(measured: LeadMeasurement | None, faults: Iterable[RunningFault]
 
 
 def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
-    """Where a vehicle with faults takes itself to be.
-
-    Returns None if it does not know.
-    """
+    """Where a vehicle with faults takes itself to be; None if it does not know."""
     for fault in faults:
         match fault.kind:
             case PositionBias(east, north, along, left):
@@ -74,10 +68,7 @@ def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
 
 
 def faulty_scattering(measured: float, faults: Iterable[RunningFault]) -> float | None:
-    """Extinction coefficient that a scatterometer with faults reports [1/m]; None if it reports nothing.
-
-    Takes `measured` [1/m].
-    """
+    """Extinction coefficient that a scatterometer with faults reports [1/m]; None if it reports nothing."""
     for fault in faults:
         match fault.kind:
             case Fouled(factor):

@@ -21,12 +21,10 @@ _DENSE_WOOD = 14.0
 
 
 def foliage_loss(way: float, frequency: float = _FREQUENCY) -> float:
-    """What leaves take from a wave on a single way through them [dB].
+    """What leaves take from a wave on a single way [m] through them [dB] (`frequency` [GHz]).
 
     Source: Weissberger, M. A. (1982), An initial critical summary of models for predicting the attenuation of radio
     waves by trees, ESD-TR-81-101: the modified exponential decay model, for 0.23 to 95 GHz and trees in leaf.
-
-    Takes `way` [m], `frequency` [GHz].
     """
     if way <= 0.0:
         return 0.0
@@ -47,11 +45,9 @@ class RadarShadow:
         return self._is_there
 
     def share_of_reach(self, radar: ArrayLike, rear: ArrayLike) -> float:
-        """Share of its reach in the open that a radar has toward a vehicle, 0 … 1.
+        """Share of its reach in the open that a radar (3,) [m] has toward vehicles' rears (k, 3) [m], 0 … 1.
 
         By the radar equation a loss of L dB on the way there and on the way back shortens the reach by 10^(−2 L / 40).
-
-        Takes `radar` (3,) [m], `rear` (k, 3) [m].
         """
         points = np.asarray(rear, np.float64).reshape(-1, 3)
         starts = np.broadcast_to(np.asarray(radar, np.float64), points.shape)
@@ -80,11 +76,9 @@ def measure_lead(
     bearing: float = 0.0,
     share_of_reach: float = 1.0,
 ) -> LeadMeasurement | None:
-    """Measure the vehicle ahead.
+    """Measurement of the vehicle ahead; None if nothing is in view (`own_speed` [m/s], `bearing` [rad]).
 
-    Two numbers are drawn in every call, with a leader or without, so that what comes later never depends on it.
-
-    Returns None if nothing is within reach and field of view. Takes `own_speed` [m/s], `bearing` [rad].
+    Every call draws two numbers, leader or not, so that what comes later never depends on it.
     """
     distance_noise, speed_noise = rng.standard_normal(2).tolist()
     if leader is None or share_of_reach <= 0.0 or leader.gap > share_of_reach * sensor.reach:

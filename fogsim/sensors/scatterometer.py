@@ -6,13 +6,11 @@ import numpy as np
 
 
 class Scatterometer:
-    """Averages the extinction where it is, with an error of its calibration and noise.
+    """Averages the extinction where it is, with an error of its calibration and noise (`averaging_time` [s]).
 
     Both are factors e^(σ x), as for the sensors next to the road. The noise is averaged as the fog is, so that its
     deviation is that of the values that come out, however often they are asked for. The volume that it looks at is some
     0.1 dm³ (of Vaisala's FD12P: de Haij, KNMI): it measures the fog at its place and nothing of the road ahead.
-
-    Takes `averaging_time` [s].
     """
 
     def __init__(self, relative_deviation: float, calibration_deviation: float, averaging_time: float) -> None:
@@ -27,10 +25,7 @@ class Scatterometer:
         self._average: tuple[float, float, float] | None = None
 
     def measure(self, extinction: float, time: float) -> float:
-        """Measure.
-
-        Returns the extinction coefficient that it reports [1/m]. Takes `extinction` [1/m], `time` [s].
-        """
+        """Extinction coefficient that it reports at a time [s], of the true one [1/m]."""
         noise = float(self._rng.standard_normal())
         if self._average is not None:
             before, average, averaged = self._average

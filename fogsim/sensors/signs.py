@@ -19,11 +19,7 @@ def signs_ahead(
     corridor: float = 25.0,
     grade: float = 0.0,
 ) -> tuple[SignSighting, ...]:
-    """Signs ahead of a vehicle by the map, nearest first.
-
-    Returns signs that face the vehicle. Takes `position` (3,) [m], `heading` [rad], `reach` [m], `corridor` [m],
-    `grade` [rad].
-    """
+    """Signs of the map that are ahead of a vehicle and face it, nearest first; lengths in m, angles in rad."""
     forward, (x, y, z) = (math.cos(heading), math.sin(heading)), position.tolist()
     seen = []
     for sign in signs.signs:

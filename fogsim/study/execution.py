@@ -68,10 +68,7 @@ def watched_run(
     sumo_outputs: Path | None = None,
     profiles: Sequence[RunProfiles] = (),
 ) -> tuple[Mapping[str, str | int | float | None], Ending | None]:
-    """Run a scenario, with or without an ego; its metrics (`RunSummary.flat`), and why it ended.
-
-    `watches` get each step; what was not played is left to them.
-    """
+    """Run a scenario; its metrics (`RunSummary.flat`) and why it ended. `watches` see the steps and the unplayed."""
     has_ego, ending = scenario.traffic.has_ego, None
     metrics: MetricsOfRun[Any] = RunMetrics(watchers=profiles) if has_ego else TrafficRunMetrics(watchers=profiles)
     steps: Iterable[TrafficStep] = (
@@ -106,10 +103,7 @@ def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, 
 
 
 def outcome_of(measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Result of a run with its ``status``, or the ``message`` of its error, which must not end other runs.
-
-    Not even SystemExit passes: the exit code of a study or test comes from its outcomes.
-    """
+    """Result of a run with its ``status``, or the ``message`` of its error, SystemExit included: other runs go on."""
     try:
         return {"status": "complete", **measure()}
     except KeyboardInterrupt:
@@ -127,10 +121,7 @@ def failure(message: str) -> dict[str, Any]:
 
 
 def run_to_file(scenario: Scenario, seed: int, result: Path, work: Work = run_outcome) -> str | None:
-    """Run and write the outcome to `result`; return the error of the run, if any.
-
-    SUMO's outputs go to a folder of the same name next to it.
-    """
+    """Write a run's outcome to `result`, with SUMO's outputs in a folder of that name; return its error, if any."""
     outcome = work(scenario, seed, result.with_suffix(""))
     write_json(result, outcome)
     return outcome.get("message")

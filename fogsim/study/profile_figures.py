@@ -21,10 +21,7 @@ _LEAST_TIME = 5.0
 
 
 def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure:
-    """Share of vehicle-time with a time to collision above a threshold, for all thresholds.
-
-    One minus it is the time-exposed time to collision (TET; Minderhoud & Bovy 2001) as a share, at every threshold.
-    """
+    """Share of vehicle-time above each time to collision: 1 − TET as a share (Minderhoud & Bovy 2001)."""
     grid = Grid(study)
     figure, panels = grid.figure(2.2)
     thresholds = CLASS_WIDTH * np.arange(CLASSES + 1)
@@ -64,10 +61,7 @@ def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
 
 
 def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Mean speed of all vehicles along the road, over the fog there; None if no road is known.
-
-    The road is the ego's route, or ``traffic.along`` without an ego.
-    """
+    """Mean speed over the fog along the ego's route, or ``traffic.along`` without an ego; None if no road is known."""
     if not any(len(pooled.speeds()) for pooled in cells.values()):
         return None
     grid = Grid(study)

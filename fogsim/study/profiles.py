@@ -121,10 +121,7 @@ _SUMS = ROAD_COLUMNS[1:]
 
 
 class _CollisionPlace(NamedTuple):
-    """Time [s], position (east, north) [m] and speed difference [m/s] of a collision.
-
-    x and y are None if neither vehicle was near the ego.
-    """
+    """Time [s], position (east, north) [m], None far from the ego, and speed difference [m/s] of a collision."""
 
     seed: int
     time: float
@@ -163,19 +160,13 @@ class PooledProfiles:
         self.collisions += [_CollisionPlace(seed, *values) for values in zip(*columns, strict=True)]
 
     def survival(self) -> NDArray[np.float64]:
-        """Share of all vehicles' time with a time to collision above the upper end of each class [-].
-
-        Followers slower than 5 m/s, which close up to a queue, count as above.
-        """
+        """Share of vehicles' time with a time to collision above each class's end [-]; below 5 m/s counts as above."""
         if self.vehicle_time <= 0.0:
             return np.full(CLASSES, np.nan)
         return np.asarray(1.0 - np.cumsum(self.moving + self.queue) / self.vehicle_time)
 
     def speeds(self, *, ego_only: bool = False) -> NDArray[np.float64]:
-        """Columns of position along the road [m], mean speed there [m/s] and observed time [s].
-
-        Of all vehicles on the ego's road, or of the ego only.
-        """
+        """Columns of position [m], mean speed [m/s] and observed time [s] on the ego's road, of all or of the ego."""
         time, way = (0, 1) if ego_only else (3, 4)
         found = [(place, sums[way] / sums[time], sums[time]) for place, sums in self._road() if sums[time] > 0.0]
         return np.array(found).reshape(-1, 3)

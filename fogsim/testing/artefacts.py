@@ -161,10 +161,7 @@ Kept = Mapping[tuple[str, str, str], Artefacts]
 def keep_artefacts(
     outcomes: Sequence[FileOutcome], out: Path, processes: int, watch: Callable[[int, int], None] = lambda _, __: None
 ) -> Kept:
-    """Run the representative case of each clause that did not pass again, and keep plots and videos of it.
-
-    The same seed gives the same run. `watch` receives the number of finished cases and their total.
-    """
+    """Run each failed clause's representative case again and keep plots and videos; `watch` gets number and total."""
     failed: dict[str, tuple[StudyRun, list[Finding]]] = {}
     for one in outcomes:
         for judgement in one.judgements:

@@ -69,7 +69,7 @@ def shrink(
 def smallest_case(
     start: Values, first: Values, divisible: Container[str], known: Mapping[str, bool], run: Fails
 ) -> SmallestCase:
-    """The smallest case that fails, from the failing one `start`; `divisible` names are searched between values.
+    """The smallest failing case from `start` down; `divisible` names are searched between their values.
 
     `known` outcomes, by `case_key`, are not run again.
     """

@@ -97,10 +97,7 @@ def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
 
 
 def cross_section(kind: str, width: float, height: float) -> tuple[float, float]:
-    """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long.
-
-    Takes `width`, `height` [m].
-    """
+    """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long."""
     large = kind in {"truck", "bus"} and math.isclose(width, _CAR_SECTION[0]) and math.isclose(height, _CAR_SECTION[1])
     return LARGE_SECTION if large else (width, height)
 

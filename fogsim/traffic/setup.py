@@ -98,10 +98,7 @@ class AnyTraffic(Protocol):
         """Let drivers see only what this fog lets them see, from now on and in every later run."""
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin what a script asks for, with the next step.
-
-        Returns those that could not begin: the vehicle has left, or there is no such lane.
-        """
+        """Begin, with the next step, what a script asks for; return what could not begin, without vehicle or lane."""
 
     def advance(self, command: Command) -> None:
         """Move by one traffic step with a command in force."""

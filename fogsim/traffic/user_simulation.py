@@ -50,26 +50,9 @@ class _AttachedLink:
 
 
 class AttachedTraffic(SumoTraffic):
-    """SUMO traffic whose steps its owner commands: `obey` before each, `look` after it.
+    """SUMO traffic whose owner commands the steps: `obey` before each, `look` after it.
 
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The ego and how vehicles obey; of the simulation's files, only a network that is named is used.
-    api : module or traci.Connection
-        libsumo, traci, or one connection of traci, with a simulation that runs.
-
-    Attributes
-    ----------
-    ego : str
-        Id of the ego.
-
-    Raises
-    ------
-    SimulationError
-        If no simulation runs there, or a mesoscopic one.
-    InputError
-        If no ego is named.
+    Only the setup's network is used. SimulationError if no microscopic simulation is running.
     """
 
     def __init__(self, setup: TrafficSetup, api: Api) -> None:

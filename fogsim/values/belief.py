@@ -203,10 +203,7 @@ def _moments(values: NDArray[np.float64], probability: NDArray[np.float64]) -> t
 
 @kernel
 def _put_quantiles(values: NDArray[np.float64], probability: NDArray[np.float64], shares: NDArray[np.float64]) -> None:
-    """Put quantiles in the place of shares, by straight lines between the middles of cells.
-
-    Takes `values`, `probability` (n,), `shares` (m,).
-    """
+    """Put quantiles in the place of shares, by straight lines between the middles of cells."""
     last = len(values) - 1
     for i in range(len(shares)):
         share, quantile = shares[i], values[last]

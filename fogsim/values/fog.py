@@ -13,10 +13,7 @@ GROUND_ALBEDO = 0.1
 
 
 def airlight_share(ground_albedo: float = GROUND_ALBEDO) -> float:
-    """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
-
-    That is its luminance in a layer of fog under an overcast sky, E being the illuminance of the ground.
-    """
+    """Airlight seen level near the ground over E / π, in fog below an overcast sky that gives E: 0.34 + 0.66 ρ."""
     return 0.34 + 0.66 * ground_albedo
 
 

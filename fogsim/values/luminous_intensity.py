@@ -93,11 +93,9 @@ def checked_beam(beam: Beam, name: str = "beam") -> Beam:
 
 
 def luminous_intensity(beam: Beam, azimuth: ArrayLike, elevation: ArrayLike) -> NDArray[np.float64]:
-    """Intensity of a lamp in directions [cd], interpolated linearly in its logarithm.
+    """Intensity of a lamp in directions [rad], interpolated linearly in its logarithm [cd].
 
     Beyond the table the intensity of its border falls by `FALL_OFF`.
-
-    Takes `azimuth`, `elevation` [rad].
     """
     right, up = np.asarray(azimuth, dtype=np.float64), np.asarray(elevation, dtype=np.float64)
     table = np.log(np.maximum(beam.intensity, _FLOOR))
@@ -121,10 +119,7 @@ def _place(
 
 
 def signal_share(lobe: SignalLobe, aside: float) -> float:
-    """Intensity of a signal lamp as high as the eye over that along its axis [-], linear in the logarithm.
-
-    Takes `aside` [rad].
-    """
+    """Intensity of a signal lamp as high as the eye, `aside` [rad], over that along its axis [-]."""
     angle, shares = abs(aside), SIGNAL_SHARES[lobe][0]
     for after, edge in enumerate(_AZIMUTHS):
         if angle < edge:

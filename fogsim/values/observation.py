@@ -246,29 +246,20 @@ def sign_kind_code(kind: str) -> int:
 
 
 def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, int, int]:
-    """Values of the channels of a sign's pixels in pictures of the map; see `Observation.sign_map`.
-
-    Takes `distance` [m], `diameter` [m].
-    """
+    """Channels of a sign's pixels in pictures of the map (see `Observation.sign_map`), by its measures [m]."""
     nearness = min(max(round(_SIGN_MAP_REACH - distance), 1), 255)
     return sign_kind_code(kind), nearness, min(round(255.0 * diameter / _SIGN_MAP_SIZE), 255)
 
 
 def sign_coordinates(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float]:
-    """Where the face of a sign is as the camera has it, before its roll: to the right, down, and in depth [m].
-
-    Takes `setback` [m].
-    """
+    """Where a sign's face is for the camera, before its roll: to the right, down, and in depth [m]."""
     ahead, up = sign.distance + setback, sign.height - camera.mount_height
     cosine, sine = math.cos(camera.pitch), math.sin(camera.pitch)
     return -sign.lateral, -(ahead * sine + up * cosine), ahead * cosine - up * sine
 
 
 def sign_place(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float, float] | None:
-    """Where a camera has the face of a sign, as an ellipse; None for one behind it.
-
-    Returns column and row of its middle, half its width and half its height [px]. Takes `setback` [m].
-    """
+    """Ellipse of a sign's face: column and row of its middle, half width and height [px]; None if behind."""
     right, down, depth = sign_coordinates(sign, camera, setback)
     if depth <= 0.0:
         return None

@@ -17,10 +17,7 @@ _Array = NDArray[np.float64]
 
 @kernel
 def _share_inside(start: _Array, end: _Array, box: _Array) -> float:
-    """Share of a straight line that lies inside a box [-]; the same from either end, and 0 for one that touches it.
-
-    Takes `start`, `end` (3,) [m], `box` (10,).
-    """
+    """Share of a line (3,) [m] inside a box (10,) [-], the same from either end; 0 if it touches it."""
     # Rounding must not depend on who looks at whom.
     if (start[0], start[1], start[2]) > (end[0], end[1], end[2]):
         start, end = end, start
@@ -47,10 +44,7 @@ def _share_inside(start: _Array, end: _Array, box: _Array) -> float:
 
 @kernel
 def _add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -> None:
-    """Add to each line's way what of it lies inside boxes.
-
-    Takes `starts`, `ends` (n, 3) [m], `boxes` (m, 10), `ways` (n,) [m].
-    """
+    """Add to each line's way (n,) [m] what of it lies inside boxes (m, 10)."""
     for line in range(len(starts)):
         x, y, z = ends[line] - starts[line]
         length = np.sqrt(x * x + y * y + z * z)
@@ -82,10 +76,7 @@ def _find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, h
 
 @kernel
 def _find_near(eyes: _Array, targets: _Array, reaches: _Array, bounds: _Array, found: NDArray[np.bool_]) -> None:
-    """Find for each pair of eyes whether boxes may be between them and what reaches so far about a target.
-
-    Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m], `bounds` (5, m) [m], `found` (n,) bool.
-    """
+    """Find (n,) whether boxes may be between eyes and what reaches so far about a target [m]; `bounds` (5, m)."""
     near, ends = np.empty(bounds.shape[1], np.int64), np.empty((2, 3))
     for one in range(len(eyes)):
         ends[0], ends[1] = targets[one] - reaches[one], targets[one] + reaches[one]
@@ -133,11 +124,7 @@ class Obstructions:
         return len(self._boxes)
 
     def hide(self, eyes: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
-        """Whether targets are hidden: each of their points, from where they are looked at.
-
-        Returns the same if eyes and a single point change places (n,) bool. Takes `eyes` (n, 3) [m], `targets` (n, k,
-        3) [m].
-        """
+        """Whether targets' points (n, k, 3) are all hidden from eyes (n, 3) [m]; the same the other way round."""
         starts = np.ascontiguousarray(eyes, np.float64).reshape(-1, 3)
         hidden = np.zeros(starts.shape[0], np.bool_)
         if self._boxes.size and hidden.size:
@@ -146,19 +133,13 @@ class Obstructions:
         return hidden
 
     def are_near(self, eyes: _Array, targets: _Array, reaches: _Array) -> NDArray[np.bool_]:
-        """Whether anything may be between eyes and what reaches so far about a target: if not, it is not hidden (n,).
-
-        Takes `eyes`, `targets` (n, 3) [m], `reaches` (n,) [m].
-        """
+        """Whether anything may be between eyes (n, 3) and what reaches so far (n,) about a target [m]."""
         found = np.empty(len(eyes), np.bool_)
         _find_near(eyes, targets, reaches, self._bounds, found)
         return found
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
-        """How much of straight lines lies inside [m].
-
-        Returns where boxes overlap, what is in both counts twice (n,). Takes `starts`, `ends` (n, 3) [m].
-        """
+        """How much of straight lines (n, 3) [m] lies inside (n,) [m]; where boxes overlap, it counts twice."""
         first, last = (np.ascontiguousarray(points, np.float64).reshape(-1, 3) for points in (starts, ends))
         ways = np.zeros(len(first))
         if len(self._boxes):
@@ -185,10 +166,7 @@ def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
 
 
 def _box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
-    """A box for each piece of a line that is straight to a centimetre; where two pieces meet, no one looks between.
-
-    Takes `line` (n, 3) [m], `half_width` [m], `heights` [m].
-    """
+    """A box for each piece of a line (n, 3) [m] that is straight to a centimetre, without gaps between them."""
     line = _straightened(line)
     found, steps = list[tuple[float, ...]](), np.diff(line, axis=0).tolist()
     for start, (step_x, step_y, rise) in zip(line[:-1].tolist(), steps, strict=True):

@@ -18,10 +18,7 @@ OWN_FRAME = CameraPose((0.0, 0.0, 0.0), 0.0)
 
 @functools.lru_cache(maxsize=8)
 def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    """Axes of a camera in the world.
-
-    Returns rows: right, down and forward as unit vectors (east, north, up).
-    """
+    """Axes of a camera in the world: rows right, down and forward, unit vectors (east, north, up)."""
     pitch = camera.pitch - pose.grade
     east, north = math.cos(pose.heading), math.sin(pose.heading)
     ahead, under = math.cos(pitch), math.sin(pitch)
@@ -38,10 +35,7 @@ def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
 
 @functools.lru_cache(maxsize=8)
 def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world.
-
-    Returns the ray is 1 long along the optical axis, so its length is distance along the ray over depth (3, 3).
-    """
+    """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world, which is 1 long along the axis."""
     return np.asarray(matrix_product(camera_axes(camera, pose).T, _camera_ray_from_pixel(camera)))
 
 

@@ -259,10 +259,7 @@ def _check_part(who: str, field: str, value: object, kind: type[ExtinctionBounds
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:
-    """A metric's result, with numbers of Python.
-
-    InputError unless it is a nested mapping of names to None, words and finite numbers.
-    """
+    """A metric's result in Python's numbers; InputError unless it nests names of None, words and finite numbers."""
     who = f"metric {metric!r}: result()"
     if not isinstance(value, Mapping):
         raise InputError(f"{who} must return a mapping of keys to values, got {shown(value)}")

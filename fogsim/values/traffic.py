@@ -256,10 +256,7 @@ def with_persons(state: TrafficState) -> TrafficState:
 
 
 def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np.float64]:
-    """Advice to vehicles as `TrafficState.advised_speed` has it (n,) [m/s]; empty where no one has heard any.
-
-    Takes `heard` [m/s].
-    """
+    """Heard advice as `TrafficState.advised_speed` has it (n,) [m/s]; empty where no one has heard any."""
     return np.fromiter(map(heard.get, ids, itertools.repeat(np.inf)) if heard else (), np.float64)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fogsim.cli import reproduce as reproduce_module
+from fogsim.cli import progress
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from tests.helpers.command import run_command
 from tests.test_interruption import raise_as_numba_does
@@ -27,7 +27,7 @@ def reproduce(monkeypatch, capsys):
 
     def run(evaluation, *, terminal: bool) -> tuple[int, str, str]:
         drawn = io.StringIO()
-        monkeypatch.setattr(reproduce_module, "stderr", Console(file=drawn, force_terminal=terminal, width=100))
+        monkeypatch.setattr(progress, "stderr", Console(file=drawn, force_terminal=terminal, width=100))
         monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": evaluation})
         code = run_command("reproduce", "negru2013", "--json")
         return code, capsys.readouterr().out, drawn.getvalue()

@@ -27,7 +27,7 @@ from tests.faults.steps import drawn_run
 def _table(information: RunInformation) -> TableRecorder:
     """Table with a clock of 0.1 s a row, so that what is lost is counted in rows and not in the machine's speed."""
     ticks = iter(range(10**9))
-    return TableRecorder(information.directory.table, information.methods, clock=lambda: 0.1 * next(ticks))
+    return TableRecorder(information.directory.file("table"), information.methods, clock=lambda: 0.1 * next(ticks))
 
 
 def _command(command: dict[str, Any]) -> None:

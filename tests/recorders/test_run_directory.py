@@ -21,7 +21,7 @@ def test_overwriting_replaces_what_fogsim_writes_and_nothing_else_at_the_end(tmp
         (tmp_path / name).write_text("earlier")
     with RunDirectory(tmp_path, overwrite=True) as directory:
         directory.begin({"status": "running"})
-        directory.report.write_text("new")
+        directory.file("report").write_text("new")
         assert directory.earlier == ["manifest.json", "steps.parquet", "video.mp4.part"]
         directory.finish({"status": "complete"})
     assert sorted(file.name for file in tmp_path.iterdir()) == ["manifest.json", "notes.txt", "report.html"]
@@ -45,14 +45,15 @@ def test_a_change_of_places_that_is_cut_off_is_completed_and_mixes_nothing(tmp_p
         (tmp_path / name).write_text("earlier")
     with RunDirectory(tmp_path, overwrite=True) as directory:
         directory.begin({"status": "running"})
-        for path in (directory.table, directory.metrics):
+        for path in (directory.file("table"), directory.file("metrics")):
             path.write_text("new")
         # What is left when the process is killed in the middle of it.
         write_json(
-            directory.manifest, {"status": "complete", "files": ["manifest.json", "metrics.json", "steps.parquet"]}
+            directory.file("manifest"),
+            {"status": "complete", "files": ["manifest.json", "metrics.json", "steps.parquet"]},
         )
         (tmp_path / "manifest.json").unlink()
-        directory.metrics.replace(tmp_path / "metrics.json")
+        directory.file("metrics").replace(tmp_path / "metrics.json")
     with pytest.raises(InputError, match="fogsim recover"):
         RunDirectory(tmp_path)
     assert recover_run(tmp_path) == ["manifest.json", "metrics.json", "steps.parquet"]

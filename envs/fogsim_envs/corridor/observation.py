@@ -61,10 +61,7 @@ class RoadKnowledge:
 
 
 def loop_places(starts: Sequence[float], length: float) -> tuple[float, ...]:
-    """Places of loops: before the first sign, between two each, and behind the last (n + 1,) [m].
-
-    Takes `starts` [m], `length` [m].
-    """
+    """Places of loops: before the first sign, between two each, and behind the last (n + 1,) [m]."""
     ends = (0.0, *starts, length)
     return tuple(0.5 * (before + behind) for before, behind in itertools.pairwise(ends))
 

@@ -87,10 +87,7 @@ def overdriven(step: TrafficStep, standard: SafetyStandard) -> float:
 
 
 def conflict(step: TrafficStep, threshold: float) -> float:
-    """How far everyone's time to collision is below a threshold: the sum of 0 … 1 for each vehicle.
-
-    Takes `threshold` [s].
-    """
+    """How far everyone's time to collision is below a threshold [s]: the sum of 0 … 1 for each vehicle."""
     found = find_following(step.traffic)
     remaining = time_to_collision(found.gap, found.speed, found.leader_speed)
     return float(np.maximum(1.0 - remaining / threshold, 0.0).sum())

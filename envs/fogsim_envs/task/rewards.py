@@ -76,10 +76,7 @@ class Way:
 def task_terms(
     before: Step, after: Step, way: Way, weights: TaskWeights, standard: SafetyStandard = DEFAULT_STANDARD
 ) -> dict[str, float]:
-    """Weighted terms of the reward for one decision period; the reward is their sum.
-
-    Returns terms by the names of `TaskWeights`.
-    """
+    """Weighted terms, by the names of `TaskWeights`, whose sum is the reward for one decision period."""
     duration = after.time - before.time
     driven = max(after.route_position - before.route_position, 0.0)
     share = driven / way.length

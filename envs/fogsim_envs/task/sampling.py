@@ -134,7 +134,7 @@ class EpisodeSource:
     def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
         """Draw an episode; as many random numbers are used whatever is fixed.
 
-        A scenario that takes the place of the environment's own road is run as it is, in fog only if that was given.
+        A scenario that replaces the environment's own road is run as it is, with fog only if that was given.
         """
         seed, own = numbered(rng, self._split)
         stated = choice.stated_episode

@@ -24,10 +24,7 @@ def prepare_economy() -> None:
 
 
 def begin_economy(*, unrolling: bool) -> Callable[[], None]:
-    """Save work from now on, if this version of numba is known, and unroll loops or not.
-
-    Returns ends it: numba is as it was.
-    """
+    """Save work, if this version of numba is known, and unroll loops or not; the result ends it."""
     if numba.version_info.short not in KNOWN:
         return lambda: None
     LinkedLibrary.deferring, LinkedLibrary.unrolling = True, unrolling

@@ -47,10 +47,7 @@ It is as fast as code for the very processor; code for any x86-64 takes half as 
 
 
 def compiled_for() -> dict[str, str] | None:
-    """Environment in which numba compiles kernels to be shipped; None where none are.
-
-    Returns variables of numba: LLVM's name of the processors, and nothing of this machine's.
-    """
+    """Variables with which numba compiles kernels to be shipped, for LLVM's processors; None if none are."""
     kind = KINDS.get(platform.machine())
     return None if kind is None else {"NUMBA_CPU_NAME": kind.name, "NUMBA_CPU_FEATURES": ""}
 

@@ -20,10 +20,7 @@ _OPENDRIVE, SUMO = ".xodr", ".net.xml"
 
 
 def find_map(written: str, folder: Path) -> Path:
-    """File of a map; InputError if there is none.
-
-    It is `written` relative to a folder, or its name with one of the endings in the user's folder of maps.
-    """
+    """File of a map: `written` relative to a folder, or its name in the user's folder of maps; InputError if none."""
     posix = written.replace("\\", "/")
     for path in (folder / written, folder / posix):
         if _is_map(path):

@@ -45,10 +45,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def keep_newest(folder: Path, most: int, written: Path | None = None) -> None:
-    """Remove all files and folders in a folder of the cache except the `most` newest, and `written`.
-
-    What has just been written is the oldest if the clock has been set back.
-    """
+    """Remove all but the `most` newest entries of a cache folder and `written`, which a reset clock may make oldest."""
     with contextlib.suppress(OSError):
         for old in sorted(folder.iterdir(), key=lambda path: path.lstat().st_mtime)[:-most]:
             if old == written:

@@ -47,15 +47,12 @@ class _ElementReader(Protocol):
     @property
     def is_done(self) -> bool:
         """True when the rest of the file is not needed."""
-        ...
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Begin an element; a ValueError is reported with file and line."""
-        ...
 
     def end(self, tag: str) -> None:
         """End an element."""
-        ...
 
 
 @contextmanager

@@ -17,11 +17,7 @@ _ROUNDING = 1e-9
 
 @kernel
 def crossing_pieces(begin: Floats, way: Floats, junction: Numbers, vehicle: Numbers, least_sine: float) -> Floats:
-    """Pairs of pieces of different vehicles in the same junction that cross.
-
-    Returns numbers of the two pieces, and at which part of either, 0 … 1, the other crosses it (k, 4). Takes `begin`,
-    `way` (n, 2) [m], `junction`, `vehicle` (n,) int.
-    """
+    """Pairs of pieces [m] in one junction that cross: their numbers, and at which part of either, 0 … 1 (k, 4)."""
     found, count = np.empty((64, 4)), 0
     length = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2)
     for i in range(len(begin)):
@@ -100,13 +96,7 @@ class Fronts(NamedTuple):
 
 
 class Junctions:
-    """Which lanes lie in which junctions: SUMO names those of a junction J ``:J_edge_lane``.
-
-    Attributes
-    ----------
-    of_lane : (n,) intp
-        Number of the junction of each lane so far, `UNKNOWN` for one outside of all.
-    """
+    """Junctions of lanes, `UNKNOWN` for none: SUMO calls the lanes of a junction J ``:J_edge_lane``."""
 
     def __init__(self) -> None:
         self.of_lane: Numbers = np.zeros(0, np.intp)

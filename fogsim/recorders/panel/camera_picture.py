@@ -92,10 +92,7 @@ BRIGHT = 10.0
 
 
 def draw_restored_picture(step: Step) -> Image.Image:
-    """Draw the camera's image, and over its right half what contrast restoration by the belief makes of it.
-
-    Where no fog is believed, by night, and of frames without a calibration it is the camera's image alone.
-    """
+    """Draw the camera's image; by day, in believed fog and calibrated, its right half is restored by the belief."""
     picture, frame = draw_camera_picture(step), step.observation.frame
     light = step.observation.light
     believed = step.belief.visibility

@@ -50,10 +50,7 @@ def _draw_profile(
     true: FogProfile | None,
     reported: Sequence[tuple[float, float]] = (),
 ) -> Image.Image:
-    """Draw the visibility at places along the road, the vehicle's own a fine line.
-
-    Takes `size` [px], `axis` [m], `reported` (float, float).
-    """
+    """Draw the visibility at places along the road [m], the vehicle's own a fine line."""
     width, height = size[0] * _OVERSAMPLING, (size[1] - _FOOT) * _OVERSAMPLING
     image = Image.new("RGB", (width, height), WELL)
     draw = ImageDraw.Draw(image)
@@ -149,10 +146,7 @@ class FramePanel:
         self._background = _draw_background()
 
     def draw(self, step: Step, derived: Derived) -> NDArray[np.uint8]:
-        """Draw the frame of a step.
-
-        Returns the frame, red first (480, 1024, 3) uint8.
-        """
+        """Draw the frame of a step, red first (480, 1024, 3) uint8."""
         frame = self._background.copy()
         picture = self._draw_picture(step)
         self._draw_banners(ImageDraw.Draw(picture), step)

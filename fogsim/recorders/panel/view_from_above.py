@@ -35,10 +35,7 @@ _LONGER, _WIDER = 1.5, 3.0
 
 
 def draw_view_from_above(step: Step, extinction: Extinctions) -> Image.Image:
-    """Draw a step, the ego heading to the right: the denser the fog, the brighter; an arc where the sight ends.
-
-    Returns picture of the size of the panel's camera picture.
-    """
+    """Draw a step, the ego heading to the right: the denser the fog, the brighter; an arc where the sight ends."""
     axes = _axes(step)
     picture = _fog(step, axes, extinction)
     draw = ImageDraw.Draw(picture)

@@ -152,7 +152,8 @@ def _findings_table(results: Results, populations: Sequence[str]) -> Rows:
         row = [f"{'* ' if finding.six else ''}{finding.text}", finding.source, str(finding.published)]
         for name in populations:
             ours, verdict = _compared(finding, results, name)
-            row += [_cell(ours, 1.0, _digits(ours)), "—" if verdict is Verdict.UNKNOWN else verdict.value]
+            digits = 2 if abs(ours.mean) < 3.0 else 1
+            row += [_cell(ours, 1.0, digits), "—" if verdict is Verdict.UNKNOWN else verdict.value]
         rows.append(tuple(row))
     return tuple(rows)
 
@@ -161,10 +162,6 @@ def _compared(finding: Finding, results: Results, population: str) -> tuple[Inte
     """Ours of a population, and whether it agrees."""
     ours = interval(finding.values(Look(results, population)))
     return ours, finding.verdict(ours.mean)
-
-
-def _digits(ours: Interval) -> int:
-    return 2 if abs(ours.mean) < 3.0 else 1
 
 
 def _cell(value: Interval, factor: float, digits: int) -> str:

@@ -21,10 +21,7 @@ _MOST_SHOWN = 5
 
 
 def check_expectations(scenario: "ScenarioFile", *, is_shortened: bool = False) -> None:
-    """Raise ValidationError if a run of the scenario could not evaluate its expectations.
-
-    A run that ``--set`` has shortened is for a look, and may end before its expectations are decided.
-    """
+    """Raise ValidationError if a run, unless ``--set`` has shortened it, could not evaluate its expectations."""
     end = math.inf if is_shortened else last_time(scenario)
     mistakes = _expectation_mistakes(scenario.expect, run_content(scenario), end, scenario.traffic.ego)
     refuse((("expect", *place), mistake) for place, mistake in mistakes)

@@ -10,9 +10,8 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.scenario.drivers_schema import ComplianceSection
-from fogsim.scenario.drivers_schema import Harmonisation as WrittenHarmonisation
 from fogsim.scenario.schema import ScenarioFile
-from fogsim.scenario.section import Method
+from fogsim.scenario.section import Method, in_si
 from fogsim.simulation.run_config import (
     NO_RENDERER,
     AdviceConfig,
@@ -23,7 +22,6 @@ from fogsim.simulation.run_config import (
 )
 from fogsim.traffic import SPEED_CHOICES, Compliance, DriverSetup, DriverSight
 from fogsim.traffic.drivers.speed_choice import SpeedChoice, checked_choice
-from fogsim.units import KMH_PER_MPS
 from fogsim.values import Display, Stretch, StretchAdvice
 
 DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Display.LAW}
@@ -94,7 +92,7 @@ def sections_config(scenario: ScenarioFile) -> SectionsConfig | None:
     drivers, signs, along = scenario.drivers, scenario.drivers.signs, scenario.traffic.along
     if drivers.advised not in DISPLAYS:
         return None
-    harmonisation = None if drivers.harmonisation is None else _harmonisation(drivers.harmonisation)
+    harmonisation = None if drivers.harmonisation is None else Harmonisation(**in_si(drivers.harmonisation))
     if drivers.advised != "signs":
         return SectionsConfig(DISPLAYS[drivers.advised], harmonisation=harmonisation, along=along)
     return SectionsConfig(
@@ -107,10 +105,6 @@ def sections_config(scenario: ScenarioFile) -> SectionsConfig | None:
         harmonisation,
         along,
     )
-
-
-def _harmonisation(written: WrittenHarmonisation) -> Harmonisation:
-    return Harmonisation(written.largest_step_kmh / KMH_PER_MPS, written.deceleration_mps2)
 
 
 def driver_sight(scenario: ScenarioFile) -> DriverSight | None:
@@ -155,11 +149,4 @@ def _speed_choice(scenario: ScenarioFile) -> SpeedChoice:
 
 
 def _compliance(written: ComplianceSection) -> Compliance:
-    return Compliance(
-        written.reached_share,
-        written.rate,
-        written.strength,
-        written.delay_s,
-        written.trust,
-        written.foreseen,
-    )
+    return Compliance(**in_si(written, "like"))

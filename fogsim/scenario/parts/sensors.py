@@ -1,7 +1,6 @@
 """From a scenario to the ego's camera and other sensors, and to senders of reports."""
 
 import math
-from dataclasses import replace
 
 from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.camera import (
@@ -20,12 +19,12 @@ from fogsim.scenario.camera_schema import CalibrationErrors as WrittenErrors
 from fogsim.scenario.camera_schema import CameraSection, Exposure, StereoSection
 from fogsim.scenario.parts.methods import method
 from fogsim.scenario.schema import ScenarioFile
+from fogsim.scenario.section import in_si
 from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.sensors.schema import (
     CameraReports,
     RoadsideCamera,
     RoadsideReports,
-    ScatterometerSection,
     Sensors,
     VehicleReports,
 )
@@ -61,7 +60,7 @@ def _camera(scenario: ScenarioFile, section: CameraSection) -> CameraConfig:
         )
         for body, usual in USUAL_MOUNTS.items()
     }
-    blur, body = section.motion_blur, section.body
+    body = section.body
     return CameraConfig(
         camera=_calibration(section, mounts["car"].height),
         sensor=_sensor(scenario, section),
@@ -72,7 +71,7 @@ def _camera(scenario: ScenarioFile, section: CameraSection) -> CameraConfig:
         has_bonnet=section.bonnet,
         lens_shading=section.lens_shading,
         lens_glare=section.lens_glare,
-        shutter=Shutter(blur.open_time_s, blur.instants, blur.follows_exposure),
+        shutter=Shutter(**in_si(section.motion_blur)),
         suspension=Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s),
         stereo=None if section.stereo is None else _stereo(section.stereo),
     )
@@ -109,14 +108,7 @@ def _sensor(scenario: ScenarioFile, section: CameraSection) -> Sensor:
 
 def _auto_exposure(section: Exposure) -> AutoExposure:
     percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
-    return AutoExposure(
-        metering=section.metering,
-        target=percent / 100.0,
-        time_constant=section.time_constant_s,
-        brightest=section.brightest_cdpm2,
-        ungained=section.ungained_cdpm2,
-        darkest=section.darkest_cdpm2,
-    )
+    return AutoExposure(target=percent / 100.0, **in_si(section, "mode", "target_percent"))
 
 
 def _errors(written: WrittenErrors) -> CalibrationErrors:
@@ -140,20 +132,14 @@ def _stereo(section: StereoSection) -> StereoConfig:
 
 def sensors_config(sensors: Sensors) -> SensorsConfig:
     """Sensors next to the camera, and the faults of all."""
-    lead, gps, light = sensors.lead, sensors.gps, sensors.light
-    view = math.radians(lead.field_of_view_deg)
     return SensorsConfig(
-        radar=LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view),
-        gps=Gps(gps.position_deviation_m, math.radians(gps.heading_deviation_deg)),
-        light=LightSensor(light.reach_m, light.tail_reach_m, math.radians(light.field_of_view_deg)),
+        radar=LeadSensor(**in_si(sensors.lead)),
+        gps=Gps(**in_si(sensors.gps)),
+        light=LightSensor(**in_si(sensors.light)),
         sign_reach=sensors.sign_reach_m,
-        scatterometer=None if sensors.scatterometer is None else _scatterometer(sensors.scatterometer),
+        scatterometer=None if sensors.scatterometer is None else ScatterometerConfig(**in_si(sensors.scatterometer)),
         faults=tuple(fault_of(written) for written in sensors.faults),
     )
-
-
-def _scatterometer(section: ScatterometerSection) -> ScatterometerConfig:
-    return ScatterometerConfig(section.relative_deviation, section.calibration_deviation, section.averaging_time_s)
 
 
 def reports_config(scenario: ScenarioFile) -> ReportsConfig:
@@ -161,23 +147,14 @@ def reports_config(scenario: ScenarioFile) -> ReportsConfig:
     reports = scenario.sensors.reports
     return ReportsConfig(
         roadside=None if reports.roadside is None else _roadside(scenario, reports.roadside),
-        vehicles=None if reports.vehicles is None else _measuring_vehicles(reports.vehicles),
+        vehicles=None if reports.vehicles is None else _radio(reports.vehicles),
         cameras=None if reports.cameras is None else _radio(reports.cameras),
     )
 
 
 def _roadside(scenario: ScenarioFile, section: RoadsideReports) -> RoadsideSender:
-    return RoadsideSender(
-        period=section.period_s,
-        delay=section.delay_s,
-        loss=section.loss,
-        clock_deviation=section.clock_deviation_s,
-        deviation=section.deviation,
-        wrong=section.wrong,
-        spacing=section.every_m,
-        first=section.first_m,
-        camera=None if section.camera is None else _mast(scenario, section.camera),
-    )
+    camera = None if section.camera is None else _mast(scenario, section.camera)
+    return RoadsideSender(spacing=section.every_m, camera=camera, **in_si(section, "every_m", "camera"))
 
 
 def _mast(scenario: ScenarioFile, section: RoadsideCamera) -> MastCamera:
@@ -191,14 +168,4 @@ def _mast(scenario: ScenarioFile, section: RoadsideCamera) -> MastCamera:
 
 
 def _radio(section: VehicleReports | CameraReports) -> RadioSender:
-    return RadioSender(
-        period=section.period_s,
-        delay=section.delay_s,
-        loss=section.loss,
-        clock_deviation=section.clock_deviation_s,
-        reach=section.range_m,
-    )
-
-
-def _measuring_vehicles(section: VehicleReports) -> RadioSender:
-    return replace(_radio(section), deviation=section.deviation, wrong=section.wrong, equipped=section.equipped)
+    return RadioSender(reach=section.range_m, **in_si(section, "range_m"))

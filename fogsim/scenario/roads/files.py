@@ -91,7 +91,7 @@ def road_layout(scenario: ScenarioFile) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    sections = _vehicles_of(scenario)
+    sections = {name: actor for name, actor in actors_of(scenario).items() if not actor.is_person}
     placed = place_actors([_actor(name, sections) for name in sections])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
@@ -177,11 +177,6 @@ def actors_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
     if scenario.road is None or not scenario.traffic.has_ego:
         return dict(scenario.actors)
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
-
-
-def _vehicles_of(scenario: ScenarioFile) -> dict[str, ActorSection]:
-    """Actors of a scenario that are vehicles, by their ids."""
-    return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
 
 
 def _walker(name: str, section: ActorSection) -> Walker:

@@ -6,8 +6,7 @@ from typing import Annotated, ClassVar, Literal, Unpack
 
 from pydantic import ConfigDict, Field
 
-from fogsim.scenario.section import Id, Number, Period, Place, Section, Share, Time
-from fogsim.units.quantities import UNIT_OF_SUFFIX
+from fogsim.scenario.section import Id, Number, Period, Place, Section, Share, Time, in_si
 from fogsim.values.fault import (
     Blackout,
     DirtyLens,
@@ -43,9 +42,6 @@ SmallAngle = Annotated[Number, Field(ge=-10, le=10)]
 Speed = Annotated[Number, Field(ge=-140, le=140)]
 """A speed, or a difference of speeds [m/s]."""
 
-_OF_ALL = frozenset(("at_s", "for_s", "sensor", "fault"))
-"""Keys that are not of what is wrong."""
-
 
 class FaultSection(Section):
     """A fault of a sensor; `kind` is its value, whose fields are the keys without their units."""
@@ -65,12 +61,7 @@ class FaultSection(Section):
 
     def in_si(self) -> FaultKind:
         """What is wrong, in SI units."""
-        values: dict[str, object] = {}
-        for key in type(self).model_fields.keys() - _OF_ALL:
-            stem, _, unit = key.rpartition("_")
-            value = getattr(self, key)
-            values[stem if unit in UNIT_OF_SUFFIX else key] = math.radians(value) if unit == "deg" else value
-        return self._kind(**values)
+        return self._kind(**in_si(self, "at_s", "for_s", "sensor", "fault"))
 
 
 class CameraFaultSection(FaultSection):

@@ -48,10 +48,7 @@ class MeasuredReports(ReportsFrom):
 
 
 class RoadsideCamera(Section):
-    """A camera on a mast next to the road, looking along it in the direction of travel.
-
-    Its lens, image sensor and exposure are those that `camera` describes for the ego.
-    """
+    """A camera on a mast, looking along the road with the traffic; lens, sensor and exposure are the ego's `camera`."""
 
     estimator: Annotated[Method, method_of(ESTIMATORS)] = Method(method="joint_road")
     """Estimator that reads its images; one for the day, since a mast has no head lamps."""

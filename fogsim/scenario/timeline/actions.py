@@ -53,11 +53,7 @@ Entries = Mapping[tuple[str, DepartAction], Enter]
 
 
 def actions_of(entry: TimelineEntry, reference: float, entering: Entries, now: Situation) -> Actions | None:
-    """What an entry begins.
-
-    Returns None while someone it involves is not on the road, or not at a place that it needs. Takes `reference`
-    [1/m].
-    """
+    """What an entry begins; None while somebody whom it needs is not there (`reference` [1/m])."""
     traffic: list[TrafficAction] = []
     fog: list[ChangeFog] = []
     lights: list[ChangeLight] = []
@@ -264,10 +260,7 @@ def _density(action: FogActions, reference: float) -> float:
 
 
 def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
-    """Extinction coefficient to which densities refer: the scenario's own, or the densest of the timeline's [1/m].
-
-    Takes `extinction` [1/m].
-    """
+    """Extinction coefficient to which densities refer: the scenario's own, or the densest of the timeline's [1/m]."""
     wanted = [
         extinction_from_visibility(doing.visibility_m)
         for entry in entries
@@ -285,10 +278,7 @@ def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[f
 
 
 def scripted_fog(entries: Sequence[TimelineEntry], config: FogConfig) -> FogConfig:
-    """A fog that can become what a timeline makes of it.
-
-    Returns with the densities that it may come to; where the air is clear, fog of density 0 in its place.
-    """
+    """A fog that can reach the densities that a timeline gives it; clear air becomes fog of density 0."""
     fog = config.field
     reference = fog_reference(entries, fog.extinction)
     changes = [doing for entry in entries for _, doing in operations(entry) if isinstance(doing, FogActions)]

@@ -35,12 +35,10 @@ def check_timeline(scenario: "ScenarioFile") -> None:
 
 
 def pointless_triggers(document: Document, scenario: "ScenarioFile", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
-    """Say which triggers, and which ``end_when``, can never come as they are written.
+    """Say which triggers, and which ``end_when``, can never come as they are written, within some limits.
 
     Triggers of OpenSCENARIO files may: what was not played is reported at the end of the run. So may those that come
     after a run's end that was moved by ``--set``.
-
-    Takes `limits` (float, float).
     """
     if document.is_overridden(("duration_s",)):
         limits = {key: ends for key, ends in limits.items() if key != "time"}

@@ -2,7 +2,6 @@
 
 from fogsim.scenario.variation.cases import (
     KEYS,
-    MOST_RUNS,
     NONE_FAILS,
     Case,
     NoSuchCaseError,
@@ -20,7 +19,6 @@ from fogsim.scenario.variation.levels import Draws, SeedLevels, Value, number_wi
 
 __all__ = [
     "KEYS",
-    "MOST_RUNS",
     "NONE_FAILS",
     "Case",
     "Draws",

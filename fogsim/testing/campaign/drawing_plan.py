@@ -275,14 +275,9 @@ def _search_boundary(space: Space, seed: int, until: int, found: Findings) -> _B
 
 def fitted(space: Space, results: Sequence[CaseResult], near: Boundary | None = None) -> Boundary | None:
     """Boundary of cases with both outcomes; cases that are inconclusive or went wrong do not count."""
-    decided = [one for one in results if _is_decided(one)]
+    decided = [one for one in results if one.is_passed or (one.message is None and one.has_failed)]
     failed = np.array([one.has_failed for one in decided])
     return fit_boundary(space.places(decided), failed, near) if failed.any() and not failed.all() else None
-
-
-def _is_decided(result: CaseResult) -> bool:
-    """Whether a case passed or failed."""
-    return result.is_passed or (result.message is None and result.has_failed)
 
 
 VERDICTS = ("passed", "failed", "inconclusive", "error")
@@ -359,10 +354,7 @@ def _drawn_from(
 
 
 def _margins(results: Sequence[CaseResult]) -> NDArray[np.float64] | None:
-    """Margins of cases; None if all are unknown.
-
-    Unknown ones are 0 if the case failed, and otherwise the largest of the known.
-    """
+    """Margins of cases, None if all are unknown; unknown ones are 0 for a failure, or else the largest known."""
     margins = [margin_of(one) for one in results]
     known = [one for one in margins if one is not None]
     if not known:

@@ -21,7 +21,7 @@ from fogsim.testing.campaign.boundary import Boundary
 from fogsim.testing.campaign.comparison import changes, changes_text, first_columns
 from fogsim.testing.campaign.drawing_plan import Findings, Purpose, Space, margin_of, number_of, verdict_of
 from fogsim.testing.campaign.running import Campaign, as_test
-from fogsim.testing.collection import FogTest
+from fogsim.testing.collection import FogTest, label_of
 from fogsim.testing.junit import add_requirements, xml_text
 from fogsim.testing.page import command_text, finding_text
 from fogsim.testing.results import CaseResult
@@ -78,7 +78,7 @@ def write_campaign_junit(path: Path, campaign: Campaign, found: Findings, settin
     named = {"name": xml_text(test.name), "file": xml_text(str(test.path))}
     suite = ET.SubElement(root, "testsuite", named | counts)
     for one, verdict in zip(found.results, verdicts, strict=True):
-        label, seconds = _label(one), f"{one.duration:.3f}"
+        label, seconds = label_of(one.run), f"{one.duration:.3f}"
         case = ET.SubElement(suite, "testcase", classname=xml_text(str(test.path)), name=xml_text(label), time=seconds)
         add_requirements(case, one.run.scenario, one.run.scenario.expect)
         if verdict != "passed":
@@ -88,10 +88,6 @@ def write_campaign_junit(path: Path, campaign: Campaign, found: Findings, settin
     ET.indent(root)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n')
-
-
-def _label(result: CaseResult) -> str:
-    return ",".join(f"{name}={level}" for name, level in result.run.levels.items())
 
 
 def _why(result: CaseResult) -> str:
@@ -137,7 +133,13 @@ def write_report(
         smallest=None if smallest is None else smallest_text(test, smallest, settings),
         compared=changes_text(campaign.earlier, found) if campaign.earlier else "",
         changes=[
-            (one.before, one.after, _label(one.result), _why(one.result), command_text(test, one.result.run, settings))
+            (
+                one.before,
+                one.after,
+                label_of(one.result.run),
+                _why(one.result),
+                command_text(test, one.result.run, settings),
+            )
             for one in changes(campaign.earlier, found)
         ]
         if campaign.earlier
@@ -171,7 +173,7 @@ def _failures(test: FogTest, found: Findings, settings: Sequence[str]) -> Iterat
     """Verdict, case, reason and command of each case that did not pass, the worst margins first."""
     wrong = [one for one in found.results if verdict_of(one) != "passed"]
     for one in sorted(wrong, key=lambda result: (verdict_of(result) != "error", margin_of(result) or 0.0)):
-        yield verdict_of(one), _label(one), _why(one), command_text(test, one.run, settings)
+        yield verdict_of(one), label_of(one.run), _why(one), command_text(test, one.run, settings)
 
 
 def maps(campaign: Campaign, found: Findings) -> Iterator[tuple[str, Figure]]:

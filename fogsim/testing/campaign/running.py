@@ -32,24 +32,9 @@ CampaignWatch = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """A scenario file with a space: what is drawn, and how much of it.
+    """A scenario file with a space: what is drawn, or which cases of an earlier campaign are run again.
 
-    Attributes
-    ----------
-    file : Path
-        The file.
-    reader : SpaceReader
-        Reads its cases.
-    seed : int
-        Seed of all draws.
-    budget : int
-        Number of cases.
-    sequencing : str
-        How the first cases fill the space: ``"sobol"`` or ``"latin_hypercube"``.
-    earlier : tuple of EarlierCase
-        Cases of an earlier campaign that are run again instead of draws.
-    odd : OddFile or None
-        The ODD whose coverage is collected, if any.
+    `sequencing` is how the first cases fill the space, ``"sobol"`` or ``"latin_hypercube"``.
     """
 
     file: Path
@@ -78,31 +63,9 @@ def load_campaign(
     odd: str | None = None,
     may_import: MayImport = import_anything,
 ) -> Campaign:
-    """Read a campaign.
+    """Read a campaign, or the cases of an earlier one in the directory `against`; InputError if a file does not fit.
 
-    Parameters
-    ----------
-    file : str or Path
-        Scenario file with ``space`` and ``expect``.
-    settings : sequence of str
-        ``key.path=value`` each.
-    case : str
-        One case of ``vary``, as comma-separated ``name=value``.
-    budget, seed, sequencing
-        See `Campaign`.
-    against : Path or None
-        Directory of an earlier campaign, whose cases are run again instead of draws.
-    odd : str or None
-        Name or binding file of the ODD whose coverage is collected.
-    may_import : callable
-        As in `load_scenario`.
-
-    Raises
-    ------
-    InputError
-        If a file does not fit.
-    MissingDependencyError
-        With an ODD, if openodd-py is missing.
+    `odd` is the name or binding file of the ODD whose coverage is collected.
     """
     path = scenario_file(file)
     reader = read_space(path, settings, case, may_import)
@@ -134,25 +97,7 @@ def _check_ends(reader: SpaceReader, space: Space) -> None:
 
 
 def run_campaign(campaign: Campaign, out: Path, engine: Engine, watch: CampaignWatch = lambda _, __: None) -> Findings:
-    """Run what is missing of a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        From `load_campaign`.
-    out : Path
-        Directory of the results; those of an earlier call with the same cases count.
-    engine : Engine
-        Engine for the cases.
-    watch : callable
-        Called after each case.
-
-    Raises
-    ------
-    InputError
-        If the directory holds something else, or a campaign of another FogSim or SUMO, or is written by another
-        process; or if a drawn case does not fit.
-    """
+    """Run what is missing of a campaign in its directory; InputError if that holds something else."""
     found, failed = Findings(), 0
     with begin_session(out, resume=True, kind="campaign") as folder:
         plan = (

@@ -88,10 +88,7 @@ _AT_ONCE = 256
 
 
 class CoverageWatch:
-    """Collects the coverage of one run by measured values.
-
-    What a signal cannot give (an invalid estimate) is missing; a signal that raises ends the run with an error.
-    """
+    """Collects the coverage of one run; invalid estimates are missing, and a signal that raises ends the run."""
 
     def __init__(self, odd: OddFile) -> None:
         self._odd, self._coverage, self._history = odd, Coverage(odd), History()

@@ -105,18 +105,8 @@ class Probe:
 class OddFile:
     """An ODD as plain values, which any process and node can use without its files.
 
-    Attributes
-    ----------
-    path : Path
-        The binding file, for messages.
-    name, text : str
-        Name and description.
-    documents : tuple of str
-        The OpenODD documents as JSON, those that others import first.
-    probes : mapping from str to Probe
-        What measures each concept.
-    criteria, situations : mapping
-        For each concept and each situation the keys of openodd-py's binding: buckets, values, target and so on.
+    `documents` are OpenODD documents as JSON, those that others import first; `criteria` and `situations` have the keys
+    of openodd-py's binding.
     """
 
     path: Path

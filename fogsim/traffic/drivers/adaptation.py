@@ -75,10 +75,7 @@ class Adaptation(NamedTuple):
 
 @kernel
 def contrast_ratio(eyes: Adaptation, distance: float) -> float:
-    """Smallest contrast at which a vehicle is noticed over that by day [-]: from 1 on, more in the dark.
-
-    Takes `distance` [m].
-    """
+    """Smallest contrast at which a vehicle is noticed at a distance [m] over that by day [-]: more in the dark."""
     # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
     if eyes.luminance >= _DAY_LUMINANCE:
         return 1.0
@@ -90,10 +87,7 @@ def contrast_ratio(eyes: Adaptation, distance: float) -> float:
 
 @functools.lru_cache(maxsize=256)
 def adaptation(illuminance: float, glare: float = 0.0, share: float = AIRLIGHT_SHARE) -> Adaptation:
-    """Eyes adapted to the light of the sky, of the own head lamps, and to glare.
-
-    Takes `illuminance` [lx], `glare` [cd/m²].
-    """
+    """Eyes adapted to the light of the sky [lx], of the own head lamps, and to glare [cd/m²]."""
     airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare
     flux, extended = _roots(min(luminance, _BRIGHT_LUMINANCE))

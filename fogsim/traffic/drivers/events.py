@@ -14,11 +14,9 @@ Order = tuple[float, float]
 
 
 def signed_gap(ahead: float | None, behind: float | None, length: float, ego_length: float) -> float | None:
-    """Gap of a vehicle to the ego, from the ways between their front bumpers.
+    """Gap of a vehicle to the ego from `ahead`, the ways between front bumpers [m]; `length` and `ego_length` [m].
 
-    Returns positive for a vehicle ahead of the ego: from the ego's front bumper to its rear bumper [m]. Negative for
-    one behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are next to one another.
-    None if no way leads from one to the other. Takes `ahead` [m], `length`, `ego_length` [m].
+    Positive bumper to bumper for a vehicle ahead, negative for one behind, 0 side by side; None without a way.
     """
     # On a road that leads in a circle there are both ways: the shorter one counts.
     if ahead is not None and (behind is None or ahead <= behind):
@@ -109,18 +107,7 @@ class _ScriptedActions:
 
 
 class Script:
-    """Plays events; remembers which have begun.
-
-    Parameters
-    ----------
-    events : iterable of Event
-        What is scripted.
-
-    Attributes
-    ----------
-    lamps : Lamps
-        Lamps that are not the vehicles' own.
-    """
+    """Plays events; remembers which have begun, and which lamps are not the vehicles' own."""
 
     def __init__(self, events: Iterable[Event]) -> None:
         self.lamps = Lamps()

@@ -119,8 +119,6 @@ def misjudged_headway(wanted: float, around: Surroundings, misjudgement: float) 
     distances are judged rightly (overestimates of 30 to 60 % where only the lamps show: Cavallo, Colomb & Doré 2001;
     shorter headways at a visibility of 30 m: Cavallo & Beaudoin; closing in until the outline shows: Caro, Cavallo et
     al. 2009).
-
-    Takes `wanted` [s].
     """
     gap = wanted * around.speed + around.minimum_gap
     if misjudgement == 0.0 or gap <= around.reach.by_body or around.speed <= 0.0:

@@ -63,10 +63,7 @@ def burning_head_lamps(lamps: int) -> float:
 
 @functools.lru_cache(maxsize=1024)
 def rear_intensity(lamps: int) -> float:
-    """Luminous intensity of the brightest rear lamp that is lit [cd].
-
-    Of two alike each is seen by itself, so that one that fails changes nothing as long as the other one burns.
-    """
+    """Luminous intensity of the brightest lit rear lamp [cd]; one of a pair counts like both."""
     kinds = _kinds_that_burn(lamps)
     third = THIRD_STOP_LAMP if burning(lamps, Side.MIDDLE) else 0.0
     return max(next((intensity for lamp, intensity in _REAR_LAMPS if kinds & lamp), 0.0), third)
@@ -133,12 +130,10 @@ def uses_high_beam(lamps: int) -> bool:
 
 
 def high_beam_veil(extinction: float) -> float:
-    """What fog adds to the veil before a driver's eyes when high beams take the place of low beams [cd/m²].
+    """What fog [1/m] adds to a driver's veil when high beams take the place of low beams [cd/m²].
 
     A fit to the veil of the pictures in moderate radiation fog (docs/explanation/night.md), from a car driver's eyes
     toward the road 40 m ahead: within 10 % from V_met = 30 m to 1000 m. From higher up it is less: 0.6 of it from 1.5
     m.
-
-    Takes `extinction` [1/m].
     """
     return _DENSEST_VEIL * extinction / (extinction + _HALF_VEIL_EXTINCTION)

@@ -92,11 +92,7 @@ class DriverSight:
         head_lamps: float = 1.0,
         glare: float = 0.0,
     ) -> float:
-        """Optical depth up to which a vehicle is seen, which falls with its distance [-].
-
-        Returns negative for a vehicle that is not even seen without fog, ``-inf`` where there is no light at all. Takes
-        `distance` [m], `intensity` [cd], `glare` [cd/m²].
-        """
+        """Optical depth up to which a vehicle is seen [-]; negative if it is not even seen without fog."""
         eyes, threshold, reach = self._eyes(glare)
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
         return depth_limit(eyes, threshold, reach, float(distance), *seen)
@@ -122,10 +118,7 @@ class DriverSight:
         head_lamps: float = 1.0,
         glare: float = 0.0,
     ) -> float:
-        """Distance up to which a vehicle is seen in even fog, up to 1 cm less [m].
-
-        Returns ``inf`` beyond `sight_kernels.FARTHEST`. Takes `extinction` [1/m].
-        """
+        """Distance up to which a vehicle is seen in even fog [1/m], up to 1 cm less; ``inf`` if far [m]."""
         eyes, threshold, reach = self._eyes(glare)
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
         return seen_distance(eyes, threshold, reach, float(extinction), *seen)
@@ -133,45 +126,30 @@ class DriverSight:
     def judge_leaders(
         self, facing: NDArray[np.float64], most_glare: float, horizon: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Whether leaders are seen, and for how long that is sure to stay so [s].
-
-        Takes `facing` (10, n), `most_glare` [cd/m²], `horizon` [s].
-        """
+        """Whether leaders (`facing` (10, n)) are seen, and for how long that is sure to stay so [s]."""
         judged = np.empty((2, facing.shape[1]))
         eyes, threshold, reach = self._eyes(0.0)
         judge_leaders(eyes, threshold, reach, self._adapted(most_glare), facing, horizon, judged)
         return judged[0], judged[1]
 
     def judge_lines(self, lines: NDArray[np.float64], sure: float, extinction: float | None) -> None:
-        """Judge whether targets are seen without any lamps or glare; see `sight_kernels.judge_lines`.
-
-        Takes `lines` (n, 13), `sure` [m], and `extinction` in even fog [1/m].
-        """
+        """Judge whether targets are seen without any lamps or glare; see `sight_kernels.judge_lines`."""
         judge_lines(*self._eyes(0.0), sure, -1.0 if extinction is None else extinction, lines)
 
     def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
-        """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].
-
-        Takes `maximum_extinction` [1/m], `most_glare` [cd/m²].
-        """
+        """Distance up to which every body is seen, without lamps, if fog is nowhere denser than given [1/m] [m]."""
         least = inherent_contrast((1.0, 1.0, 1.0), self.airlight_share)
         return self.seen_distance(maximum_extinction, least, head_lamps=0.0, glare=most_glare)
 
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
-        """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].
-
-        Takes `minimum_extinction` [1/m], `brightest` [cd].
-        """
+        """Distance from which nothing of a vehicle is seen if fog is nowhere thinner than given [1/m] [m]."""
         # By day no one sees by head lamps.
         own = HIGH_BEAM_LIGHT if self.illuminance < DAY_ILLUMINANCE else 1.0
         return self.seen_distance(minimum_extinction, 1.0, brightest, own) + DISTANCE_TOLERANCE
 
 
 def inherent_contrast(paint: tuple[float, float, float], airlight_share: float = AIRLIGHT_SHARE) -> float:
-    """Contrast of a vehicle's rear to the airlight, 0 … 1.
-
-    A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
-    """
+    """Contrast of a rear to the airlight, 0 … 1: a third is dark glass and tyres, the rest paint under half the sky."""
     reflectance = luminance_of(paint) * 2.0 / 3.0
     return max(0.0, 1.0 - _VERTICAL_ILLUMINANCE * reflectance / airlight_share)
 
@@ -211,8 +189,6 @@ def drivers_visibility(sight: DriverSight | None, visibility: float) -> float:
 
     White & Jeffery 1980: speeds by night follow those by day if visibility is the distance at which a rear light of 2
     cd is seen.
-
-    Takes `visibility` [m].
     """
     if sight is None or sight.illuminance >= DAY_ILLUMINANCE or math.isinf(visibility):
         return visibility

@@ -113,10 +113,7 @@ def depth_limit(
     intensity: float,
     head_lamps: float,
 ) -> float:
-    """Optical depth up to which a vehicle is seen [-]; see `DriverSight.depth_limit`.
-
-    Takes `reach` [m], `distance`, `contrast`, `intensity`, `head_lamps` [m], [cd].
-    """
+    """Optical depth up to which a vehicle is seen [-]; see `DriverSight.depth_limit` (`distance` [m])."""
     squared = distance * distance
     once = contrast * eyes.airlight / (eyes.luminance * (threshold * contrast_ratio(eyes, distance)))
     once += intensity / (squared * eyes.eye_threshold)
@@ -129,10 +126,7 @@ def depth_limit(
 def depth_limits(
     eyes: Adaptation, threshold: float, reach: float, looks: NDArray[np.float64], limits: NDArray[np.float64]
 ) -> None:
-    """Write to `limits` (n,) the optical depth up to which each of many vehicles is seen [-]; see `depth_limit`.
-
-    Takes `reach` [m], and `looks` (4, n): distances [m], contrasts, intensities [cd] and light of own head lamps.
-    """
+    """Write the `depth_limit` of each of many `looks` (4, n): distance [m], contrast, intensity [cd], head lamps."""
     for i in range(limits.size):
         limits[i] = depth_limit(eyes, threshold, reach, looks[0, i], looks[1, i], looks[2, i], looks[3, i])
 
@@ -147,10 +141,7 @@ def seen_distance(
     intensity: float,
     head_lamps: float,
 ) -> float:
-    """Distance up to which a vehicle is seen in even fog [m]; see `DriverSight.seen_distance`.
-
-    Takes `reach` [m], `extinction` [1/m], `contrast`, `intensity`, `head_lamps` [cd].
-    """
+    """Distance up to which a vehicle is seen in even fog [1/m]; see `DriverSight.seen_distance` [m]."""
     near, far = 0.0, _FARTHEST
     if depth_limit(eyes, threshold, reach, far, contrast, intensity, head_lamps) >= extinction * far:
         return math.inf
@@ -173,10 +164,7 @@ def judge_leaders(
     horizon: float,
     judged: NDArray[np.float64],
 ) -> None:
-    """Whether leaders are seen, and for how long that is sure to stay so.
-
-    Takes `facing` (10, n), `horizon` [s], `judged` (2, n) [s].
-    """
+    """Judge (2, n) whether leaders (`facing` (10, n)) are seen, and for how long that is sure to stay so [s]."""
     for i in range(facing.shape[1]):
         distance, depth, contrast = facing[DISTANCE, i], facing[DEPTH, i], facing[CONTRAST, i]
         deepening, change = facing[_DEEPENING, i], facing[_CLOSING, i] * horizon

@@ -101,14 +101,10 @@ class SpeedChoice(Protocol):
 
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter (`visibility` [m])."""
-        ...
 
 
 def speed_share(choice: SpeedChoice, visibility: float) -> float:
-    """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
-
-    Takes `visibility` [m].
-    """
+    """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative."""
     share: Callable[[float], float] | None = getattr(choice, "share", None)
     return 1.0 if share is None else share(visibility)
 
@@ -357,10 +353,7 @@ def desired_speed(
     room: float = math.inf,
     kept: float = 0.0,
 ) -> float:
-    """Speed that a driver wants to drive [m/s], never more than the own one.
-
-    Takes `own` [m/s], `visibility` [m], `room` [m/s], `kept` [m/s].
-    """
+    """Speed that a driver wants to drive, never more than the own one; speeds in m/s, `visibility` in m."""
     chosen = chosen_speed(setup.speed_choice, driver.speed_factor, own, visibility)
     chosen = min(max(min(chosen, room), kept), own)
     wanted = []
@@ -372,9 +365,6 @@ def desired_speed(
 
 
 def speed_by_compliance(compliance: Compliance, own: float, advised: float, visibility: float) -> float:
-    """Speed of a driver who follows advice, as far as he believes it where he is [m/s].
-
-    Takes `own`, `advised` [m/s], `visibility` [m].
-    """
+    """Speed of a driver who follows advice, as far as he believes it where he is [m/s]."""
     belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
     return complied_speed(own, advised, belief * compliance.strength, belief * compliance.trust)

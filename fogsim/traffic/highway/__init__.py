@@ -1,6 +1,6 @@
 """highway-env as a second traffic simulation; nothing else of FogSim knows that library."""
 
-from fogsim.traffic.highway.behaviour import DriverControl, control_drivers, limit_sight
+from fogsim.traffic.highway.behaviour import control_drivers, limit_sight
 from fogsim.traffic.highway.fleet import EGO, LEAD, Fleet, read_snapshot
 from fogsim.traffic.highway.network import RouteProgress, road_network, same_roads
 from fogsim.traffic.highway.traffic import HighwayTraffic, OtherRoadsError, is_highway_environment
@@ -8,7 +8,6 @@ from fogsim.traffic.highway.traffic import HighwayTraffic, OtherRoadsError, is_h
 __all__ = [
     "EGO",
     "LEAD",
-    "DriverControl",
     "Fleet",
     "HighwayTraffic",
     "OtherRoadsError",

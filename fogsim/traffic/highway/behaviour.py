@@ -108,10 +108,7 @@ class _Manoeuvres:
         self._keeping_lane: dict[str, tuple[float, bool]] = {}
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin what a script asks for: changes of lane as they are here, and lamps that fail all at once.
-
-        Returns those that could not begin: the vehicle has left, or there is no such lane.
-        """
+        """Begin changes of lane and failures of all lamps; return what could not begin, without vehicle or lane."""
         vehicles, refused = self._fleet.present(), list[TrafficAction]()
         situation = self._situation(vehicles)
         for action in actions:
@@ -131,10 +128,7 @@ class _Manoeuvres:
         return tuple(refused)
 
     def plan(self) -> Mapping[str, Order]:
-        """Begin what is due, before the drivers decide.
-
-        Returns speeds for this step, for `apply` once the drivers have decided.
-        """
+        """Begin what is due; return speeds for this step, for `apply` once the drivers have decided."""
         vehicles = self._fleet.present()
         self._end_lane_changes(vehicles)
         actions = self._script.play(self._situation(vehicles))
@@ -286,13 +280,7 @@ def control_drivers(
     advice_deceleration: float,
     sight: DriverSight | None = None,
 ) -> DriverControl:
-    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `DriverControl`.
-
-    Parameters
-    ----------
-    fleet, setup, events, seed, advice_deceleration, sight
-        See `DriverControl`.
-    """
+    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `DriverControl`."""
     control = DriverControl(fleet, setup, events, seed, advice_deceleration, sight)
     # On this one road, not in the library: other environments of the process go on as they are.
     fleet.environment.road.act = control

@@ -77,10 +77,7 @@ class _HighwayVehiclePlaces:
 
 
 class HighwayDesiredSpeeds:
-    """Sets the target speeds of an environment's IDM drivers, and in dense fog their time headways.
-
-    Takes `advice_deceleration` [m/s²].
-    """
+    """Sets the target speeds of an environment's IDM drivers, and in dense fog their time headways."""
 
     def __init__(
         self, fleet: Fleet, setup: DriverSetup, seed: int, advice_deceleration: float, sight: DriverSight | None = None

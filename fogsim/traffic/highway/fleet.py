@@ -24,15 +24,7 @@ _BRAKING = 0.5
 
 
 class Fleet:
-    """Vehicles of one run of one environment.
-
-    Parameters
-    ----------
-    environment : highway_env.envs.common.abstract.AbstractEnv
-        The environment, after its reset.
-    ego : highway_env.vehicle.kinematics.Vehicle
-        The ego.
-    """
+    """Vehicles of one run of an environment, after its reset."""
 
     def __init__(self, environment: Any, ego: Any) -> None:
         self.environment = environment
@@ -59,15 +51,7 @@ class Fleet:
         return float(1.0 / self.environment.config["simulation_frequency"])
 
     def name(self, vehicle: Any) -> str:
-        """Id of a vehicle or an obstacle, for as long as the run lasts: its kind and its place in the order of naming.
-
-        Those on the road at the beginning are named first, in the environment's own order.
-
-        Parameters
-        ----------
-        vehicle : highway_env.vehicle.kinematics.Vehicle
-            The vehicle.
-        """
+        """Id of a vehicle or obstacle for the whole run: its kind, and its place in the environment's order."""
         return self._names.setdefault(vehicle, f"{type(vehicle).__name__} {len(self._names)}")
 
     def known(self) -> frozenset[str]:
@@ -79,23 +63,11 @@ class Fleet:
         return {self.name(vehicle): vehicle for vehicle in self.environment.road.vehicles}
 
     def paint(self, vehicle: Any) -> tuple[float, float, float]:
-        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours mark roles, not paints.
-
-        Parameters
-        ----------
-        vehicle : highway_env.vehicle.kinematics.Vehicle
-            The vehicle.
-        """
+        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours mark roles, not paints."""
         return paint(self.name(vehicle), SUMO_DEFAULT_COLOUR)
 
     def lamps(self, vehicle: Any) -> Lamp:
-        """Lit lamps; an obstacle has none, and neither has a vehicle whose lamps have failed.
-
-        Parameters
-        ----------
-        vehicle : highway_env.vehicle.kinematics.Vehicle
-            The vehicle.
-        """
+        """Lit lamps; an obstacle has none, and neither has a vehicle whose lamps have failed."""
         if not hasattr(vehicle, "action") or self.name(vehicle) in self.dark:
             return Lamp.NONE
         steady = self.ego_lamps if vehicle is self.ego else self.lamps_of.get(self.name(vehicle), OTHERS_LAMPS)
@@ -137,26 +109,7 @@ def read_snapshot(
     reach: float,
     heard: Mapping[str, float] | None = None,
 ) -> TrafficSnapshot | None:
-    """Snapshot of the traffic.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles.
-    progress : RouteProgress
-        Follows the ego along its route from one snapshot to the next.
-    collisions : tuple of Collision
-        What has happened.
-    reach : float
-        Vehicles farther from the ego than this are left out [m].
-    heard : mapping from vehicle id to float or None
-        What drivers have heard advised [m/s]; None if no one has heard anything.
-
-    Returns
-    -------
-    TrafficSnapshot or None
-        None if the ego is not on the road.
-    """
+    """Snapshot of the traffic up to a `reach` from the ego [m]; None if the ego is not on the road."""
     ego, vehicles = fleet.ego, fleet.environment.road.vehicles
     if ego not in vehicles:
         return None

@@ -52,13 +52,7 @@ def _reached_at(lane: Any, following: Any) -> float:
 
 
 class RouteProgress:
-    """How far along a route a vehicle is that moves on from one look to the next.
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        Polyline along the route [m].
-    """
+    """Position along a route (n, 3) [m] of a vehicle that moves on from one look to the next."""
 
     def __init__(self, line: NDArray[np.float64]) -> None:
         self._line = line
@@ -72,15 +66,7 @@ class RouteProgress:
         return float(self._starts[-1])
 
     def update(self, here: NDArray[np.float64], backwards: bool = False) -> float:
-        """Station of the place of the route that is nearest, among those that can have been reached [m].
-
-        Parameters
-        ----------
-        here : (3,) float64
-            Where the vehicle is now [m].
-        backwards : bool
-            Whether it drives backwards; else its station does not decrease.
-        """
+        """Nearest position along the route to `here` that can have been reached; it falls only `backwards` [m]."""
         if self._last is None:
             station = self._nearest(here, 0.0, self.length)
         else:
@@ -125,20 +111,7 @@ def upright(points: ArrayLike) -> NDArray[np.float64]:
 
 
 def road_network(road: Any, ego: Any) -> RoadNetwork:
-    """Lanes of a road and the route of the ego.
-
-    Parameters
-    ----------
-    road : highway_env.road.road.Road
-        The road.
-    ego : highway_env.vehicle.kinematics.Vehicle
-        The ego.
-
-    Returns
-    -------
-    RoadNetwork
-        The route leads along the planned route of the ego, or without one straight on, to the end of the last lane.
-    """
+    """Lanes of a road, and the ego's planned route, or straight on without one, to the end of the last lane."""
     lanes = [
         lane
         for start, ends in road.network.graph.items()
@@ -205,13 +178,7 @@ def _route(network: Any, ego: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
-    """Whether two networks have the same lanes, whatever the routes.
-
-    Parameters
-    ----------
-    one, other : RoadNetwork
-        The networks.
-    """
+    """Whether two networks have the same lanes, whatever the routes."""
     return len(one.lanes) == len(other.lanes) and all(
         np.array_equal(a.centreline, b.centreline)
         and (a.lane_id, a.width, a.speed_limit, a.left, a.right) == (b.lane_id, b.width, b.speed_limit, b.left, b.right)

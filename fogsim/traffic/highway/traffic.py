@@ -30,10 +30,7 @@ from fogsim.values.script import TrafficAction
 
 
 def _find_collisions(fleet: Fleet, period: float) -> Iterator[Collision]:
-    """Collisions of the last simulation step by the library's own rule; they are found in later steps again.
-
-    Takes `period` [s].
-    """
+    """Collisions of the last step by the library's own rule; they are found in later steps again (`period` [s])."""
     for one, other in _hits(fleet.environment.road, period):
         collider, victim = fleet.name(one), fleet.name(other)
         if _approach(one, other) < _approach(other, one):
@@ -69,13 +66,7 @@ class OtherRoadsError(SimulationError):
 
 
 def is_highway_environment(environment: object) -> bool:
-    """Whether something is one of highway-env's environments.
-
-    Parameters
-    ----------
-    environment : object
-        Anything.
-    """
+    """Whether something is one of highway-env's environments."""
     return isinstance(environment, AbstractEnv)
 
 
@@ -84,8 +75,6 @@ class HighwayTraffic:
 
     The ego keeps its lane and follows its leader by IDM, as the others do. Of the environment, roads and vehicles are
     used, not its rewards, its endings or what it does once a policy step (intersections let new vehicles in there).
-
-    Takes `reading_radius` [m], `advice_deceleration` [m/s²].
     """
 
     def __init__(

@@ -16,10 +16,7 @@ _MOST_BYTES = 50_000_000
 
 @dataclass(slots=True)
 class _Flows:
-    """Rates of all flows together by vehicle type [1/h], number of flows, and vehicles that are written one by one.
-
-    `is_whole` is False if a file could not be read to its end.
-    """
+    """Rates by vehicle type [1/h], number of flows, and single vehicles; not `is_whole` if a file was cut off."""
 
     rates: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     flows: int = 0
@@ -142,10 +139,7 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
 def read_demand(
     files: Iterable[Path], wanted: Iterable[str], most_bytes: int = _MOST_BYTES, *, reroutes: bool = False
 ) -> Demand:
-    """Search for vehicles in additional and route files, in SUMO's order.
-
-    After `most_bytes` unpacked bytes the demand counts as open.
-    """
+    """Search additional and route files for vehicles in SUMO's order; open after `most_bytes` unpacked bytes."""
     files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
     for file in files:
         reader.file = file

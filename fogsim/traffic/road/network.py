@@ -145,10 +145,7 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
 
 
 def _crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
-    """Heads for pedestrians at both ends of a crossing lane (sumolib).
-
-    `side` is the side that vehicles keep to: left (1) or right (−1).
-    """
+    """Heads for pedestrians at both ends of a crossing lane (sumolib); `side` is left (1) or right (−1) traffic."""
     edge = crossing.getEdge()
     ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]
     line = np.array(crossing.getShape3D(), np.float64)
@@ -334,10 +331,7 @@ _MOST_BYTES = 2_000_000_000  # of a network, unpacked
 
 @no_garbage_collection()
 def read_net(path: Path) -> RoadMap:
-    """Read a SUMO network file, compressed by gzip or not.
-
-    Maps of large files are cached (see `fogsim.traffic.road.map_cache`).
-    """
+    """Read a SUMO network file, gzip or not; maps of large ones are cached (`fogsim.traffic.road.map_cache`)."""
     if not is_worth_caching(path):
         return _parsed(path)
     known = cached_map(path)
@@ -415,10 +409,7 @@ def _check_shape(lane: Lane) -> None:
 
 
 def route_axis(roads: RoadMap, route: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middle lanes of a route's edges, end to end, as (n, 3) [m], and the speed limit up to each point (n,) [m/s].
-
-    The polyline repeats no point; the limit is the highest of the edge that leads to the point.
-    """
+    """Middle of a route's lanes (n, 3) [m] without repeated points, and the highest limit up to each (n,) [m/s]."""
     middle = [roads.middle_lane(edge) for edge in route]
     for lane in middle:
         _check_shape(lane)

@@ -28,10 +28,7 @@ _SIGN_DIAMETER = 0.9
 
 
 def limit_sign(edge: Any, side: float) -> Sign | None:
-    """Sign at the start of an edge whose limit differs from that of every edge leading to it.
-
-    It stands on the side that vehicles keep to: left (1) or right (−1).
-    """
+    """Sign at an edge whose limit differs from all edges' before it, on the side driven on: left (1), right (−1)."""
     limit = _limit(edge)
     if any(abs(_limit(incoming) - limit) < 0.1 for incoming in edge.getIncoming()):
         return None

@@ -67,7 +67,7 @@ def read_name(tag: str, attributes: Mapping[str, str]) -> str:
 
 
 def check_outputs(paths: Iterable[Path]) -> None:
-    """Raise InputError if a SUMO file, or one that it names, sends an output to an address or names a missing file.
+    """Raise InputError if a SUMO file, or one that it names, sends outputs to an address or names missing files.
 
     SUMO ends the process if some of those are missing.
     """

@@ -40,10 +40,7 @@ _LEAST_SPEED = 10.0
 
 @dataclass(frozen=True, slots=True)
 class _Glide:
-    """The way to a lane: the cubic Hermite polynomial from (offset, rate) to (0, 0).
-
-    For who begins without sideways speed it is a smoothstep.
-    """
+    """Way to a lane: the cubic Hermite polynomial from (offset, rate) to (0, 0), a smoothstep if the rate is 0."""
 
     # begun, duration: when it began, and how long it takes [s]
     begun: float

@@ -18,12 +18,8 @@ Neither has types; every use is inside the traffic stage.
 class SumoLink(Protocol):
     """A SUMO simulation that can be begun, stepped and ended.
 
-    Attributes
-    ----------
-    remote : bool
-        True where every call is a message to another process, so that few calls must do.
-    shared : bool
-        True where others may command the simulation too, and take vehicles away between two calls.
+    It is `remote` if every call is a message to another process, so that few calls must do, and `shared` if others may
+    command it too, and take vehicles away between two calls.
     """
 
     @property

@@ -29,10 +29,7 @@ _MOST_BYTES = 50_000_000  # of a file that is searched
 
 
 def located(what: str, message: str, arguments: Sequence[str]) -> str:
-    """What SUMO cannot do and its message, after the file and line of the first fault in it, if these can be found.
-
-    `arguments` are those of SUMO's command line.
-    """
+    """SUMO's message after file and line of its first fault, if the files of the command line show it."""
     message = " ".join(message.removeprefix("Error: ").split())
     place = _PLACE.search(message)
     if place is not None:

@@ -38,11 +38,9 @@ class AllVehicles:
 
 
 class NearbyVehicles:
-    """Finds the vehicles near the ego; one far away is asked again only when it could have come near.
+    """Finds the vehicles near the ego (`radius` [m]); one far away is asked again only when it could be near.
 
-    Nor are distances of those near computed before one of them could be far.
-
-    Takes `radius` [m].
+    Distances of those near are computed only once one of them could be far.
     """
 
     def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
@@ -58,10 +56,7 @@ class NearbyVehicles:
         self._all_near_until = -math.inf
 
     def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        """Ids of those near in SUMO's order, the ego among them, and their positions (n, 3) [m].
-
-        As long as they are the same vehicles, the ids are the same object.
-        """
+        """Ids near the ego, with its own, in SUMO's order (the same object if alike), and positions (n, 3) [m]."""
         roster = self._roster
         roster.update()
         here = self._position(self._ego)
@@ -76,7 +71,7 @@ class NearbyVehicles:
         come_near = self._schedule_far(far, distances) if far else ()
         if come_near:
             self._set_near([*self._near, *come_near])
-        position = self._positions(self._near)
+        position = positions_of(self._near, self._position)
         if has_jumped or come_near or roster.time >= self._all_near_until:
             position = self._drop_far(position, here)
         return self._near, position
@@ -130,9 +125,6 @@ class NearbyVehicles:
         if not new:
             return due
         return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
-
-    def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        return positions_of(vehicles, self._position)
 
 
 def positions_of(vehicles: Sequence[str], position: Callable[[str], Sequence[float]]) -> NDArray[np.float64]:

@@ -29,22 +29,8 @@ class OutputFolder:
 
     SUMO puts its option ``output-prefix`` before the last part of every name of an output, of absolute names too, so
     that a prefix that leads through the root to this folder brings all of them there. Files of one name from different
-    folders become one; ``stdout`` and ``/dev/null`` stay what they are.
-
-    Parameters
-    ----------
-    folder : Path or None
-        The folder, made where it is not there; None for one that is removed at the end, with a warning if anything is
-        in it.
-    prefix : str
-        What the names of files begin with.
-    collects_warnings : bool
-        Whether to read SUMO's warnings on `close`, from a log that is removed.
-
-    Attributes
-    ----------
-    warnings : tuple of str
-        What SUMO had warned of at the last `close`.
+    folders become one; ``stdout`` and ``/dev/null`` stay what they are. Without a `folder` there is one that is removed
+    at the end, with a warning if anything is in it; SUMO's own `warnings`, if collected, are read on `close`.
     """
 
     def __init__(self, folder: Path | None, prefix: str = "", collects_warnings: bool = False) -> None:
@@ -92,10 +78,7 @@ class OutputFolder:
         return link
 
     def twice(self) -> list[str]:
-        """Names of files that SUMO has open more than once, for outputs of one name in different folders.
-
-        Returns none where the system does not report open files, and where nothing is kept.
-        """
+        """Names of files that SUMO has open for several outputs; none where the system does not report them."""
         if self._folder is None or not _OPEN_FILES.is_dir():
             return []
         place = str(self._folder.resolve())

@@ -25,27 +25,8 @@ class Roster:
     """Keeps the set of vehicles on the road by which have entered and left in the last step.
 
     All ids are asked for at first, when steps were missed, and when their number is another: SUMO reports those that a
-    calibrator removes a step late, and those that are removed by hand not at all.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process.
-    mark : LoadMark or None
-        Checked at every step, or where that is a message, whenever all ids are read again and once a `_CHECK_PERIOD`.
-
-    Attributes
-    ----------
-    present : set of str
-        Vehicles on the road at `time`; not to be changed by others.
-    time : float
-        Simulated time of the last update [s].
-    teleported : sequence of str
-        Vehicles that SUMO has begun to teleport in the last step.
-    removals : int
-        Number of steps in which vehicles have left: as long as it stays, none has.
+    calibrator removes a step late, and those that are removed by hand not at all. The `mark` is checked at every step,
+    or, if that is a message (`remote`), whenever all ids are read again and once a `_CHECK_PERIOD`.
     """
 
     def __init__(self, api: Api, remote: bool = False, mark: LoadMark | None = None) -> None:
@@ -58,9 +39,9 @@ class Roster:
         self._checked = 0.0
         self._entered: list[str] = []
         self._entries = 0
-        self.present: set[str] = set()
+        self.present: set[str] = set()  # Not to be changed by others
         self.teleported: Sequence[str] = ()
-        self.removals = 0
+        self.removals = 0  # Steps in which vehicles have left
         self.time = float("nan")
         self.reload()
 

@@ -30,11 +30,9 @@ def load_traci() -> ModuleType:
 
 
 class TraciLink:
-    """One client of a SUMO or sumo-gui that runs with ``--remote-port``.
+    """One client of a SUMO or sumo-gui that runs with ``--remote-port`` (`timeout` [s]).
 
     The simulation is taken as it is at the first `begin`, whatever its arguments; a later one loads the arguments.
-
-    Takes `timeout` [s].
     """
 
     remote = True
@@ -129,10 +127,7 @@ class TraciLink:
 
 
 class _LimitedSocket:
-    """A traci socket that raises our error if SUMO is silent; traci takes silence for a closed connection.
-
-    Takes `timeout` [s].
-    """
+    """A traci socket that raises our error if SUMO is silent (`timeout` [s]), which traci takes for closed."""
 
     def __init__(self, connected: socket.socket, timeout: float, where: str) -> None:
         self._socket = connected

@@ -55,10 +55,7 @@ _TURNS = {"junction": 0.5 * math.pi, "junctionPedestrian": 0.5 * math.pi, "front
 
 
 class _DynamicState(NamedTuple):
-    """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
-
-    A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
-    """
+    """What changes about vehicles, in SUMO's units, by `ids`; a named tuple, made in a third of a dataclass's time."""
 
     ids: tuple[str, ...]  # Vehicle ids
     position: NDArray[np.float64]  # (n, 3): Middle of the front bumper [m]
@@ -194,10 +191,7 @@ class VehicleReader:
         )
 
     def _free_speeds(self, lanes: tuple[str, ...], constants: _Constants) -> NDArray[np.float64]:
-        """Speeds that drivers would drive by themselves (n,) [m/s].
-
-        Limits are as they were when the ego first came near: those of signs that change are advice.
-        """
+        """Speeds that drivers would choose freely (n,) [m/s], by the limits found first: later ones are advice."""
         if lanes != self._free[0] or constants is not self._free[1]:
             limits = np.fromiter(map(self._lane_limit, lanes), np.float64, len(lanes)) * constants.speed_factor
             self._free = lanes, constants, np.minimum(limits, constants.top_speed)

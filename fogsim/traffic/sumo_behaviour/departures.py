@@ -14,10 +14,7 @@ _UNLIMITED = 10.0
 
 
 def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
-    """Bring a vehicle onto the road with the next step; SUMO delays it as long as it would hit another.
-
-    Returns false if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
-    """
+    """Bring a vehicle onto the road near another; False if it is there already, or there is no place."""
     get, like = api.vehicle, action.like
     if action.vehicle in get.getLoadedIDList() or like not in present or is_off_lanes(api, like):
         return False
@@ -59,10 +56,7 @@ def _footways(api: Api, edge: str) -> int:
 
 
 def enter(api: Api, action: Enter) -> bool:
-    """Bring a vehicle onto the road on a way of its own; SUMO delays it as long as it would hit another.
-
-    Returns false if there is such a vehicle already, or no way leads along its edges.
-    """
+    """Bring a vehicle onto the road on a way of its own; False if it is there already, or there is no way."""
     if action.vehicle in api.vehicle.getLoadedIDList():
         return False
     kind = _type(api, action.vehicle, action.kind, action.speed)

@@ -61,27 +61,10 @@ class Column(IntEnum):
 
 
 class DriverTable:
-    """The table; it grows with every new driver.
+    """The table (m, len(Column)); it grows, into another array, with every new driver.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    setup : DriverSetup
-        What drivers are like.
-    seed : int
-        With a vehicle's id it gives its driver's traits, so that they depend on nothing else.
-    session : str
-        Name of the session.
-
-    Attributes
-    ----------
-    values : (m, len(Column)) float64
-        The rows; another array when the table has grown.
-    kinds : tuple of FollowingModel
-        Kinds of drivers there are.
-    top_speeds, headways, speed_factors : Claims
-        The session's claims to what is set of vehicles.
+    Traits depend on the seed and the vehicle's id alone; `top_speeds`, `headways` and `speed_factors` are the session's
+    claims to what is set of vehicles.
     """
 
     def __init__(self, api: Api, setup: DriverSetup, seed: int, session: str) -> None:

@@ -26,7 +26,7 @@ _DRIVES = 1.0  # [m/s]
 class _EgoChoice:
     """Watches a simulation until a vehicle suits: a car, van, truck or bus that drives on a lane.
 
-    It is the first one with `_LONG_WAY` and no stop ahead of it, or a vehicle whose id is ``any``.
+    It is the first with `_LONG_WAY` and no stop ahead, or any vehicle for the id ``any``.
     """
 
     def __init__(self, api: Api) -> None:
@@ -115,10 +115,7 @@ class EgoDriving:
         self._planned_from: float | None = None
 
     def apply(self, control: EgoControl | None, present: set[str]) -> bool:
-        """Drive for the next step.
-
-        Returns whether the ego is driven by hand.
-        """
+        """Drive for the next step; return whether the ego is driven by hand."""
         ego, vehicles = self._ego, self._api.vehicle
         if ego is None or ego not in present:
             self._planned_from = None

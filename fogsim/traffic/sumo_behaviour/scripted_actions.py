@@ -180,11 +180,7 @@ class ScriptedActions:
     def begin(
         self, actions: Sequence[TrafficAction], time: float, present: Collection[str]
     ) -> tuple[TrafficAction, ...]:
-        """Begin actions.
-
-        Returns those that could not begin: the vehicle has left, has no such lane, or is not behind the one that it is
-        to follow. Takes `time` [s].
-        """
+        """Begin actions at a time [s]; return those without their vehicle, lane, or leader ahead."""
         # Who leaves by one of these is gone for the next.
         present = {*present}
         refused, motion = list[TrafficAction](), self._motion(time, present)

@@ -81,10 +81,7 @@ _SAME = 1e-6  # [m/s], [m/s²]
 
 
 class SpeedControl:
-    """Brings the ego to its advised speed and vehicles to scripted ones; remembers which, to free them again.
-
-    Takes `step_length` [s].
-    """
+    """Brings the ego to its advised speed and vehicles to scripted ones; remembers which, to free them again."""
 
     def __init__(self, api: Api, step_length: float) -> None:
         self._vehicles = api.vehicle
@@ -106,11 +103,9 @@ class SpeedControl:
                 self._held.discard(vehicle)
 
     def impose(self, speeds: Mapping[str, float], close: Collection[str] = ()) -> None:
-        """Give vehicles exact speeds after this step, as far as others on the road leave room for them.
+        """Give vehicles exact speeds after this step [m/s], as far as others on the road leave room for them.
 
         They speed up no faster than their type can, and brake as hard as it can in an emergency.
-
-        Takes `speeds` [m/s].
         """
         get = self._vehicles
         for vehicle, wanted in speeds.items():
@@ -366,10 +361,7 @@ class SumoDesiredSpeeds:
         return np.array([allowed if UNKNOWN < allowed < top else self._allowed(v) for v, allowed, top in both])
 
     def _allowed(self, vehicle: str) -> float:
-        """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given.
-
-        Off the lanes it is ``inf``.
-        """
+        """What the road allows a driver [m/s], whatever top speed the vehicle was given; ``inf`` off the lanes."""
         allowed = float(self._allowed_speed(vehicle))
         if allowed == UNKNOWN:
             return math.inf

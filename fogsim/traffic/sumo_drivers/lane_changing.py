@@ -57,8 +57,6 @@ def _safe_speed(gap: float, leader_speed: float, deceleration: float, headway: f
     """Speed behind a leader from which one stops behind it if both brake equally hard [m/s].
 
     Source: Krauss, S. (1998), Microscopic modeling of traffic flow: investigation of collision free vehicle dynamics.
-
-    Takes `gap` [m], `leader_speed` [m/s], `deceleration` [m/s²], `headway` [s].
     """
     delay = deceleration * headway
     return math.sqrt(delay**2 + leader_speed**2 + 2.0 * deceleration * max(gap, 0.0)) - delay
@@ -191,10 +189,7 @@ class _RequestedChanges:
         self._left: set[str] = set()
 
     def ask(self, driver: str, lanes: int, time: float) -> bool:
-        """Let a driver change lane from the next step on, whoever is there, but not into an overlap.
-
-        Returns false if there is no such lane on the same edge. Takes `time` [s].
-        """
+        """Let a driver change lane from the next step on, without an overlap; False if there is no such lane."""
         edge, lane = str(self._vehicles.getRoadID(driver)), int(self._vehicles.getLaneIndex(driver)) + lanes
         # No one changes lanes on a junction.
         if edge.startswith(":") or not 0 <= lane < int(self._edges.getLaneNumber(edge)):

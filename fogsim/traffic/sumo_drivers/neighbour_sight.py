@@ -139,10 +139,7 @@ def _nearest(neighbours: Iterable[tuple[str, float]]) -> tuple[str, float]:
 
 
 class NeighbourSight:
-    """Which neighbours drivers perceive: those in sight, but not within the reaction time after they were not.
-
-    Takes `reaction_time` [s].
-    """
+    """Which neighbours drivers perceive: those in sight for at least the reaction time [s]."""
 
     def __init__(self, sight: VehicleSight, reaction_time: float) -> None:
         self._sight = sight

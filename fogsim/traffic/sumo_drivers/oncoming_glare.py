@@ -34,10 +34,7 @@ _Point = tuple[float, float, float]
 
 
 def most_glare(illuminance: float) -> float:
-    """Veil of glare that there can be at most [cd/m²]; none by day, when it is nothing next to the airlight.
-
-    Takes `illuminance` [lx].
-    """
+    """Most veil of glare that there can be [cd/m²]; none by day, when it is nothing next to the airlight."""
     return 0.0 if illuminance >= DAY_ILLUMINANCE else MOST_GLARE
 
 

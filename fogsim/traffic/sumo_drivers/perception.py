@@ -199,15 +199,7 @@ class _IgnoredLeaders:
 
 
 class Perception:
-    """Decides in each step which leaders are seen.
-
-    Attributes
-    ----------
-    leader, speed : Getter
-        Leaders as SUMO's ``getLeader`` reports them, to be asked with `REACH`, and SUMO's ``getSpeed``.
-    hidden : mapping from str to str
-        Leaders that are not reacted to, by follower, as they are at any time.
-    """
+    """Decides in each step which leaders are seen: `hidden` has those that are not reacted to, by follower."""
 
     def __init__(self, view: DriversView) -> None:
         api, fog, sight, self._roster = view.api, view.fog, view.sight, view.roster

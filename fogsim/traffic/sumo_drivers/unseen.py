@@ -88,10 +88,7 @@ class _IgnoredFoes:
 
 
 class UnseenFoes:
-    """Whom drivers do not react to at junctions: who is out of sight, and who has come into view only just now.
-
-    Takes `reaction_time` [s].
-    """
+    """Whom drivers do not react to at junctions: who is out of sight, or in view only just now."""
 
     def __init__(self, api: Api, session: str, reaction_time: float) -> None:
         self._ignored = _IgnoredFoes(api, session)
@@ -109,10 +106,7 @@ class UnseenFoes:
         return self._since.keys()
 
     def decide(self, driver: str, is_seen: Mapping[str, bool], now: float) -> bool:
-        """Decide to whom of those near a driver reacts; to all others he does.
-
-        Returns whether one of them has come into view and is soon reacted to. Takes `now` [s].
-        """
+        """Decide to whom of those near a driver reacts; return whether one of them is soon reacted to."""
         before = self._since.get(driver, {})
         unseen: dict[str, float] = {}
         for foe, seen in is_seen.items():

@@ -190,11 +190,7 @@ def _corners(parts: Sequence[Part], sizes: NDArray[np.float64]) -> NDArray[np.fl
 
 
 class DriversView:
-    """What all parts of drivers' perception go by.
-
-    Takes `remote`, true where every call is a message to another process, and `obstructions`, what stands next to the
-    roads.
-    """
+    """What all parts of drivers' perception go by; `remote` if a call is a message, `obstructions` beside the roads."""
 
     def __init__(
         self,
@@ -222,10 +218,7 @@ _Pairs = Sequence[tuple[str, str]]
 
 
 class VehicleSight:
-    """Finds which vehicles drivers see, along straight lines through the fog and past what stands next to the road.
-
-    Other vehicles hide no one.
-    """
+    """Finds which vehicles drivers see, along straight lines through fog and past roadside objects, not vehicles."""
 
     def __init__(self, view: DriversView) -> None:
         self._hidden_vehicles = view.hidden_vehicles

@@ -25,20 +25,7 @@ _LONGEST = 25.0
 
 
 class _LaneSpots:
-    """Where vehicles are across their edge, in SUMO's measure of lanes.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-
-    Attributes
-    ----------
-    is_divided : bool
-        Whether vehicles share lanes side by side (SUMO's sublane model).
-    """
+    """Where vehicles are across their edge, in SUMO's measure of lanes; `is_divided` in its sublane model."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self.is_divided = float(api.simulation.getOption("lateral-resolution")) > 0.0
@@ -89,12 +76,7 @@ class Leaders:
         self._read: tuple[float, dict[str, list[_Spot]]] = (-1.0, {})
 
     def within(self, reach: float) -> Getter:
-        """Getter like SUMO's ``getLeader``, to be called with the vehicle and this reach [m].
-
-        Where lanes are not shared it is SUMO's own.
-
-        Takes `reach` [m].
-        """
+        """Getter like SUMO's ``getLeader``, which it is if lanes are not shared, called with vehicle and reach [m]."""
         if self._spots.is_divided:
             return self.find
         (in_lane,) = vehicle_getters(self._api, self._remote, ("getLeader",), {"getLeader": ("d", reach)})
@@ -116,10 +98,7 @@ class Leaders:
         return self.find(ego, _EGO_REACH) if found and found[0] and is_against(found[0], lane(found[0])) else found
 
     def find(self, vehicle: str, reach: float) -> tuple[str, float] | None:
-        """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none.
-
-        Takes `reach` [m].
-        """
+        """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none."""
         lane = self._lane(vehicle)
         if not lane:
             return None
@@ -166,12 +145,11 @@ class Leaders:
             lanes = range(1 if edge.startswith(":") else int(self._api.edge.getLaneNumber(edge)))
             nearest = sorted(lanes, key=lambda other: abs(other - int(number)))
             candidates = [lane] if edge.startswith(":") else [f"{edge}_{other}" for other in nearest]
-            ways = (self._way_of(link) for one in candidates for link in self._links(one) if _leads_to(link, following))
+            links = (link for one in candidates for link in self._links(one))
+            there = (link for link in links if link[0].rpartition("_")[0] == following)
+            ways = ((*inner_lanes(self._links, link[4]), link[0]) for link in there)
             known = self._ways[lane, following] = next(ways, ())
         return known
-
-    def _way_of(self, link: Sequence[str]) -> tuple[str, ...]:
-        return (*inner_lanes(self._links, link[4]), link[0])
 
     def _from(self, edge: str, station: float) -> Iterator[_Spot]:
         """Vehicles on an edge whose fronts are past a station [m], in their order."""
@@ -195,11 +173,6 @@ class Leaders:
             # SUMO counts from where the oncoming lane begins.
             station = float(self._lane_length(lane)) - station
         return _Spot(vehicle, lane, is_against, station, self._spots.across(vehicle, lane), *size)
-
-
-def _leads_to(link: Sequence[str], edge: str) -> bool:
-    """Whether a link of a lane leads to an edge."""
-    return link[0].rpartition("_")[0] == edge
 
 
 class Courses:

@@ -90,10 +90,7 @@ class LongBodies:
         return replace(state, pieces=_joined(bent)) if bent else state
 
     def parts(self, vehicle: str, length: float, front: _Point, heading: float) -> list[Part]:
-        """Straight parts of one body, the front first; the body itself where it does not bend.
-
-        Takes `length` [m], `front` (float, float, float) [m], `heading` [rad].
-        """
+        """Straight parts of one body [m], the front first; the body itself where it does not bend."""
         joints = None
         if length > LONGEST_RIGID:
             sections = self._sections(vehicle, length)

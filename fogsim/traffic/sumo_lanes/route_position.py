@@ -160,10 +160,7 @@ class GapToEgo:
         self._ego = ego
 
     def measure(self, vehicle: str) -> float | None:
-        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; None if one of them is off the lanes.
-
-        Both must be on the road.
-        """
+        """Gap of a vehicle on the road [m], with the sign and None of `signed_gap`; None if either is off the lanes."""
         if is_off_lanes(self._api, self._ego) or is_off_lanes(self._api, vehicle):
             return None
         find, distance, length = self._places.find, self._places.distance, self._length

@@ -15,10 +15,7 @@ from fogsim.values import Stretch
 
 
 class _Piece(NamedTuple):
-    """An edge, also one inside a junction, and the positions along a road at which it begins and ends [m].
-
-    Those who overtake on the oncoming lane are on one of the opposite edges.
-    """
+    """An edge or way inside a junction, its ends along a road [m], and the oncoming edges on which others overtake."""
 
     edge: str
     start: float
@@ -55,7 +52,7 @@ class SumoVehiclePlaces:
             for edge in (piece.edge, *piece.opposite):
                 is_against = edge is not piece.edge
                 for vehicle, station in found(edge):
-                    if piece.opposite and self._is_against(vehicle) != is_against:
+                    if piece.opposite and self._directions.is_against(vehicle, self._lane(vehicle)) != is_against:
                         continue
                     # SUMO counts from where the oncoming lane begins, and far below 0 off the lanes.
                     position = piece.end - station if is_against else piece.start + station
@@ -78,9 +75,6 @@ class SumoVehiclePlaces:
         for vehicle in vehicles:
             there.setdefault(self._lane(vehicle).rpartition("_")[0], []).append((vehicle, self._station(vehicle)))
         return lambda edge: there.get(edge, ())
-
-    def _is_against(self, vehicle: str) -> bool:
-        return self._directions.is_against(vehicle, self._lane(vehicle))
 
     def _ego_route(self) -> tuple[str, ...]:
         """Edges of the ego's route; of its last one when it has left the road, none if it was not looked at before."""

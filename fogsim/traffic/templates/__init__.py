@@ -9,7 +9,6 @@ from fogsim.traffic.templates.on_foot import WALKING_SPEED, Footfall, Walker
 from fogsim.traffic.templates.placement import (
     VEHICLE_KINDS,
     Actor,
-    KnownWays,
     Placed,
     PlacementError,
     Relation,
@@ -26,7 +25,6 @@ __all__ = [
     "Actor",
     "Demand",
     "Footfall",
-    "KnownWays",
     "Layout",
     "Obstruction",
     "Placed",

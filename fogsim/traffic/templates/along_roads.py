@@ -46,22 +46,8 @@ def straight_links(edges: Sequence[Edge]) -> list[Link]:
 class _AlongRoad:
     """A road with one curve and one grade at most; what a template leaves open is a straight, level country road.
 
-    Attributes
-    ----------
-    length : float
-        Length [m].
-    lanes, oncoming_lanes : int
-        Lanes of either direction; 0 oncoming ones for a road of one direction.
-    lane_width, median : float
-        Width of each, and distance between the two directions' inner borders [m].
-    limit : float
-        Speed limit [m/s].
-    curve_at, curve_radius, curve_turn : float
-        Where a curve begins and its radius [m], and by how much it turns to the left, or, negative, right [rad].
-    grade : float
-        Grade [-]; positive climbs.
-    grade_at, grade_length : float
-        Where it begins and how long it is, with its vertical curves [m].
+    Lengths are in m, the limit in m/s, grades positive if they climb, and turns in rad, to the right if negative.
+    Without oncoming lanes it is a road of one direction. Vertical curves belong to the length of a grade.
     """
 
     length: float = 2000.0
@@ -83,34 +69,12 @@ class _AlongRoad:
         return self.length
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            Stations at which the ego's way is cut into edges [m].
-
-        Raises
-        ------
-        InputError
-            If its curve or its grade is longer than the road.
-        """
+        """The road, the ego's way cut into edges at stations [m]; InputError if its curve or grade is too long."""
         ends = [0.0, *sorted(cuts), self.length]
         return self.laid(list(itertools.pairwise(ends)))
 
     def laid(self, spans: Sequence[tuple[float, float]]) -> Layout:
-        """The road in parts.
-
-        Parameters
-        ----------
-        spans : sequence of tuple of float
-            Stations between which each part lies [m].
-
-        Raises
-        ------
-        InputError
-            If its curve or its grade is longer than the road.
-        """
+        """The road in parts between stations [m]."""
         axis = self.axis()
         parts = [axis.part(*span) for span in spans]
         nodes = ["begin", *(f"cut{number}" for number in range(1, len(parts))), "end"]
@@ -136,23 +100,11 @@ class _AlongRoad:
         return self.median + self.oncoming_lanes * self.lane_width
 
     def axis(self) -> Axis:
-        """Its middle.
-
-        Raises
-        ------
-        InputError
-            If its curve or its grade is longer than the road.
-        """
+        """Its middle."""
         return axis_of(self.bends(), self.grades(), _START)
 
     def bends(self) -> list[Bend]:
-        """Its plan.
-
-        Raises
-        ------
-        InputError
-            If its curve does not end on it.
-        """
+        """Its plan; InputError if its curve does not end on it."""
         if not self.curve_turn:
             return [Bend(self.length)]
         curve = spirals_and_arc(self.curve_radius, self.curve_turn)
@@ -163,13 +115,7 @@ class _AlongRoad:
         return [*before, *curve, Bend(rest)]
 
     def grades(self) -> list[tuple[float, float]]:
-        """Its profile: stations [m] and grades [-].
-
-        Raises
-        ------
-        InputError
-            If its grade does not end on it, or is too short for its vertical curves.
-        """
+        """Its profile: stations [m] and grades [-]; InputError if its grade is too short, or does not end on it."""
         if not self.grade:
             return []
         eased, end = abs(self.grade) * _CREST_RADIUS, self.grade_at + self.grade_length
@@ -205,35 +151,14 @@ class Motorway(_AlongRoad):
 
 @dataclass(frozen=True, slots=True)
 class _WalkedRoad(_AlongRoad):
-    """A road that may have footways and zebra crossings.
-
-    Attributes
-    ----------
-    footways : bool
-        Whether there is a footway to the right of either direction.
-    footway_width : float
-        Their width [m].
-    zebra_crossings : tuple of float
-        Stations at which persons cross the road [m].
-    """
+    """A road that may have footways to the right of either direction, and zebra crossings at stations [m]."""
 
     footways: bool = False
     footway_width: float = 2.0
     zebra_crossings: tuple[float, ...] = ()
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road; see `_AlongRoad.layout`.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            Stations at which the ego's way is cut into edges [m].
-
-        Raises
-        ------
-        InputError
-            If its curve or its grade is longer than the road, or where it has no room for a crossing.
-        """
+        """The road; see `_AlongRoad.layout`."""
         zebras = sorted(self.zebra_crossings)
         self._check_zebras(zebras)
         if not self.footways:
@@ -326,13 +251,7 @@ class Rural(_WalkedRoad):
 
 @dataclass(frozen=True, slots=True)
 class Tunnel(_AlongRoad):
-    """A road of two lanes with a tunnel.
-
-    Attributes
-    ----------
-    tunnel_at, tunnel_length, tunnel_height : float
-        Where the tunnel begins, how long and how high it is [m].
-    """
+    """A road of two lanes with a tunnel."""
 
     limit: float = 80.0 / 3.6
     tunnel_at: float = 500.0
@@ -340,18 +259,7 @@ class Tunnel(_AlongRoad):
     tunnel_height: float = 5.2
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road; see `_AlongRoad.layout`.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            Stations at which the ego's way is cut into edges [m].
-
-        Raises
-        ------
-        InputError
-            If the tunnel, the curve or the grade is longer than the road.
-        """
+        """The road; see `_AlongRoad.layout`."""
         end = self.tunnel_at + self.tunnel_length
         if end > self.length:
             raise InputError(

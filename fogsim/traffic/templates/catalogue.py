@@ -37,21 +37,7 @@ _PRIORITY, _RAMP_PRIORITY = 10, 5
 
 @dataclass(frozen=True, slots=True)
 class _Ramp(Motorway):
-    """A motorway with a ramp that comes from the right, and a lane to speed up on.
-
-    Attributes
-    ----------
-    ramp_at : float
-        Where the lane to speed up on begins [m].
-    ramp_length : float
-        Length of the ramp before it [m].
-    merge_length : float
-        Length of that lane [m].
-    ramp_limit : float
-        Speed limit on the ramp [m/s].
-    ramp_radius, ramp_turn : float
-        Radius of the ramp's curve [m], and by how much it turns there [rad].
-    """
+    """A motorway with a ramp that comes from the right, and a lane to speed up on, which begins at `ramp_at` [m]."""
 
     ramp_at: float = 700.0
     ramp_length: float = 350.0
@@ -66,18 +52,7 @@ class _Ramp(Motorway):
         return self.ramp_at
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            Stations at which the ego's way is cut into edges [m].
-
-        Raises
-        ------
-        InputError
-            If its curve or its grade is longer than the road.
-        """
+        """The road; see `RoadTemplate.layout`."""
         axis, merge_end = self.axis(), self.ramp_at + self.merge_length
         inner = axis.moved(-0.5 * self.median)
         usual = (self.lane_width, self.limit, _PRIORITY)
@@ -123,12 +98,10 @@ class RoadTemplate(Protocol):
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
         """The road (`cuts` [m])."""
-        ...
 
     @property
     def free_length(self) -> float:
         """How far from its beginning the ego's way may be cut [m]."""
-        ...
 
 
 ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(

@@ -27,10 +27,7 @@ class Demand:
 
 
 def cuts_around(placed: Sequence[Placed], length: float) -> tuple[float, ...]:
-    """Where the ego's way is cut so that the lanes of actors stay free around and between them, and the rest fills.
-
-    Takes `length` [m].
-    """
+    """Where the ego's way is cut so that actors' lanes stay free around and between them, and the rest fills [m]."""
     if not placed:
         return ()
     first = min(one.position - one.actor.length for one in placed) - _ROOM

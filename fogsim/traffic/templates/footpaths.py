@@ -76,10 +76,7 @@ class WalkingArea:
 
 
 def place_before(way: CrossingWay, zebra: Zebra) -> float:
-    """Where on its way across a node who turns waits for those who cross the road that it turns into.
-
-    Returns share of the way's length [-].
-    """
+    """At which share of its way across a node who turns waits for those who cross the road beyond [-]."""
     apart = distances(way.line, zebra.line)
     return max(1, int(np.argmax(apart < 0.5 * ZEBRA_WIDTH))) / (len(apart) - 1)
 

@@ -66,9 +66,6 @@ class CrossingWay:
         left, others_left = self.link.direction == "l", other.link.direction == "l"
         if left != others_left:
             return left
-        return self._comes_before(other)
-
-    def _comes_before(self, other: "CrossingWay") -> bool:
         return clockwise_from_north(self.source) < clockwise_from_north(other.source)
 
     def is_opposite(self, other: "CrossingWay") -> bool:
@@ -87,10 +84,7 @@ def _turned(angle: float) -> float:
 
 
 def curve(one: Points, heading: float, other: Points, last_heading: float) -> Points:
-    """Cubic Bézier curve from a place and direction to another.
-
-    Takes `one`, `other` (3,) [m], `heading`, `last_heading` [rad].
-    """
+    """Cubic Bézier curve from a place (3,) [m] and heading [rad] to another."""
     turn = abs(_turned(last_heading - heading))
     # Handles that make a quarter of a circle of a quarter turn: 4/3 tan(θ/4) of the radius.
     reach = math.dist(other, one) * (2.0 / 3.0 / (1.0 + math.cos(0.5 * turn)))
@@ -113,10 +107,7 @@ def line_length(line: Points) -> float:
 
 
 def distances(line: Points, other: Points) -> Points:
-    """Distance of each place along a line (in steps of about half a metre) from another line [m].
-
-    Takes `line`, `other` (n, 3) [m].
-    """
+    """Distance of each place along a line (n, 3), about half a metre apart, from another line [m]."""
     one, two = _dense(line), _dense(other)
     apart: Points = np.min(np.linalg.norm(one[:, None, :2] - two[None, :, :2], axis=-1), axis=1)
     return apart
@@ -129,10 +120,7 @@ def _dense(line: Points) -> Points:
 
 
 def waiting_place(way: CrossingWay, others: Sequence[CrossingWay]) -> float | None:
-    """Where on its way across a node who turns left waits for those who come towards him; None if there is none.
-
-    Returns share of the way's length [-].
-    """
+    """At which share of its way who turns left waits for oncoming vehicles [-]; None if there are none."""
     meeting = [distances(way.line, other.line) for other in others if other.link.target != way.link.target]
     if not meeting:
         return None

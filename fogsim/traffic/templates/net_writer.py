@@ -324,7 +324,8 @@ def _internal_junctions(node: _Junction) -> Iterator[str]:
         way = node.ways[number]
         met = [n for n, meeting in enumerate(node.meets[number][: len(node.ways)]) if meeting]
         walked = [f"{zebra.name}_0" for zebra in node.zebras if zebra.is_met_by(way)]
-        lanes = dict.fromkeys(_lane_from(node.ways[n]) for n in met if node.ways[n].is_opposite(way))
+        facing = (one for one in map(node.ways.__getitem__, met) if one.is_opposite(way))
+        lanes = dict.fromkeys(one.source.lane_id(one.link.from_lane) for one in facing)
         x, y, _ = _parts(node, number)[0][2][-1].tolist()
         yield element(
             "junction",
@@ -340,10 +341,6 @@ def _internal_junctions(node: _Junction) -> Iterator[str]:
 def _entry(node: _Junction, number: int) -> str:
     edge, lane = node.entry(number)
     return f"{edge}_{lane}"
-
-
-def _lane_from(way: CrossingWay) -> str:
-    return way.source.lane_id(way.link.from_lane)
 
 
 def _area_before(node: _Junction, zebra: Zebra) -> WalkingArea:

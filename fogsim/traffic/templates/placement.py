@@ -71,7 +71,6 @@ class _EdgeMeasures(Protocol):
 
     def index(self, number: int) -> int:
         """Number of a lane in SUMO; lanes are counted from the right, from 0."""
-        ...
 
 
 class Ways(Protocol):
@@ -80,19 +79,15 @@ class Ways(Protocol):
     @property
     def ways(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         """Ways by name."""
-        ...
 
     def way(self, name: str) -> tuple[str, ...]:
         """Edges of a way."""
-        ...
 
     def edge(self, name: str) -> _EdgeMeasures:
         """An edge by its id."""
-        ...
 
     def between(self, one: str, other: str) -> float:
         """Length of the way across the junction between two edges [m]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,17 +36,7 @@ _TURNS = {"straight": 2, "left": 3, "right": 1}
 
 @dataclass(frozen=True, slots=True)
 class Streets:
-    """What roads have in common that meet.
-
-    Attributes
-    ----------
-    length : float
-        Length of the ego's way, in whose middle they meet [m].
-    lane_width : float
-        Width of each lane [m].
-    limit, side_limit : float
-        Speed limits on the ego's road and on the other [m/s].
-    """
+    """Roads that meet in the middle of the ego's way; measures in m, limits in m/s."""
 
     length: float = 600.0
     lane_width: float = 3.25
@@ -59,18 +49,9 @@ class Streets:
         return 0.0
 
     def arm(self, number: int, inner: float, nodes: tuple[str, str], priorities: Sequence[int]) -> tuple[Edge, Edge]:
-        """Both directions of a road that ends where the roads meet.
+        """Both directions of the road of one of `_ARMS`, which ends `inner` metres from the middle, at two nodes.
 
-        Parameters
-        ----------
-        number : int
-            Which of `_ARMS`; its edges are called like that, and ``.back``.
-        inner : float
-            Distance from the middle at which it ends [m].
-        nodes : tuple of str
-            Ids of the nodes to which it leads, and from which it leads away.
-        priorities : sequence of int
-            Of the ego's road and of the other.
+        `priorities` are those of the ego's road and of the other.
         """
         name, away = _ARMS[number], _straight_axis(_DIRECTIONS[number], (inner, 0.5 * self.length))
         is_side = number % 2
@@ -89,16 +70,9 @@ def _straight_axis(direction: float, reach: tuple[float, float]) -> Axis:
 
 @dataclass(frozen=True, slots=True)
 class Crossing(Streets):
-    """Two streets that cross; the ego comes from the west, on the main road.
+    """Two streets that cross; the ego comes from the west, on the main road; without lights the other gives way.
 
-    Attributes
-    ----------
-    lights : bool
-        Whether it has traffic lights; without, the other road gives way.
-    footways : bool
-        Whether there is a footway to the right of either direction, and crossings over all roads where they meet.
-    footway_width : float
-        Their width [m].
+    Footways are to the right of either direction, with crossings over all roads where they meet.
     """
 
     lights: bool = False
@@ -106,13 +80,7 @@ class Crossing(Streets):
     footway_width: float = 2.0
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:  # noqa: ARG002 - as of `RoadTemplate`
-        """The road.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            None.
-        """
+        """The road, which has no cuts."""
         inner, node = self.lane_width + (ZEBRA_LEAD + _KERB_CORNER if self.footways else _CORNER), "middle"
         edges = [edge for number in range(4) for edge in self.arm(number, inner, (node, node), (_MAIN, _SIDE))]
         links, ways = list[Link](), list[tuple[str, tuple[str, ...]]]()
@@ -138,27 +106,13 @@ def _two_phases(walks: bool = False) -> tuple[Phase, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Roundabout(Streets):
-    """Four roads that meet at a roundabout; the ego comes from the west and leaves to the east.
-
-    Attributes
-    ----------
-    radius : float
-        Radius of the middle of its lane [m].
-    ring_limit : float
-        Speed limit on it [m/s].
-    """
+    """Four roads that meet at a roundabout, whose lane has a `radius`; the ego goes from the west to the east."""
 
     radius: float = 18.0
     ring_limit: float = 35.0 / 3.6
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:  # noqa: ARG002 - as of `RoadTemplate`
-        """The road.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            None.
-        """
+        """The road, which has no cuts."""
         edges, links = list[Edge](), list[Link]()
         for number, name in enumerate(_ARMS):
             into, away = self.arm(number, self.radius + _APPROACH, (f"{name}.in", f"{name}.out"), (_SIDE, _SIDE))

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from fogsim.conditions import EGO, Limits, lights_of
@@ -12,7 +12,7 @@ from fogsim.scenario.expect.checks import last_time, named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import TrafficFiles
 from fogsim.scenario.schema import Clocks, ScenarioFile
-from fogsim.scenario.timeline import departing_vehicles, operations, pointless_triggers
+from fogsim.scenario.timeline import SIGNAL_STATES, SignalActions, departing_vehicles, operations, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.timeline.vehicle_actions import VehicleActions
 from fogsim.scenario.traffic_schema import ChangeLane
@@ -97,7 +97,7 @@ def demand_mistakes(document: Document, scenario: ScenarioFile, made: TrafficFil
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
         mistakes |= {at: text for at, text in unfit.items() if text}
         mistakes |= _wide_changes(scenario, demand, edges)
-        mistakes |= _unknown_signals(scenario, edges)
+        mistakes |= _unknown_signals(scenario, edges) or _unfit_signals(scenario, edges)
         way = _way(scenario, demand)
         mistakes |= _unknown_edges(_edges_on_the_way(scenario), edges)
         mistakes |= _unknown_way(scenario, edges) or _places_aside(scenario, way, edges)
@@ -172,6 +172,25 @@ def _unknown_signals(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, s
         for at, signal in _named_signals(scenario)
         if signal not in known
     }
+
+
+def _unfit_signals(scenario: ScenarioFile, edges: NetEdges) -> dict[KeyPath, str]:
+    """Phases that no program of the timeline's traffic lights has, and states with too few or too many letters."""
+    mistakes: dict[KeyPath, str] = {}
+    # Additional files may bring programs with more phases.
+    is_all = not scenario.traffic.additional and scenario.traffic.config is None
+    for number, entry in enumerate(scenario.timeline):
+        for subject, doing in operations(entry):
+            if not isinstance(doing, SignalActions):
+                continue
+            phases, links = edges.signals[subject.removeprefix("signal.")]
+            at = "timeline", number, "do", subject
+            if is_all and phases and doing.phase is not None and doing.phase >= phases:
+                mistakes[*at, "phase"] = f"their program has phases 0 to {phases - 1}; got {doing.phase}"
+            state = doing.state or ""
+            if links and state not in SIGNAL_STATES and len(state) not in (0, 1, links):
+                mistakes[*at, "state"] = f"they have {links} links: give one letter, or {links}; got {shown(state)}"
+    return mistakes
 
 
 def _named_signals(scenario: ScenarioFile) -> Iterator[tuple[KeyPath, str]]:
@@ -273,7 +292,7 @@ def _banks_aside(scenario: ScenarioFile, length: float) -> dict[KeyPath, str]:
     return mistakes
 
 
-def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:
+def _suggested(name: str, known: Collection[str]) -> str:
     """The nearest of many names, and some others."""
     near = nearest(name, known)
     some = [*([near] if near else []), *(one for one in known if one != near)][:_MOST_SHOWN]

@@ -1,5 +1,6 @@
 """The block ``timeline``: what is written, and every mistake at its place."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,27 @@ def test_mistakes_are_told_with_their_key() -> None:
         text = mistake(f"{{when: time > 1 s, do: {do}}}")
         assert f"timeline.0.{told}" in text or (told in text and "timeline.0.do" in text)
         assert len(text.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("shows", "told"),
+    [
+        ("phase: 99", "phase: their program has phases 0 to "),
+        ("state: rG", "state: they have "),
+        ("state: red", ""),
+        ("state: r", ""),
+        ("phase: 0", ""),
+    ],
+)
+def test_traffic_lights_show_what_their_program_can(tmp_path: Path, shows: str, told: str) -> None:
+    file = tmp_path / "lights.fog.yaml"
+    file.write_text(
+        "name: lights\ndescription: x\nroad: {template: crossing, lights: true}\nactors: {ego: {speed: 30 km/h}}\n"
+        f"fog: {{visibility: 100 m}}\ntimeline: [{{when: time > 1 s, do: {{signal.middle: {{{shows}}}}}}}]\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=f"timeline.0.do.signal.middle.{told}") if told else contextlib.nullcontext():
+        load_scenario(file)
 
 
 def test_mistakes_of_conditions_and_names() -> None:

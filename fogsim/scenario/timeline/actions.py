@@ -45,7 +45,7 @@ from fogsim.values.script import (
 
 _HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
 _SLOWEST = 0.01  # Speed at which a change of lane over any distance takes as long as it may [m/s]
-_STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
+SIGNAL_STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
 
 
 Entries = Mapping[tuple[str, DepartAction], Enter]
@@ -66,7 +66,7 @@ def actions_of(entry: TimelineEntry, reference: float, entering: Entries, now: S
                     return None
                 traffic += moves
             case SignalActions():
-                state = "r" if doing.state is None else _STATES.get(doing.state, doing.state)
+                state = "r" if doing.state is None else SIGNAL_STATES.get(doing.state, doing.state)
                 signal = subject.removeprefix("signal.")
                 traffic.append(SetSignal(signal, doing.phase, state, _endless(doing.for_s)))
             case FogActions():

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +29,15 @@ _Point = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class NetEdges:
-    """Edges for vehicles: number of lanes, middle lanes [m] of the wanted ones, and ids of traffic lights.
+    """Edges for vehicles: number of lanes, and middle lanes [m] of the wanted ones; traffic lights.
 
+    `signals` are the most phases that a program of traffic lights has, and the number of their links, by id.
     `gaps` are pairs of wanted edges that were to follow one another and have no lane from one to the next.
     """
 
     lanes: Mapping[str, int]
     axes: Mapping[str, Sequence[_Point]]
-    signals: tuple[str, ...] = ()
+    signals: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     gaps: Collection[tuple[str, str]] = ()
 
     def route_length(self, route: Sequence[str]) -> float:
@@ -57,7 +58,7 @@ def read_net_edges(
     if not reader.lanes or (size == most_bytes and not reader.has_edges):
         return None
     axes = {edge: shapes[len(shapes) // 2] for edge, shapes in reader.shapes.items() if shapes}
-    return NetEdges(reader.lanes, axes, tuple(reader.signals), reader.unlinked if size < most_bytes else ())
+    return NetEdges(reader.lanes, axes, reader.signals, reader.unlinked if size < most_bytes else ())
 
 
 class _EdgeReader:
@@ -68,8 +69,9 @@ class _EdgeReader:
         self.unlinked = unlinked
         self.lanes: dict[str, int] = {}
         self.shapes: dict[str, list[list[_Point]]] = {edge: [] for edge in wanted}
-        self.signals: dict[str, None] = {}
-        self._edge = ""
+        self.signals: dict[str, tuple[int, int]] = {}
+        self._edge = self._signal = ""
+        self._phases = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if tag == "edge":
@@ -80,7 +82,12 @@ class _EdgeReader:
             if self._edge in self.shapes:
                 self.shapes[self._edge].append(_points(attributes.get("shape", "")))
         elif tag == "tlLogic":
-            self.signals[attributes.get("id", "")] = None
+            self._signal, self._phases = attributes.get("id", ""), 0
+            self.signals.setdefault(self._signal, (0, 0))
+        elif tag == "phase":
+            self._phases += 1
+            most = max(self.signals.get(self._signal, (0, 0))[0], self._phases)
+            self.signals[self._signal] = most, len(attributes.get("state", ""))
         elif tag == "connection":
             # All edges and programs of traffic lights come before the connections.
             self.has_edges = True

@@ -1,6 +1,5 @@
 """Runs of a study in parallel processes of this machine; completed runs are kept however it ends."""
 
-import ast
 import contextlib
 import multiprocessing.util
 import os
@@ -16,7 +15,7 @@ from pathlib import Path
 from fogsim.core.files.atomic import write_json
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.interruption import Interruption
-from fogsim.errors import InputError
+from fogsim.core.processes import refuse_to_run_again
 from fogsim.study.execution import PROCESS_DIED, RunWatch, Work, failure, result_file, run_outcome, run_to_file
 from fogsim.study.plan import StudyRun
 
@@ -78,7 +77,7 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 @contextlib.contextmanager
 def worker_pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
     """Processes that end with this one, and at once if the block raises an error; `module` has their work."""
-    _refuse_to_run_again()
+    refuse_to_run_again()
     # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
     # imported what they need.
     open_standard_streams()
@@ -95,26 +94,6 @@ def worker_pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(wait=True, cancel_futures=True)
         raise
     pool.shutdown(wait=True)
-
-
-def _refuse_to_run_again() -> None:
-    """Refuse a script that each process would run from its beginning, as multiprocessing's do, this call included."""
-    main, frame = sys.modules["__main__"], sys._getframe()
-    while frame.f_back is not None and (frame.f_globals is not vars(main) or frame.f_code.co_name != "<module>"):
-        frame = frame.f_back
-    try:
-        script = ast.parse(Path(str(main.__file__)).read_bytes())
-    except (AttributeError, OSError, SyntaxError, ValueError):
-        return
-    if frame.f_globals is not vars(main):
-        return
-    here = [one for one in script.body if one.lineno <= frame.f_lineno <= (one.end_lineno or 0)]
-    names = {name.id for one in here for name in ast.walk(one) if isinstance(name, ast.Name)}
-    if here and "__name__" not in names:
-        raise InputError(
-            f"{main.__file__}:{frame.f_lineno}: processes that are started here run this script again: put what only "
-            'the first is to do below if __name__ == "__main__":'
-        )
 
 
 def _prepare_worker() -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from fogsim.core.files.atomic import write_json
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.interruption import Interruption
+from fogsim.core.processes import refuse_to_run_again
 from fogsim.study.execution import PROCESS_DIED, RunWatch, Work, failure, result_file, run_outcome, run_to_file
 from fogsim.study.plan import StudyRun
 
@@ -76,6 +77,7 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 @contextlib.contextmanager
 def worker_pool(processes: int, module: str) -> Iterator[ProcessPoolExecutor]:
     """Processes that end with this one, and at once if the block raises an error; `module` has their work."""
+    refuse_to_run_again()
     # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
     # imported what they need.
     open_standard_streams()

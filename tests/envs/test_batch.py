@@ -18,7 +18,7 @@ from fogsim_envs.batch import RuleConstants
 from fogsim_envs.batch.belief_kernels import update_belief
 from fogsim_envs.batch.layout import CELLS, EPISODE
 from fogsim_envs.infos import row_of
-from fogsim_envs.task import ScenarioDistribution
+from fogsim_envs.task import ScenarioDistribution, TaskWeights
 
 BATCH, FAST = "fogsim/FogAdvisoryBatch-v2", "fogsim/FogAdvisoryFast-v2"
 
@@ -238,7 +238,10 @@ def test_options_reach_the_batch_through_stable_baselines() -> None:
     pytest.importorskip("stable_baselines3", reason="an extra")
     from fogsim_envs.batch.stable_baselines import BatchVecEnv
 
-    envs = BatchVecEnv(made(2))
+    inner = made(2)
+    envs = BatchVecEnv(gymnasium.wrappers.vector.RecordEpisodeStatistics(inner))
+    envs.set_attr("reward_weights", TaskWeights(progress=1.0))
+    assert inner.unwrapped.reward_weights == TaskWeights(progress=1.0)
     envs.set_options({"visibility": 50.0})
     with pytest.raises(InputError, match="no options"):
         envs.reset()

@@ -2,6 +2,7 @@ import io
 import json
 import multiprocessing
 import os
+import re
 import signal
 import sys
 import time
@@ -15,6 +16,7 @@ from fogsim.scenario import load_scenario
 from fogsim.study import StudyRun
 from fogsim.study.execution import result_file
 from fogsim.study.pool import ProcessPool, _end
+from tests.helpers.command import run_python
 
 SCENARIO = load_scenario("motorway_fog_bank")
 WORK = """
@@ -122,3 +124,23 @@ def test_the_death_of_the_server_of_processes_costs_no_run(tmp_path: Path, monke
     work = __import__("plain_work").work
     ProcessPool(1, work).run(runs, tmp_path, lambda run, _: told.append(run.seed))
     assert told == [0, 1]
+
+
+SCRIPT = """
+from fogsim.study.pool import worker_pool
+
+def begin():
+    with worker_pool(1, "fogsim.study.execution"):
+        print("begun")
+
+{guard}begin()
+"""
+
+
+@pytest.mark.parametrize("guard", ["", 'if __name__ == "__main__": '])
+def test_a_script_that_each_process_would_run_again_is_refused(tmp_path: Path, guard: str) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT.format(guard=guard))
+    done = run_python("script.py", cwd=tmp_path, check=bool(guard))
+    refusal = r'script.py:8: processes that are started here run this script again: .* if __name__ == "__main__":'
+    assert done.stdout.strip() == ("begun" if guard else "")
+    assert bool(re.search(refusal, done.stderr)) != bool(guard)

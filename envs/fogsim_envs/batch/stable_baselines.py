@@ -75,7 +75,7 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ARG002 - there is one for all
         """Set an attribute of all."""
-        setattr(self.envs, attr_name, value)
+        setattr(self.envs.unwrapped, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method once for all."""

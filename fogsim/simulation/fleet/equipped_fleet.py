@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from fogsim.core.files.standard_streams import open_standard_streams
+from fogsim.core.processes import refuse_to_run_again
 from fogsim.core.randomness import named_generator
 from fogsim.errors import SimulationError
 from fogsim.simulation.ego.route_places import Places, RoutePlaces
@@ -46,6 +47,7 @@ class _UnitProcess:
         """Begin a run; see `UnitPool.start_run`."""
         if self._process is None:
             open_standard_streams()
+            refuse_to_run_again()
             # None of this process's simulation, threads and contexts in it.
             context = multiprocessing.get_context("forkserver")
             self._link, theirs = context.Pipe()

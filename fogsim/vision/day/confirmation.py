@@ -15,6 +15,7 @@ from fogsim.vision.day.second_opinion import (
     CLEAR,
     DISAGREE,
     GLARES,
+    MODEL_DEVIATION,
     STANDS_OUT,
     WIDEST,
     DayVerdict,
@@ -29,10 +30,6 @@ from fogsim.vision.lines.horizon import Horizon, levelled
 
 PERIOD, SOON = 10.0, 1.0
 """Times after which an image is compared again: one that confirmed an estimate, and one that did not [s]."""
-
-MODEL_DEVIATION = 0.15
-"""Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
-are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
 _CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""

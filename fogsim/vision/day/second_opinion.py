@@ -12,6 +12,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, OpticalDepths
 from fogsim.vision.day.day_fit import DayFit, fit_day
+from fogsim.vision.day.row_data import STRETCHED
 from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import quantile
@@ -114,6 +115,9 @@ def _block_means(
     return means
 
 
+MODEL_DEVIATION = 0.15
+"""Relative deviation of k by what is none of the hypotheses; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
+
 _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
@@ -145,8 +149,9 @@ _SUSPECTED = 0.2
 _HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
-_LEAST_CONTRAST = 0.08
-"""Least contrast of far road to near road over the sky for fog to show [-]."""
+_LEAST_CONTRAST, _CONTRAST_ALONE = 0.08, 0.2
+"""Least contrast of far road to near road over the sky for fog to show, and for it to be read by the day model alone
+[-]."""
 
 _DARK = 6.0 / 255.0
 """Light of the brightest rows below which it is no day, over full scale [-]."""
@@ -212,18 +217,18 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
     high = middle * math.exp(math.hypot(math.log(high / middle), calibration))
     is_clear = low > CLEAR
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
-    by_light = fit.lights
     usual = float(fit.surfaces[:_USUAL_SURFACES].sum())
     is_fog = fit.below(_FOG) > _LEAST_FOG
     shows = is_fog and fit.contrast > _LEAST_CONTRAST
-    answers = is_clear or (shows and high < WIDEST * low)
     is_stated = fit.responses[0] > _HARDLY_STATED
+    unusual = float(fit.lights[LIGHTS.is_unusual].sum())
+    is_known = is_stated or unusual < _MOSTLY or float(fit.responses[STRETCHED].sum()) > _MOSTLY
+    answers = is_clear or (shows and high < WIDEST * low and is_known and fit.contrast > _CONTRAST_ALONE)
     is_lane = (lines or 0) >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
     is_road = fit.fog_over_none > _A_ROAD or is_lane
-    sky = float(by_light[LIGHTS.sky == 1].sum())
+    sky = float(fit.lights[LIGHTS.sky == 1].sum())
     is_sky = sky > _MOSTLY or fit.clipped > 0.0
-    is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane
-    is_sure = is_sure and is_sky and low > _DENSEST
+    is_sure = is_sky and low > _DENSEST and ((fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane)
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
     # What crosses an uneven road, as a wiper does, is no tone curve, nor is the course of one that sags.
@@ -238,7 +243,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
         shows_fog=shows and is_road,
         is_sure=is_sure,
         is_even=is_even and is_stated,
-        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even and is_stated else 0.0,
+        outside=unusual if is_sure and is_even and is_stated else 0.0,
         doubt=fit.doubt,
         response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
         response_shift=shift,
@@ -257,14 +262,13 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
         (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
-        (fit.contrast < _LEAST_CONTRAST, FAR_ROAD),
+        (fit.contrast < _CONTRAST_ALONE, FAR_ROAD),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
         (wet, "the road may be wet: it mirrors the sky as fog would veil it"),
         (fit.responses[0] < _HARDLY_STATED, "the camera does not have the response that its description states"),
     )
-    said = (reason for holds, reason in reasons if holds)
-    return next(said, "the extinction is not observable: too little road is seen")
+    return next((why for holds, why in reasons if holds), "the extinction is not observable: too little road is seen")
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -402,9 +406,10 @@ def _ends(own: Estimate) -> tuple[float, float]:
 def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
     if verdict.reason or not verdict.is_sure:
-        reason = verdict.reason or str(own.diagnostics.get("reason", ""))
-        return refused(own, reason)
-    return Estimate(own.method, verdict.extinction, verdict.deviation, diagnostics=_found(own), reach=verdict.reach)
+        return refused(own, verdict.reason or str(own.diagnostics.get("reason", "")))
+    deviation = math.hypot(verdict.deviation, MODEL_DEVIATION * verdict.extinction)
+    answer = Estimate(own.method, verdict.extinction, deviation, diagnostics=_found(own), reach=verdict.reach)
+    return replace(answer, common_deviation=MODEL_DEVIATION)
 
 
 def refused(own: Estimate, reason: str) -> Estimate:

@@ -11,18 +11,18 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
+from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
 from fogsim.vision.day.recent_change import RecentChange
 from fogsim.vision.day.row_data import near_horizon
 from fogsim.vision.day.second_opinion import (
     CLEAR,
     DISAGREE,
     GLARES,
-    STANDS_OUT,
+    MODEL_DEVIATION,
     WIDEST,
     DayVerdict,
     agree,
     refused,
-    stands_out,
     verdict_of,
 )
 from fogsim.vision.light.luminance import linear_pixels
@@ -31,10 +31,6 @@ from fogsim.vision.lines.horizon import Horizon, levelled
 
 PERIOD, SOON = 10.0, 1.0
 """Times after which an image is compared again: one that confirmed an estimate, and one that did not [s]."""
-
-MODEL_DEVIATION = 0.15
-"""Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
-are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
 _MOST_CHANGE = 0.3
 """Largest relative deviation of k by how it changed over the last images: these methods take fog for even [-]."""

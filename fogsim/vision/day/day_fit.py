@@ -94,8 +94,9 @@ class DayFit:
 
     @property
     def response_shift(self) -> float:
-        """Mean of ln k under all responses over that under the stated one; 0 unless that is unlikely [-]."""
-        return float((self.responses * self.log_means).sum()) if self.responses[0] < _UNLIKELY_STATED else 0.0
+        """Mean of ln k under all responses over that under the stated one, as far as that is unlikely [-]."""
+        unlikely = max(1.0 - float(self.responses[0]) / _UNLIKELY_STATED, 0.0)
+        return unlikely * float((self.responses * self.log_means).sum())
 
     def response_deviation(self, shift: float) -> float:
         """Deviation of ln k under all responses from what is so far from that under the stated one [-]."""
@@ -173,27 +174,29 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, chances: Floats, e
         ended = _ended(rows, 1 + int(np.argmax(of_light[_ALL.size :])))
         return _weighed(ended, camera, horizon, chances, earlier)
     kept = np.flatnonzero(of_light[: _ALL.size] > of_light.max() - _SUITS)
-    some, chosen = np.logaddexp.reduce(whole, axis=1), np.zeros(grid.cells.shape[:2], np.bool_)
+    some, chosen, bent = np.logaddexp.reduce(whole, axis=1), *np.zeros((2, *grid.cells.shape[:2]), np.bool_)
     others = _OTHERS[grid.responses[_OTHERS[:, 0]] & grid.surfaces[_OTHERS[:, 1]]]
     if len(others):
         first = np.logaddexp.reduce(grid.evidence(grid.cells[1, ::2], others, kept) + grid.lights[kept], axis=2)
         some = np.maximum(some, first.max(axis=1) + grid.likely[::2])
+        by_response = (first + _UNLIKELY * (others[:, 0] == 0)).max(axis=1) + grid.likely[::2]
+        bent[:, ::2] = by_response > some.max() - _SUITS
     chosen[:, ::2] = some > some.max() - _FIRST_WORTHWHILE
-    return _posterior(grid, _wider(chosen, 2), kept, none)
+    return _posterior(grid, _wider(chosen, 2), bent, kept, none)
 
 
-def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float) -> DayFit:
+def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], bent: NDArray[np.bool_], kept: Ints, none: float) -> DayFit:
     """Posterior over cells and hypotheses.
 
-    Where fog may be, all surfaces are tried under the stated response; where it still may be, all responses over the
-    likeliest surface. What other surfaces add is taken to be the same under every response.
+    Where fog may be, all surfaces are tried under the stated response; where it still may be, or another response makes
+    it likely, all responses over the likeliest surface. What other surfaces add is taken to be the same under all.
     """
     prior = grid.of_horizon[:, None] + grid.likely
     tried = np.array([(0, int(s)) for s in np.flatnonzero(grid.surfaces)])
     stated = grid.hypotheses(chosen, tried, kept, prior)
     good = np.full(chosen.shape, _UNLIKELY)
     good[chosen] = np.logaddexp.reduce(stated, axis=(1, 2))
-    still = chosen & _wider(good > good.max() - _WORTHWHILE, 1)
+    still = chosen & _wider(bent | (good > good.max() - _WORTHWHILE), 1)
     stated = stated[still[chosen]]
     by_surface = np.logaddexp.reduce(stated, axis=(0, 2))
     best = int(np.argmax(by_surface))
@@ -255,22 +258,23 @@ _LOG_SURFACES = np.log(SURFACES.chance)
 _USUAL = np.zeros((1, 2), np.int64)
 """The stated response and the usual surface."""
 
-_OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
+_OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (5, 0)])
 """Responses and surfaces of a first look: what the usual ones do not explain may need another visibility."""
 
 _HARDLY, _LIKELY = 0.03, 2
 """Probability below which a surface is not tried in every later image of a drive [-], and how many responses are, in
 addition to the stated one: an image hardly separates them, and a camera keeps its own."""
 
-_UNLIKELY_STATED = 0.1
-"""Probability of the stated response below which the mean over all counts; chosen on pool 0 of
+_UNLIKELY_STATED = 0.15
+"""Probability of the stated response below which the mean over all counts, the more the less it is; chosen on pool 0 of
 `benchmarks/camera_kinds.py` [-]."""
 
 _LEAST_CHANCE = 1e-9
 """Least chance of the stated response that others are compared with [-]."""
 
 _SUITS = 5.0
-"""Logarithm of the evidence below the best at which a light is not tried under other surfaces and responses [-]."""
+"""Logarithm of the evidence below the best at which a light is not tried under other surfaces and responses, nor what
+only other responses make likely under all [-]."""
 
 
 _ALL = np.arange(LIGHTS.sky.size)

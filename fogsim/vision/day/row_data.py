@@ -22,22 +22,21 @@ _POINTS = 1025
 MOST_SLOPE = 12.0
 """Most light per signal that a curve is taken to have [-]: the ends of S-curves are flat."""
 
-STATED = 0.45
+STATED = 0.3
 """Chance that a camera has the response that its description states [-]."""
 
 _OTHERS = {
     "srgb": 0.12,
-    "s .5": 0.15,
-    "s 1": 0.07,
-    "knee .8": 0.1,
-    "knee 2.2": 0.06,
-    "film 1": 0.06,
-    "film": 0.1,
-    "2.5": 0.08,
+    "s .7": 0.18,
+    "shoulder 1.5": 0.15,
+    "log 50": 0.08,
+    "film 1": 0.14,
+    "film": 0.12,
+    "2.5": 0.06,
     "1.8": 0.05,
 }
-"""How likely the other curves are, before they are scaled to the rest of 1 [-]: sRGB, S-curves over it, soft
-shoulders, a film curve and powers."""
+"""How likely the other curves are, before they are scaled to the rest of 1 [-]: sRGB, an S-curve over it, a soft
+shoulder, a logarithm, film curves, which are most like those of camera makers, and powers."""
 
 _OTHER_LINEAR = 0.02
 """The same for light itself [-]."""
@@ -45,6 +44,9 @@ _OTHER_LINEAR = 0.02
 
 _BLACK_POINTS = (0.2, 0.35, 0.5)
 """Signals that were stretched to black, over those stretched to white: of clear air, and of thin and dense fog [-]."""
+
+STRETCHED = slice(-len(_BLACK_POINTS), None)
+"""Where the curves of stretched levels are."""
 
 _STRETCHED = 0.3
 """Chance that levels were stretched, where some pixels are black: so may dark things be [-]."""
@@ -79,7 +81,7 @@ def curves_of(camera: Camera) -> Curves:
     slope = np.clip(np.gradient(np.array(light), signal, axis=1), 1.0 / MOST_SLOPE, MOST_SLOPE)
     chance = np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum(), none])
     stretched = (1.0 - _STRETCHED) * chance
-    stretched[-none.size :] = _STRETCHED / none.size
+    stretched[STRETCHED] = _STRETCHED / none.size
     return Curves(np.array(light), slope, chance, stretched)
 
 
@@ -103,7 +105,9 @@ def _inverse(name: str, signal: Floats) -> Floats:
     kind, _, number = name.partition(" ")
     if kind == "s":
         out = srgb + float(number) * (srgb * srgb * (3.0 - 2.0 * srgb) - srgb)
-    elif kind == "knee":
+    elif kind == "log":
+        out = np.log1p(float(number) * light) / math.log1p(float(number))
+    elif kind == "shoulder":
         # The eye's and many sensors' saturation: 1 − exp(−a light).
         bent = (1.0 - np.exp(-float(number) * light)) / (1.0 - np.exp(-float(number)))
         out = respond(bent, Response.SRGB)

@@ -7,109 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.core.jit import kernel
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, OpticalDepths
 from fogsim.vision.day.day_fit import DayFit, fit_day
+from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
+from fogsim.vision.day.row_data import STRETCHED
 from fogsim.vision.day.row_kernels import LIGHTS
-from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.light.medians import quantile
-from fogsim.vision.light.pixel_kernels import LinearPixels, row_luminance
 from fogsim.vision.lines.horizon import Horizon
 
-_BLOCKS = 80
-"""Groups of columns that are judged, across the image."""
-
-_ABOVE = 5
-"""Rows above the horizon that are looked at [px]: what shows there is as high as the camera."""
-
-_BELOW_CROWNS = 2.5
-"""Mounting height up to which that stands on the ground [m]: above, crowns overhang what is seen below them."""
-
-_SKY_HEIGHT, _BRIGHTEST = 0.5, 0.9
-"""Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
-
-_OWN_LANE = 0.2
-"""Columns to either side of the way ahead that do not count, over the image's: vehicles have dark windows above bright
-bodies [-]."""
-
-_DARKER, _BRIGHTER, _LEAST_ROWS = 0.8, 0.15, 3
-"""Light over the airlight below which something stands there, and by how much the ground before it must be brighter to
-show that it stands farther away [-], in how many rows."""
-
-_MOST_FAR = 0.2
-"""Share of the image's width in which things show that fog would hide, from which on there is no such fog [-]."""
-
-STANDS_OUT = "what stands at the horizon is darker than fog would leave it"
-GLARES = "the sun or a lamp shines into the camera, and its glare veils the road"
-
-
-def stands_out(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> bool:
-    """Whether much is seen that fog of an extinction would hide; see `share_of_far_objects`."""
-    return share_of_far_objects(level, camera, horizon, extinction) > _MOST_FAR
-
-
-def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
-    """Share of the image's width in which something is seen that fog of an extinction would hide [-].
-
-    At the depth d fog leaves no light below A (1 − e^(−k d)), so that something of the light L is nearer than −ln(1 − L
-    / A) / k, and its foot lies as far below the horizon. Where the ground between there and the horizon is seen, it is
-    farther.
-
-    Takes `level` (rows, cols), `extinction` [1/m].
-    """
-    margin = 2.0 * horizon.standard_deviation + 1.0
-    first, last = math.floor(horizon.row - margin) - _ABOVE, math.floor(horizon.row - margin)
-    ground = math.ceil(horizon.row + margin)
-    top = max(math.floor(last - _SKY_HEIGHT * camera.height), 0)
-    is_seen = first >= 0 and last > top and ground + _LEAST_ROWS < camera.height and extinction > 0.0
-    if not is_seen or camera.mount_height > _BELOW_CROWNS:
-        return 0.0
-    pixels = linear_pixels(level, camera)
-    per_block = max(camera.width // _BLOCKS, 1)
-    middles = (np.arange(camera.width // per_block) + 0.5) * per_block
-    aside = np.flatnonzero(np.abs(middles - camera.principal_point[0]) > _OWN_LANE * camera.width)
-    sky = _block_means(pixels, top, last, per_block, aside)
-    brightest = sky.max(initial=0.0)
-    # With the airlight, which is no brighter, less is dark.
-    if not brightest > 0.0 or _over(sky[first - top :], brightest).min() >= _DARKER:
-        return 0.0
-    airlight = quantile(sky, _BRIGHTEST)
-    if not airlight > 0.0:
-        return 0.0
-    above = _over(sky[first - top :], airlight)
-    if above.min() >= _DARKER:
-        return 0.0
-    depth = -np.log1p(-np.clip(above, 0.0, _DARKER)) / extinction
-    ends = np.ceil(camera.row_distance / np.maximum(depth, 1e-3) - margin + horizon.row).astype(np.int64)
-    ends = np.minimum(np.where(above < _DARKER, ends, ground), camera.height)
-    below = _block_means(pixels, ground, max(int(ends.max()), ground), per_block, aside)
-    rows, counted = np.arange(ground, ground + len(below))[:, None], ends - ground
-    brighter = ((rows < ends) & (below > airlight * (above + _BRIGHTER))).sum(axis=0)
-    return float(((counted >= _LEAST_ROWS) & (brighter > 0.5 * counted)).mean())
-
-
-def _over(sky: NDArray[np.float32], airlight: float) -> NDArray[np.float64]:
-    """Mean of each block of some rows over the airlight (blocks,) [-]."""
-    return np.asarray((sky / airlight).mean(axis=0, dtype=np.float64))
-
-
-@kernel
-def _block_means(
-    image: LinearPixels, first: int, end: int, width: int, blocks: NDArray[np.int64]
-) -> NDArray[np.float32]:
-    """Mean luminance of rows of some blocks of so many columns (rows, blocks)."""
-    means, line = np.empty((end - first, blocks.size), np.float32), np.empty(width, np.float32)
-    for row in range(first, end):
-        for i in range(blocks.size):
-            row_luminance(image.pixels[:, blocks[i] * width : (blocks[i] + 1) * width], image.tables, row, line)
-            total = 0.0
-            for value in line:
-                total += float(value)
-            means[row - first, i] = total / width
-    return means
-
+MODEL_DEVIATION = 0.15
+"""Relative deviation of k by what is none of the hypotheses; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
 _FOG, _LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
@@ -143,12 +51,13 @@ _SUSPECTED = 0.2
 _HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
-_LEAST_CONTRAST, _DARK = 0.08, 6.0 / 255.0
-"""Least contrast of far road to near road over the sky for fog to show [-], and light of the brightest rows below which
-it is no day, over full scale [-]."""
+_LEAST_CONTRAST, _CONTRAST_ALONE, _DARK = 0.08, 0.2, 6.0 / 255.0
+"""Least contrast of far road to near road over the sky for fog to show, and for it to be read by the day model alone
+[-]; and light of the brightest rows below which it is no day, over full scale [-]."""
 
 FAR_ROAD = "far road is hardly brighter: there is little fog, a road as bright as it, or something before the near road"
 CONTRAST = "contrast shows where the fog of the road's brightness would leave none, or something hangs before the road"
+GLARES = "the sun or a lamp shines into the camera, and its glare veils the road"
 DISAGREE = "how the road fades and how its image brightens disagree"
 WALLED = "something across the way hides road and sky, as a wall does, or the stated pitch is wrong"
 
@@ -210,18 +119,18 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
     high = middle * math.exp(math.hypot(math.log(high / middle), calibration))
     is_clear = low > CLEAR
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
-    by_light = fit.lights
     usual = float(fit.surfaces[:_USUAL_SURFACES].sum())
     is_fog = fit.below(_FOG) > _LEAST_FOG
     shows = is_fog and fit.contrast > _LEAST_CONTRAST
-    answers = is_clear or (shows and high < WIDEST * low)
     is_stated = fit.responses[0] > _HARDLY_STATED
+    unusual = float(fit.lights[LIGHTS.is_unusual].sum())
+    is_known = is_stated or unusual < _MOSTLY or float(fit.responses[STRETCHED].sum()) > _MOSTLY
+    answers = is_clear or (shows and high < WIDEST * low and is_known and fit.contrast > _CONTRAST_ALONE)
     is_lane = (lines or 0) >= _LANE and float(fit.surfaces[_USUAL_SURFACES]) > _MOSTLY and is_stated
     is_road = fit.fog_over_none > _A_ROAD or is_lane
-    sky = float(by_light[LIGHTS.sky == 1].sum())
+    sky = float(fit.lights[LIGHTS.sky == 1].sum())
     is_sky = sky > _MOSTLY or fit.clipped > 0.0
-    is_sure = (fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane
-    is_sure = is_sure and is_sky and low > _DENSEST
+    is_sure = is_sky and low > _DENSEST and ((fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane)
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
     is_hidden = math.isinf(fit.free) and float(fit.surfaces[_USUAL_SURFACES + 1]) > _MOSTLY
@@ -238,7 +147,7 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
         shows_fog=shows and is_road,
         is_sure=is_sure,
         is_even=is_even and is_stated,
-        outside=float(by_light[LIGHTS.is_unusual].sum()) if is_sure and is_even and is_stated else 0.0,
+        outside=unusual if is_sure and is_even and is_stated else 0.0,
         doubt=fit.doubt,
         response_deviation=fit.response_deviation(shift) if is_fog else 0.0,
         response_shift=shift,
@@ -258,14 +167,13 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
     reasons = (
         (fit.brightest < _DARK, "too dark: this is a daytime method"),
         (fit.clipped > _MOSTLY, "the sky is clipped, and the airlight not known: expose for the sky"),
-        (fit.contrast < _LEAST_CONTRAST, FAR_ROAD),
+        (fit.contrast < _CONTRAST_ALONE, FAR_ROAD),
         (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
         (hidden, "the sky above the road is hidden"),
         (wet, "the road may be wet: it mirrors the sky as fog would veil it"),
         (fit.responses[0] < _HARDLY_STATED, "the camera does not have the response that its description states"),
     )
-    said = (reason for holds, reason in reasons if holds)
-    return next(said, "the extinction is not observable: too little road is seen")
+    return next((why for holds, why in reasons if holds), "the extinction is not observable: too little road is seen")
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -405,9 +313,10 @@ def _ends(own: Estimate) -> tuple[float, float]:
 def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
     if verdict.reason or not verdict.is_sure:
-        reason = verdict.reason or str(own.diagnostics.get("reason", ""))
-        return refused(own, reason)
-    return Estimate(own.method, verdict.extinction, verdict.deviation, diagnostics=_found(own), reach=verdict.reach)
+        return refused(own, verdict.reason or str(own.diagnostics.get("reason", "")))
+    deviation = math.hypot(verdict.deviation, MODEL_DEVIATION * verdict.extinction)
+    answer = Estimate(own.method, verdict.extinction, deviation, diagnostics=_found(own), reach=verdict.reach)
+    return replace(answer, common_deviation=MODEL_DEVIATION)
 
 
 def refused(own: Estimate, reason: str) -> Estimate:

@@ -9,8 +9,9 @@ import pytest
 from fogsim.values import Camera, Estimate, LeadMeasurement
 from fogsim.vision.day import confirmation
 from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.day.far_objects import STANDS_OUT
 from fogsim.vision.day.row_data import near_horizon
-from fogsim.vision.day.second_opinion import DISAGREE, STANDS_OUT, DayVerdict
+from fogsim.vision.day.second_opinion import DISAGREE, DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)

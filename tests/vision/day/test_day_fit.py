@@ -107,6 +107,19 @@ def test_levels_that_were_stretched_to_black_are_seen_as_such(visibility):
     assert fit.quantile(0.5) == pytest.approx(visibility, rel=0.15)
 
 
+def test_the_mean_over_responses_counts_the_more_the_less_likely_the_stated_one_is():
+    fit = fit_day(picture(100.0), CAMERA, HORIZON)
+    means, others = np.full(fit.responses.size, -0.2), np.full(fit.responses.size, 1.0 / (fit.responses.size - 1))
+    means[0] = 0.0
+    shifts = [
+        replace(fit, responses=np.append(stated, (1.0 - stated) * others[1:]), log_means=means).response_shift
+        for stated in (0.3, 0.16, 0.1, 0.02, 0.0)
+    ]
+    assert shifts[:2] == [0.0, 0.0]
+    assert np.all(np.diff(shifts[1:]) < 0.0)
+    assert shifts[-1] == pytest.approx(-0.2)
+
+
 def test_no_curve_is_there_twice():
     for response in Response:
         light = curves_of(replace(CAMERA, response=response)).light

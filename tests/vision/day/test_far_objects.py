@@ -8,7 +8,7 @@ import pytest
 
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
-from fogsim.vision.day.second_opinion import share_of_far_objects
+from fogsim.vision.day.far_objects import share_of_far_objects
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(320, 240, 300.0, (159.5, 100.0), 1.4, bits=12)

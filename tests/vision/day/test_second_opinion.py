@@ -10,7 +10,7 @@ from fogsim.values import Camera, Estimate
 from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.day import second_opinion
 from fogsim.vision.day.row_kernels import LIGHTS
-from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
+from fogsim.vision.day.second_opinion import MODEL_DEVIATION, MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
@@ -57,7 +57,9 @@ def test_the_day_model_answers_where_the_other_has_none_and_else_says_why_not(sa
     none = Estimate.invalid("joint_road", "no sky is seen above the road")
     found, _ = said(none, DENSER)
     assert found.valid
-    assert found.visibility_interval == pytest.approx((46.0, 54.0), rel=0.02)
+    alone = math.hypot(DENSER.deviation, MODEL_DEVIATION * DENSER.extinction)
+    assert (found.extinction, found.standard_deviation) == (DENSER.extinction, pytest.approx(alone))
+    assert found.common_deviation == MODEL_DEVIATION
     assert said(none, SILENT)[0].diagnostics["reason"] == "dark"
     unsure = said(none, replace(DENSER, is_sure=False))[0]
     assert not unsure.valid
@@ -100,7 +102,7 @@ def test_an_unlikely_response_is_given_up_for_the_mean_over_others_and_an_imposs
     assert found.optical_depths.depth[0] == pytest.approx(1.5 * math.exp(-0.2))
     assert said(own, replace(thinner, free=20.0), times)[0] == found
     other, _ = said(own, replace(DENSER, is_stated=False, is_even=False))
-    assert other.visibility_interval == pytest.approx((46.0, 54.0), rel=0.02)
+    assert other.extinction == DENSER.extinction
 
 
 def test_where_the_sky_is_clipped_an_estimate_is_as_unsure_as_the_day_model(said):
@@ -148,6 +150,29 @@ def test_a_road_in_shade_is_one_where_its_lines_meet_under_the_stated_response()
     assert not seen.reason
     assert seen.is_sure
     assert not seen.is_even
+
+
+def test_an_unknown_response_and_a_road_that_may_be_wet_are_too_much_for_one_image():
+    responses, wet = np.array([0.0, 1.0, 0.0, 0.0, 0.0]), np.eye(LIGHTS.chance.size)[1]
+    fit = second_opinion.DayFit(
+        log_visibility=np.log([95.0, 100.0, 105.0]),
+        chance=np.full(3, 1.0 / 3.0),
+        fog_over_none=30.0,
+        responses=responses,
+        surfaces=np.eye(6)[0],
+        lights=wet,
+        clipped=0.0,
+        brightest=0.8,
+        contrast=0.5,
+        log_means=np.zeros(5),
+        obstacle=math.inf,
+    )
+    assert "wet" in verdict_of(fit, SCALE).reason
+    assert not verdict_of(replace(fit, lights=np.eye(LIGHTS.chance.size)[0]), SCALE).reason
+    assert not verdict_of(replace(fit, responses=np.eye(5)[4]), SCALE).reason
+    assert not verdict_of(replace(fit, responses=np.array([0.5, 0.5, 0.0, 0.0, 0.0])), SCALE).reason
+    bright = replace(fit, lights=np.eye(LIGHTS.chance.size)[0], contrast=0.15)
+    assert verdict_of(bright, SCALE).reason == second_opinion.FAR_ROAD
 
 
 def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):

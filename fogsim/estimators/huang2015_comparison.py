@@ -15,7 +15,7 @@ from fogsim.vision.light.luminance import clipping, darker_by, linear_luminance
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.region.road_image import MIN_AIRLIGHT
-from fogsim.vision.vehicle.airlight import hidden_at_side, neighbouring_airlight
+from fogsim.vision.vehicle.airlight import Rows, hidden_at_side, neighbouring_airlight
 from fogsim.vision.vehicle.contrast_ratio import LOST, TOP, MeanLuminances, mean_luminances
 from fogsim.vision.vehicle.patch import Patch, Placement, pixel_shares, rescale_position, shrink
 from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox
@@ -131,7 +131,7 @@ def crop_vehicle(image: Pixels, camera: Camera, distance: float) -> VehicleCrop:
         raise CannotTellError("the vehicle ahead is too small in the image")
     level = levelled(image, camera)
 
-    def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
+    def luminance_of(rows: Rows, cols: slice) -> NDArray[np.float32]:
         return linear_luminance(level[rows, cols], camera.response, camera.bits, camera.black_level)
 
     return vehicle_crop(camera, distance, luminance_of, partial(_sky_above, level, camera, distance))

@@ -157,7 +157,8 @@ def distance_at_depth(
         return math.inf
     if last == 0 or depths[last] == depth:
         return float(distances[last])
-    near, far, low, high = *distances[last - 1 : count].tolist(), *depths[last - 1 : count].tolist()
+    near, far = distances[last - 1 : count].tolist()
+    low, high = depths[last - 1 : count].tolist()
     return float((far - near) / (high - low) * (depth - low) + near)
 
 

@@ -168,7 +168,8 @@ def inflection_with_deviation(
 def _candidates(curve: RoadCurve) -> Floats:
     """Rows below the horizon at which an inflection is looked for [px] (n,)."""
     step = math.log(max(curve.below_horizon[-1], 2.0 * _HIGHEST) / _HIGHEST) / (_CANDIDATES - 1)
-    return _HIGHEST * np.exp(step * np.arange(_CANDIDATES))
+    at: Floats = _HIGHEST * np.exp(step * np.arange(_CANDIDATES))
+    return at
 
 
 @kernel

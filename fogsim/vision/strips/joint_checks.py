@@ -39,7 +39,8 @@ class Left:
 
     def suffices(self, fit: JointFit) -> bool:
         """Whether even fog still explains the road about as well as in the full look."""
-        return fit.misfit <= _WORSE * self.misfit and np.count_nonzero(fit.used) / fit.used.size >= self.used - _FEWER
+        used = np.count_nonzero(fit.used) / fit.used.size
+        return fit.misfit <= _WORSE * self.misfit and bool(used >= self.used - _FEWER)
 
 
 def left_by(time: float, fit: JointFit) -> Left:

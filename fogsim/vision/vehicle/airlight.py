@@ -138,7 +138,7 @@ def road_fall(
 
 
 @functools.lru_cache(maxsize=64)
-def _road_rows(camera: Camera, nearest: float, farthest: float) -> tuple[NDArray[np.float64], ...]:
+def _road_rows(camera: Camera, nearest: float, farthest: float) -> tuple[NDArray[np.float64], Ints, Ints, Ints]:
     """Distances of rows of road between two of them [m], those rows, and their columns (n,); the arrays are shared."""
     at = np.linspace(nearest, farthest, _ROWS)
     rows = np.clip(np.rint(camera.horizon_row + camera.row_distance / at).astype(int), 0, camera.height - 1)

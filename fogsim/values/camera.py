@@ -1,7 +1,7 @@
 """The calibration of a camera and where it is."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from numbers import Real
 
@@ -62,10 +62,6 @@ class Camera:
     black_level : float
         Share of full scale, before the response, at which the sensor reads no light, so that noise about the dark is
         not cut off: 0 … 0.25.
-    horizon_row : float
-        Row of the horizon at the principal column, v_h = v0 − α tan θ [px] (negru2013 eq. 6); follows from the others.
-    row_distance : float
-        λ = α H / cos θ [px·m], so that a road point on row v lies λ / (v − v_h) ahead (negru2013 eq. 11); follows too.
     """
 
     width: int
@@ -78,8 +74,6 @@ class Camera:
     response: Response = Response.LINEAR
     bits: int = 8
     black_level: float = 0.0
-    horizon_row: float = field(init=False, repr=False, compare=False)
-    row_distance: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse a calibration that no camera can have."""
@@ -103,9 +97,6 @@ class Camera:
         # For other numbers, such as NumPy's short ones, kernels would be compiled again, and count less exactly.
         self._take(int, "width", "height", "bits")
         self._take(float, "focal_length", "mount_height", "pitch", "roll", "black_level")
-        horizon = self.principal_point[1] - self.focal_length * math.tan(self.pitch)
-        object.__setattr__(self, "horizon_row", horizon)
-        object.__setattr__(self, "row_distance", self.focal_length * self.mount_height / math.cos(self.pitch))
 
     def _take(self, kind: type[int | float], *names: str) -> None:
         for name in names:
@@ -130,6 +121,16 @@ class Camera:
         if not (_finite(u0) and _finite(v0)):
             raise InputError(f"camera principal_point must be two finite numbers, got {shown(self.principal_point)}")
         object.__setattr__(self, "principal_point", (float(u0), float(v0)))
+
+    @property
+    def horizon_row(self) -> float:
+        """Row of the horizon at the principal column, v_h = v0 − α tan θ [px] (negru2013 eq. 6)."""
+        return self.principal_point[1] - self.focal_length * math.tan(self.pitch)
+
+    @property
+    def row_distance(self) -> float:
+        """λ = α H / cos θ [px·m], so that a road point on row v lies λ / (v − v_h) ahead (negru2013 eq. 11)."""
+        return self.focal_length * self.mount_height / math.cos(self.pitch)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.core.linear_algebra import matrix_product
 from vehicle_bodies.projection import COLUMNS, ROWS, Mask, Projection, Size, Wide, light_of
 
-_NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]
+_NARROW = 0.03  # runs of columns and gaps between them that are left out [units of the box]
 _UNEVEN = 0.06  # how far a surface may lie from a straight line [units of the box]
 _DARK, _OWN_LIGHT = 0.02, 0.7  # light below which parts look alike, and weight of its logarithm in the division
 _HOLLOW = 0.8  # share of its outline that a row without a gap covers

@@ -51,9 +51,9 @@ MODELS: Mapping[str, Model] = {
 
 
 _DETAILS = {
-    FAR: Detail({"rear": 6, "front": 6, "left": 5}, 0.06),
-    TINY: Detail({"rear": 5, "front": 4, "left": 3}, 0.03),
-    SPECK: Detail({"rear": 4, "front": 2, "left": 1}, 0.1),
+    FAR: Detail({"rear": 9, "front": 6, "left": 5}, 0.03),
+    TINY: Detail({"rear": 9, "front": 5, "left": 3}, 0.03),
+    SPECK: Detail({"rear": 8, "front": 3, "left": 1}, 0.05),
 }
 
 

@@ -1,12 +1,11 @@
 """Levels of detail of vehicles that are small in the picture: of few triangles, made from the shapes in full.
 
 A level is a stack of few zones of height. In each zone, from each side, it has as much paint as the shape shows
-from there, under the same light, and what is not paint in one panel of its mean colour; its outline encloses the same
-area. So it has the mean radiance of the shape in any paint, from the rear, the front and the sides. Lamps and plates
-are those of the shape.
+from there, under the same light, and what is not paint in one panel that is as bright at either edge; its outline
+encloses the same area. So each zone has the mean radiance of the shape in any paint, from the rear, the front and the
+sides, and what is dark stays dark. Lamps and plates are those of the shape.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,18 +16,30 @@ from fogsim.scene.solids import Material, grid_faces, merge, mesh
 from fogsim.values.scene import Mesh, Surface
 from vehicle_bodies.lamp_patches import drop_unused, lamp_quads
 from vehicle_bodies.parts import contact_shadow
-from vehicle_bodies.projection import ROWS, Projection, Size, placed, project_shape, sum_light, upwards_of
+from vehicle_bodies.projection import (
+    COLUMNS,
+    ROWS,
+    Projection,
+    Size,
+    Wide,
+    placed,
+    project_shape,
+    row_sums,
+    upwards_of,
+)
 from vehicle_bodies.solids import PAINT, mirrored
-from vehicle_bodies.spans import BEHIND, SideView, Span, divide_into_zones, find_spans, within
+from vehicle_bodies.spans import BEHIND, Part, SideView, Span, divide_into_zones, find_spans, within
 
-Wide = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Key = tuple[str, tuple[int, int]]  # side and zone
 
 _NEAR = 0.01  # how deep in the shape lamps and plates may lie that show [units of the box]
 _SIDES = ("rear", "front", "left")  # the right one is the mirror image of the left one
 _ON_ROAD = 0.02  # height below which a level surface lies on the road [units of the box]
 _ROUNDS, _FINE = 2, 2  # rounds of correction, and how many times as fine the body is looked at for them
 _BREADTHS, _GAINS = (0.95, 1.05), (0.5, 2.0)  # bounds of corrections
+_GREY, _OWN = np.full((2, 3), 0.5), Material((0.5, 0.5, 0.5))  # colours are those of the vertices
+_LEVEL_TO = 4  # rows below the top of a zone where the body is still as high
 _STEP = 0.9  # a zone whose footprint is smaller than this share of the one below it shows that one's top
 
 
@@ -54,13 +65,13 @@ def levels_of_detail(shape: Mesh, size: Size, details: Sequence[Detail], shadow:
     body, kept = _without_shadow(shape), merge((lamp_quads(shape), _sheeting(shape)))
     looks = {side: _side_view(side, body, kept, size) for side in _SIDES}
     top, rest = project_shape("top", body, size), merge((kept, _shadow(size, shadow)))
-    wanted = {side: _totals(side, shape, size) for side in _SIDES}
+    wanted = {side: _row_sums(side, shape, size) for side in _SIDES}
     return [_matched(looks, wanted, top, detail, rest, size) for detail in details]
 
 
 def _matched(
     looks: Mapping[str, SideView],
-    wanted: Mapping[str, Sequence[float]],
+    wanted: Mapping[str, Wide],
     top: Projection,
     detail: Detail,
     rest: Mesh,
@@ -73,25 +84,30 @@ def _matched(
         zones = divide_into_zones(side, look.seen, left, size, detail.zones[side])
         own = [run for zone in zones for run in find_spans(look, zone, detail.little)]
         runs[side] = own if side != "left" else [within(run, looks["rear"].seen) for run in own]
-    gains = dict.fromkeys(looks, _Gain(1.0, 1.0, np.ones(3)))
+    gains = {(side, run.zone): _Gain(1.0, 1.0, np.ones(3)) for side, own in runs.items() for run in own}
     rest = merge((_tops(top, runs["left"], runs["rear"]), rest))
     for _ in range(_ROUNDS):
         whole = _built(runs, gains, rest, size)
-        gains = {side: _corrected(gain, wanted[side], _totals(side, whole, size)) for side, gain in gains.items()}
+        got = {side: _row_sums(side, whole, size) for side in looks}
+        for (side, zone), gain in gains.items():
+            # What is seen where no zone is belongs to the next one below.
+            end = min((run.zone[0] for run in runs[side] if run.zone[0] > zone[0]), default=ROWS)
+            rows = slice(_FINE * zone[0], _FINE * end)
+            gains[side, zone] = _corrected(gain, wanted[side][rows].sum(axis=0), got[side][rows].sum(axis=0))
     return _built(runs, gains, rest, size)
 
 
-def _built(runs: Mapping[str, Sequence[Span]], gains: Mapping[str, _Gain], rest: Mesh, size: Size) -> Mesh:
+def _built(runs: Mapping[str, Sequence[Span]], gains: Mapping[Key, _Gain], rest: Mesh, size: Size) -> Mesh:
     panels = {
-        side: merge([panel for run in own for panel in _panels(side, run, gains[side], size)])
+        side: merge([panel for run in own for panel in _panels(side, run, gains[side, run.zone], size)])
         for side, own in runs.items()
     }
     return merge((*panels.values(), mirrored(panels["left"]), rest))
 
 
-def _corrected(gain: _Gain, want: Sequence[float], got: Sequence[float]) -> _Gain:
-    """Factors that would have given the area and the light (see `sum_light`) that the body has."""
-    area, paint, *own = np.array(want) / np.maximum(got, 1e-9)
+def _corrected(gain: _Gain, want: Wide, got: Wide) -> _Gain:
+    """Factors that would have given the area and the light (see `row_sums`) that the body has in a zone."""
+    area, paint, *own = np.maximum(want, 1e-9) / np.maximum(got, 1e-9)
     # Broader panels have more light, too.
     return _Gain(
         float(np.clip(gain.breadth * area, *_BREADTHS)),
@@ -100,9 +116,8 @@ def _corrected(gain: _Gain, want: Sequence[float], got: Sequence[float]) -> _Gai
     )
 
 
-def _totals(side: str, shape: Mesh, size: Size) -> tuple[float, ...]:
-    seen = project_shape(side, shape, size, _FINE)
-    return sum_light(seen.depth, seen.normal, seen.paint, seen.own)
+def _row_sums(side: str, shape: Mesh, size: Size) -> Wide:
+    return row_sums(project_shape(side, shape, size, _FINE))
 
 
 def _side_view(side: str, body: Mesh, kept: Mesh, size: Size) -> SideView:
@@ -131,45 +146,42 @@ def _sheeting(shape: Mesh) -> Mesh:
 
 
 def _panels(side: str, run: Span, gain: _Gain, size: Size) -> list[Mesh]:
-    """Panels of a run: one of what is not paint, and behind it one of paint."""
-    (start, end), broader = run.split, replace(run, breadth=run.breadth * gain.breadth)
-    split = 0.0 < end - start < 1.0
+    """Panels of a run, that behind first: one of what is not paint, and one of paint."""
+    run = replace(run, breadth=run.breadth * gain.breadth)
     panels = []
-    if end > start:
-        red, green, blue = np.clip(gain.own * run.colour, 0.005, 0.9).tolist()
-        normals = _normals(side, run.normals[0], run.normals[0][2], size)
-        panels.append(_panel(side, broader, (start, end), Material((red, green, blue)), normals, size))
-    if end - start < 1.0 and run.light > 0.0:
-        normals = _normals(side, run.normals[1], upwards_of(gain.paint * run.light), size)
-        behind = replace(broader, depth=broader.depth + BEHIND * split)
-        panels.append(_panel(side, behind, (0.0, 1.0), PAINT, normals, size))
+    for place, (kind, part) in enumerate(reversed(run.parts.items())):
+        colour, normal, upwards = np.clip(gain.own * run.colour, 0.005, 0.9), run.normals[0], run.normals[0][[2, 2]]
+        if kind == "paint":
+            colour, normal, upwards = _GREY, run.normals[1], upwards_of(gain.paint * run.light)
+        behind = replace(run, depth=run.depth + place * BEHIND)
+        panels.append(_panel(side, behind, part, kind == "paint", colour, _normals(side, normal, upwards, size), size))
     return panels
 
 
-def _normals(side: str, mean: Wide, upwards: float, size: Size) -> Wide:
-    """Normals at the lower and the upper edge of a panel (2, 3), in the box.
-
-    Their mean is the given one with another z, which says how much light there is.
-    """
-    mean = mean.copy()
-    mean[1 if side != "left" else 0] = 0.0  # the same on both sides of the body
-    mean[2] = np.clip(upwards, -0.99, 0.99)
-    level = float(np.hypot(mean[0], mean[1]))
-    mean[:2] *= min(1.0, math.sqrt(1.0 - mean[2] ** 2) / max(level, 1e-9))
-    level, length = max(float(np.hypot(mean[0], mean[1])), 1e-9), max(math.hypot(*mean), 1e-9)
-    # Turned up as much at the upper edge as down at the lower one, for normals are all of one length.
-    upright = np.array([-mean[2] * mean[0] / level, -mean[2] * mean[1] / level, level]) / length
-    turn = math.sqrt(max(1.0 - length**2, 0.0)) * upright
-    both = np.array([mean - turn, mean + turn]) * np.array(size)
+def _normals(side: str, mean: Wide, upwards: Wide, size: Size) -> Wide:
+    """Normals at the lower and the upper edge of a panel (2, 3), in the box: to where the mean is, with these z."""
+    level = mean[:2] * ((0.0, 1.0) if side == "left" else (1.0, 0.0))  # the same on both sides of the body
+    level /= max(float(np.abs(level).sum()), 1e-9)
+    z = np.clip(upwards, -0.99, 0.99)
+    both = np.column_stack((np.sqrt(1.0 - z**2)[:, None] * level, z)) * np.array(size)
     return np.asarray(both / np.linalg.norm(both, axis=1, keepdims=True))
 
 
-def _panel(side: str, run: Span, part: tuple[float, float], material: Material, normals: Wide, size: Size) -> Mesh:
-    """Part of a run, between two shares of its breadth."""
-    across = run.middle[:, None] + (np.array(part) - 0.5) * run.breadth[:, None]
-    up = np.repeat(np.array(run.zone)[:, None] / ROWS, 2, axis=1)
-    points = placed(side, across, up, np.repeat(run.depth[:, None], 2, axis=1), size)
-    return mesh(points, grid_faces(2, 2), np.repeat(normals, 2, axis=0), material)
+def _panel(side: str, run: Span, part: Part, painted: bool, colour: Wide, normals: Wide, size: Size) -> Mesh:
+    """Part of a run, of the colour and with the normals that are given at the lower and upper edge of the run."""
+    across, up = part
+    middle, breadth, depth, row = (_between(pair, up) for pair in (run.middle, run.breadth, run.depth, run.zone))
+    right = middle[:, None] + (np.array(across) - 0.5) * breadth[:, None]
+    points = placed(side, right, np.repeat(row[:, None] / ROWS, 2, axis=1), np.repeat(depth[:, None], 2, axis=1), size)
+    colours, directions = (
+        np.repeat(np.stack([_between(column, up) for column in ends.T], axis=1), 2, axis=0)
+        for ends in (colour, normals)
+    )
+    return mesh(points, grid_faces(2, 2), directions, PAINT if painted else _OWN, reflectance=colours)
+
+
+def _between(ends: Wide | tuple[int, int], shares: tuple[float, float]) -> Wide:
+    return np.interp(shares, (0.0, 1.0), ends)
 
 
 def _tops(top: Projection, long: Sequence[Span], wide: Sequence[Span]) -> Mesh:
@@ -181,6 +193,10 @@ def _tops(top: Projection, long: Sequence[Span], wide: Sequence[Span]) -> Mesh:
         footprint = (x[1] - x[0]) * (y[1] - y[0])
         own = (top.depth <= 1.0 - zone[0] / ROWS) & (top.depth >= 1.0 - (zone[1] + 1) / ROWS)
         if area < _STEP * footprint and own.any():
+            # Where the body is lower, as a cab is before its box, one would see the inner side of this from there.
+            high = own & (top.depth <= 1.0 - (zone[1] - _LEVEL_TO) / ROWS)
+            there = np.flatnonzero((high if high.any() else own).any(axis=0)) / COLUMNS
+            x = max(x[0], there[0]), min(x[1], there[-1])
             parts.append(_top(x, y, zone[1] / ROWS, top, own))
         area = max(area, footprint)
     return merge(parts)

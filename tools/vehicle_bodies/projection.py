@@ -36,9 +36,9 @@ def light_of(upwards: Wide | float) -> Wide:
     return np.asarray(_LEVEL + _UPWARDS * np.asarray(upwards, np.float64))
 
 
-def upwards_of(light: float) -> float:
+def upwards_of(light: Wide) -> Wide:
     """Z of the normal of a surface with that share of light."""
-    return (light - _LEVEL) / _UPWARDS
+    return np.asarray((light - _LEVEL) / _UPWARDS)
 
 
 _VIEWS = {"rear": (1, 2, 0, 1.0), "front": (1, 2, 0, -1.0), "left": (0, 2, 1, -1.0), "top": (0, 1, 2, -1.0)}
@@ -82,19 +82,10 @@ def project_shape(side: str, shape: Mesh, size: Size, fine: int = 1) -> Projecti
     return Projection(depth, layered[..., :3], layered[..., 3], layered[..., 4:])
 
 
-@kernel
-def sum_light(depth: Wide, normal: Wide, paint: Wide, own: Wide) -> tuple[float, float, float, float, float]:
-    """Sums over a `Projection`: samples that are covered, light on paint, and light of what is not (three channels)."""
-    area, light, red, green, blue = 0.0, 0.0, 0.0, 0.0, 0.0
-    for row in range(depth.shape[0]):
-        for column in range(depth.shape[1]):
-            if depth[row, column] < np.inf:
-                area += 1.0
-                light += paint[row, column] * (_LEVEL + _UPWARDS * normal[row, column, 2])
-                red += own[row, column, 0]
-                green += own[row, column, 1]
-                blue += own[row, column, 2]
-    return area, light, red, green, blue
+def row_sums(seen: Projection) -> Wide:
+    """Sums over rows (rows, 5): samples that are covered, light on paint, and light of what is not (three channels)."""
+    paint = seen.paint * light_of(seen.normal[..., 2])
+    return np.column_stack((seen.covered.sum(axis=1), paint.sum(axis=1), seen.own.sum(axis=1)))
 
 
 @kernel

@@ -1,5 +1,6 @@
 """Division of a body into zones of height, and of these into spans without a gap, as seen from one side."""
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -10,10 +11,16 @@ from numpy.typing import NDArray
 from fogsim.core.linear_algebra import matrix_product
 from vehicle_bodies.projection import COLUMNS, ROWS, Mask, Projection, Size, Wide, light_of
 
-_NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]
+_NARROW = 0.03  # runs of columns and gaps between them that are left out [units of the box]
 _UNEVEN = 0.06  # how far a surface may lie from a straight line [units of the box]
+_DARK, _OWN_LIGHT = 0.02, 0.7  # light below which parts look alike, and weight of its logarithm in the division
+_HOLLOW = 0.8  # share of its outline that a row without a gap covers
 _LEAST = 4  # rows of a zone
 BEHIND = 0.003  # how far panels stay behind lamps and plates [units of the box]
+
+
+Part = tuple[tuple[float, float], tuple[float, float]]  # where a panel begins and ends across a run, and up (0 … 1)
+WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +40,9 @@ class Span:
     middle: Wide  # at its lower and upper edge [units of the box]
     breadth: Wide
     depth: Wide
-    split: tuple[float, float]  # where across it the panel of what is not paint begins and ends (0 … 1)
-    colour: Wide  # reflectance of that panel
-    light: float  # share of the sky's light on the paint next to it
+    parts: dict[str, Part]  # where the panels of "paint" and of what is its "own" lie in it, from behind
+    colour: Wide  # reflectance of what is not paint, at the lower and upper edge of the run (2, 3)
+    light: Wide  # share of the sky's light on the paint, at the lower and upper edge of the run (2,)
     normals: tuple[Wide, Wide]  # mean normals of what is not paint, and of paint
 
 
@@ -78,7 +85,12 @@ def _fitted_span(look: SideView, zone: tuple[int, int], inside: Mask, alone: boo
     before = look.over.depth[rows][inside & look.over.covered[rows]]
     if len(before):
         depth = np.maximum(depth, before.max() + BEHIND)
-    return Span(zone, middle, breadth, np.clip(depth, 0.0, 1.0), *_materials(look, zone, inside, little))
+    share = (z / len(z))[:, None]
+    start, width = (
+        pair[0] + share * (pair[1] - pair[0]) for pair in (middle - 0.5 * breadth, np.maximum(breadth, 1e-3))
+    )
+    across = ((np.arange(COLUMNS) + 0.5) / COLUMNS - start) / width
+    return Span(zone, middle, breadth, np.clip(depth, 0.0, 1.0), *_materials(look, zone, inside, across, little))
 
 
 def _depth(samples: Wide, z: Wide, count: NDArray[np.int64], height: int) -> Wide:
@@ -91,10 +103,11 @@ def _depth(samples: Wide, z: Wide, count: NDArray[np.int64], height: int) -> Wid
 
 
 def within(run: Span, rear: Projection) -> Span:
-    """The run of a flank no farther out at its edges than the body is broad there, lest it should show from behind."""
-    breadth = rear.covered.mean(axis=1)
-    edges = (breadth[run.zone[0] : run.zone[0] + 3].max(), breadth[run.zone[1] - 3 : run.zone[1]].max())
-    return replace(run, depth=np.maximum(run.depth, 0.5 - 0.5 * np.array(edges)))
+    """The run of a flank no farther out at its edges than the body reaches there, lest it should show from behind."""
+    rows = np.flatnonzero(rear.covered.any(axis=1))
+    reach = np.interp(np.arange(ROWS), rows, np.argmax(rear.covered[rows], axis=1) / COLUMNS)
+    edges = reach[run.zone[0] : run.zone[0] + 3].min(), reach[run.zone[1] - 3 : run.zone[1]].min()
+    return replace(run, depth=np.maximum(run.depth, edges))
 
 
 def _line(z: Wide, values: Wide, weights: NDArray[Any], height: int) -> Wide:
@@ -107,43 +120,56 @@ def _line(z: Wide, values: Wide, weights: NDArray[Any], height: int) -> Wide:
 
 
 def _materials(
-    look: SideView, zone: tuple[int, int], inside: Mask, little: float
-) -> tuple[tuple[float, float], Wide, float, tuple[Wide, Wide]]:
-    """Split, colour, light and normals of a run (see `Span`) with which it shows the light of the body there."""
+    look: SideView, zone: tuple[int, int], inside: Mask, across: Wide, little: float
+) -> tuple[dict[str, Part], Wide, Wide, tuple[Wide, Wide]]:
+    """Parts, colour, light and normals of a run (see `Span`) with which it shows the light of the body there.
+
+    `across` (rows, columns) is where in the run each sample lies (0 … 1).
+    """
     rows = slice(*zone)
-    kept, normal = look.over.depth[rows] < np.inf, look.seen.normal[rows]
-    free, paint = inside & ~kept, inside & (look.seen.paint[rows] > 0.5)
-    own = inside & ~paint
-    whole = max(int(free.sum()), 1)
-    start, end = _place(look.side, free, own, 1.0 - paint.sum() / whole, little)
-    room = whole * (end - start)
+    free, normal = inside & ~look.over.covered[rows], look.seen.normal[rows]
+    paint = look.seen.paint[rows] > 0.5
+    own, paint = free & ~paint, free & paint
     means = _mean(normal[own]), _mean(normal[paint])
-    # What is kept shows its own light, whatever it hides.
-    light = look.seen.own[rows][own].sum(axis=0) - look.over.own[rows][inside & kept].sum(axis=0)
-    colour = light / max(room, 1.0) / light_of(means[0][2])
-    lit = float(paint.sum() * light_of(means[1][2])) / max(whole - room, 1.0)
-    return (start, end), colour, lit, means
+    share = own.sum() / max(free.sum(), 1)
+    parts: dict[str, Part] = {"paint": WHOLE} if paint.any() else {}
+    if share > 1.0 - little:
+        parts = {"own": WHOLE}
+    elif share > little:
+        (first, tight), (second, other) = _part(across, own, share), _part(across, paint, 1.0 - share)
+        # What lies more densely is before the other.
+        parts = {"paint": WHOLE, "own": first} if tight >= other else {"own": WHOLE, "paint": second}
+    colour = _ends(look.seen.own[rows], own) / light_of(means[0][2])
+    return parts, colour, _ends(light_of(normal[..., 2:]), paint)[:, 0], means
+
+
+def _ends(values: Wide, own: Mask) -> Wide:
+    """Straight lines through the means in each row of samples (rows, columns, channels), at both ends (2, channels)."""
+    count = own.sum(axis=1)
+    if not count.any():
+        return np.zeros((2, values.shape[2]))
+    means = (values * own[..., None]).sum(axis=1) / np.maximum(count, 1)[:, None]
+    z: Wide = np.arange(len(own), dtype=np.float64) + 0.5
+    lines = np.stack([_line(z, column, count, len(own)) for column in means.T], axis=1)
+    return np.clip(lines, means[count > 0].min(axis=0), means[count > 0].max(axis=0))
 
 
 def _mean(normals: Wide) -> Wide:
     return np.asarray(normals.mean(axis=0)) if len(normals) else np.zeros(3)
 
 
-def _place(side: str, free: Mask, own: Mask, share: float, little: float) -> tuple[float, float]:
-    """Where across a run the panel of what is not paint begins and ends (0 … 1), for its share of the run."""
-    if share > 1.0 - little:
-        return 0.0, 1.0
-    if share < little:
-        return 1.0, 1.0
-    if side != "left":
-        return 0.5 - 0.5 * share, 0.5 + 0.5 * share
-    across = np.concatenate(([0.0], np.cumsum(free.sum(axis=0)))) / max(free.sum(), 1)
-    content = np.concatenate(([0.0], np.cumsum(own.sum(axis=0))))
-    starts = np.linspace(0.0, 1.0 - share, 65)
-    best = starts[np.argmax(np.interp(starts + share, across, content) - np.interp(starts, across, content))]
-    if best < _NARROW:
-        return 0.0, share
-    return (1.0 - share, 1.0) if best + share > 1.0 - _NARROW else (float(best), float(best + share))
+def _part(across: Wide, own: Mask, share: float) -> tuple[Part, float]:
+    """Rectangle of a share of a run, about the middle of samples and in their proportions, and how densely they lie."""
+    up = np.broadcast_to((np.arange(len(own)) + 0.5)[:, None] / len(own), own.shape)[own]
+    places = np.clip(across[own], 0.0, 1.0), up
+    broad, tall = (max(math.sqrt(12.0) * float(place.std()), 1e-3) for place in places)
+    tight = share / (broad * tall)
+    broad = float(np.clip(broad * math.sqrt(tight), share, 1.0))
+    sides = []
+    for place, size in zip(places, (broad, share / broad), strict=True):
+        low = float(np.clip(place.mean() - 0.5 * size, 0.0, 1.0 - size))
+        sides.append((low, low + size))
+    return (sides[0], sides[1]), tight
 
 
 def divide_into_zones(side: str, seen: Projection, left: Projection, size: Size, count: int) -> list[tuple[int, int]]:
@@ -151,8 +177,16 @@ def divide_into_zones(side: str, seen: Projection, left: Projection, size: Size,
 
     The sum of squares that straight lines through outlines and mean materials leave is the least.
     """
-    materials = seen.paint.sum(axis=1) / np.maximum(seen.covered.sum(axis=1), 1)
-    cost = _cost(_outlines(side, seen, left, size), straight=True) + _cost(materials[:, None], straight=False)
+    covered, paint = seen.covered.sum(axis=1), seen.paint.sum(axis=1)
+    light = np.log(_DARK + seen.own.mean(axis=2).sum(axis=1) / np.maximum(covered - paint, 1))
+    cost = _cost(np.column_stack((_outlines(side, seen, left, size), _OWN_LIGHT * light)), straight=True)
+    cost += _cost((paint / np.maximum(covered, 1))[:, None], straight=False)
+    if side != "left":
+        # Between the wheels one sees the road, and nothing of the other end.
+        hollow = covered < _HOLLOW * (COLUMNS - 2 * np.argmax(seen.covered, axis=1))
+        clear = int(np.argmin(hollow))
+        if clear >= _LEAST:
+            cost[:clear, clear + 1 :] = np.inf
     best, cut = cost[0].copy(), np.zeros((count, ROWS + 1), np.int64)
     for zone in range(1, count):
         total = best[:, None] + cost

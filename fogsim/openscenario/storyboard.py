@@ -256,10 +256,7 @@ class Storyboard:
         return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
 
     def _overridden(self, entry: Entry, name: str) -> list[str]:
-        """Conditions that an event whose changes of speed would go on is ended by one that overrides or replaces it.
-
-        They are for its execution of a name.
-        """
+        """When an execution of an event whose changes of speed would go on is overridden or replaced, by its name."""
         effect = entry.effect
         goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
         if not goes_on:

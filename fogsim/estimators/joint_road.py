@@ -36,7 +36,7 @@ from fogsim.vision.strips.course_geometry import course_deviation, course_geomet
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, Left, is_ramp, left_by, no_road
 from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.shade import divided_road, is_sure
-from fogsim.vision.strips.sky import Sky, shared_sky
+from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
     lowest_road_row,
@@ -199,7 +199,7 @@ class JointRoad:
         level = levelled(image, self._camera)
         pixels = linear_pixels(level, self._camera)
         margin = 3.0 * self._horizon.standard_deviation + 2.0
-        sky = shared_sky(observation.shared, pixels, self._camera, margin)
+        sky = sky_above(pixels, self._camera, margin)
         if sky is not None and sky.luminance < _MIN_AIRLIGHT:
             return Estimate.invalid(self.method, TOO_DARK, **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):

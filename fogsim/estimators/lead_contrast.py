@@ -269,8 +269,7 @@ class LeadContrast:
             fit = self._fit(self._track.likely_distances())
             about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, _LEAST_EXTINCTION), DENSEST)
             self._track.relevel(about)
-            depth, shared = likely + self._setback, observation.shared
-            crop = daytime_crop(image, self._camera, depth, self._pitch_deviation, about, shared)
+            crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
             detection = self._track.look(crop, number, lead.distance, time, surprise=surprise, densest=densest)
             found["lead_box"], road = _box(detection), crop.road

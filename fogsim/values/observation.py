@@ -2,8 +2,8 @@
 
 import math
 import zlib
-from dataclasses import dataclass, field
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,8 +175,6 @@ class Observation:
         Extinction coefficient that a forward-scatter sensor on board measures at its place [1/m]; None without one.
     camera_trouble : str
         Why the frame does not show the road of now, as far as the vehicle itself can detect; empty if it seems to.
-    shared : dict
-        What one method has read of the image and others read too; empty at first.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -190,7 +188,6 @@ class Observation:
     right: SecondView | None = None
     scattering: Measured | None = None
     camera_trouble: str = ""
-    shared: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Keep a read-only view of a bare array."""

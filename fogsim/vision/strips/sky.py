@@ -2,7 +2,7 @@
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -344,15 +344,6 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
         if found.noise > _FINER * pixel_noise(image, below):
             return None
     return None if math.isnan(found.luminance) else found
-
-
-def shared_sky(shared: dict[Any, Any], image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
-    """`sky_above`, read once for all methods that share what they read of an image."""
-    key = sky_above, camera, margin
-    if key not in shared:
-        shared[key] = sky_above(image, camera, margin)
-    sky: Sky | None = shared[key]
-    return sky
 
 
 @kernel

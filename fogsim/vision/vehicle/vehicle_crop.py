@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels, part_luminance
 from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
-from fogsim.vision.strips.sky import Sky, shared_sky
+from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.airlight import (
     RoadFall,
     Rows,
@@ -177,27 +177,21 @@ def vehicle_crop(
 
 
 def daytime_crop(
-    image: Pixels,
-    camera: Camera,
-    depth: float,
-    pitch_deviation: float,
-    extinction: float = USUAL_EXTINCTION,
-    shared: dict[Any, Any] | None = None,
+    image: Pixels, camera: Camera, depth: float, pitch_deviation: float, extinction: float = USUAL_EXTINCTION
 ) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be, before an even sky or one that brightens upward.
 
     In the latter case the airlight before the vehicle darkens downward, and each row is taken relative to its own.
 
-    Takes `image` (rows, cols), `depth` [m], `pitch_deviation` [rad], `extinction` [1/m], `shared` of the `Observation`.
+    Takes `image` (rows, cols), `depth` [m], `pitch_deviation` [rad], `extinction` [1/m].
     """
     if abs(camera.roll) > math.pi / 4:
         raise CannotTellError("the camera lies on its side or is upside-down")
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    # That of joint_road, with which the sky is shared.
     margin = 3.0 * calibrated_horizon(camera, pitch_deviation).standard_deviation + 2.0
-    sky = shared_sky({} if shared is None else shared, pixels, camera, margin)
+    sky = sky_above(pixels, camera, margin)
     airlight = None if sky is None else row_airlight(sky, camera, extinction)
     luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)
     crop = vehicle_crop(

@@ -38,7 +38,7 @@ def test_they_report_the_fog_that_their_images_show(steps: list[Step]) -> None:
     true = extinction_from_visibility(200.0)
     assert len({one.source for one in found}) >= 10
     for one in found:
-        assert abs(math.log(one.extinction / true)) < 3.0 * one.relative_deviation < 0.4
+        assert abs(math.log(one.extinction / true)) < 3.0 * one.relative_deviation < 0.5
     errors = [math.log(one.extinction / true) for one in found]
     assert np.abs(np.median(errors)) < 0.1
     # No two images have the same noise.

@@ -133,8 +133,8 @@ def verdict_of(fit: DayFit, scale_deviation: float, lines: int | None = 0) -> Da
     is_sure = is_sky and low > _DENSEST and ((fit.fog_over_none > _LIKELY_A_ROAD and usual > _MOSTLY) or is_lane)
     half = 0.5 * (dense - thin) / NORMAL_90_PERCENT
     is_even = float(fit.surfaces[:_EVEN_SURFACES].sum()) > _MOSTLY
-    is_hidden = math.isinf(fit.free) and float(fit.surfaces[_USUAL_SURFACES + 1]) > _MOSTLY
-    is_walled = fit.end.is_sharp or (is_hidden and fit.end.is_sky_even)
+    is_hidden = float(fit.surfaces[_USUAL_SURFACES + 1]) > _MOSTLY
+    is_walled = math.isinf(fit.free) and (fit.end.is_sharp or (is_hidden and fit.end.is_sky_even))
     # What crosses an uneven road, as a wiper does, is no tone curve, nor is the course of one that sags.
     shows_response = is_even and is_sure and lines is not None
     shift = fit.response_shift if is_fog and shows_response and is_stated else 0.0

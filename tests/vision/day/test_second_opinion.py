@@ -10,6 +10,7 @@ from fogsim.values import Camera, Estimate
 from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.day import second_opinion
 from fogsim.vision.day.row_kernels import LIGHTS
+from fogsim.vision.day.road_end import RoadEnd
 from fogsim.vision.day.second_opinion import MODEL_DEVIATION, MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
@@ -173,6 +174,9 @@ def test_an_unknown_response_and_a_road_that_may_be_wet_are_too_much_for_one_ima
     assert not verdict_of(replace(fit, responses=np.array([0.5, 0.5, 0.0, 0.0, 0.0])), SCALE).reason
     bright = replace(fit, lights=np.eye(LIGHTS.chance.size)[0], contrast=0.15)
     assert verdict_of(bright, SCALE).reason == second_opinion.FAR_ROAD
+    walled = replace(fit, end=RoadEnd(density=1.0))
+    assert verdict_of(walled, SCALE).is_walled
+    assert not verdict_of(replace(walled, free=25.0), SCALE).is_walled  # the road ends at a vehicle
 
 
 def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):

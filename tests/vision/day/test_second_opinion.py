@@ -9,8 +9,8 @@ import pytest
 from fogsim.values import Camera, Estimate
 from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.day import second_opinion
-from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.day.road_end import RoadEnd
+from fogsim.vision.day.row_kernels import LIGHTS
 from fogsim.vision.day.second_opinion import MODEL_DEVIATION, MOST_DOUBT, PERIOD, DayVerdict, SecondOpinion, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 

@@ -67,7 +67,7 @@ def test_mistakes_are_told_with_their_key() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shows", "told"),
+    ("shows", "mistake"),
     [
         ("phase: 99", "phase: their program has phases 0 to "),
         ("state: rG", "state: they have "),
@@ -76,14 +76,18 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("phase: 0", ""),
     ],
 )
-def test_traffic_lights_show_what_their_program_can(tmp_path: Path, shows: str, told: str) -> None:
+def test_traffic_lights_show_what_their_program_can(tmp_path: Path, shows: str, mistake: str) -> None:
     file = tmp_path / "lights.fog.yaml"
     file.write_text(
         "name: lights\ndescription: x\nroad: {template: crossing, lights: true}\nactors: {ego: {speed: 30 km/h}}\n"
         f"fog: {{visibility: 100 m}}\ntimeline: [{{when: time > 1 s, do: {{signal.middle: {{{shows}}}}}}}]\n",
         encoding="utf-8",
     )
-    with pytest.raises(InputError, match=f"timeline.0.do.signal.middle.{told}") if told else contextlib.nullcontext():
+    with (
+        pytest.raises(InputError, match=f"timeline.0.do.signal.middle.{mistake}")
+        if mistake
+        else contextlib.nullcontext()
+    ):
         load_scenario(file)
 
 

@@ -132,11 +132,9 @@ class _CollisionPlace(NamedTuple):
 
 @dataclass(slots=True)
 class PooledProfiles:
-    """Sums of the profiles of some runs.
+    """Sums over runs: times [s] by class of time to collision, behind leaders that move and slower ones (`queue`).
 
-    `moving` and `queue` are times [s] per class of time to collision, behind a leader that moves and behind one slower
-    than 5 m/s. `road` maps a position along the road [m] to time, distance and extinction over time, of the ego and of
-    all vehicles; `path` is the road in plan (n, 2) [m].
+    `road` has time, distance and extinction over time by position [m], of the ego and of all; `path` is (n, 2) [m].
     """
 
     vehicle_time: float = 0.0

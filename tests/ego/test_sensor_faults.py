@@ -8,7 +8,15 @@ import fogsim
 from fogsim.values import Frame, Step
 from fogsim.values.fault import Blackout, Fault
 
-SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=1", "fog.visibility_m=100", "estimators=[zhu2015]", "advice=none")
+SMALL = (
+    EARLY,
+    "camera.width=160",
+    "camera.height=120",
+    "duration_s=1",
+    "fog.visibility_m=100",
+    "estimators=[zhu2015]",
+    "advice=none",
+)
 
 
 def steps(*faults: str, settings: tuple[str, ...] = ()) -> list[Step]:

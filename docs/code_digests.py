@@ -29,8 +29,9 @@ DATA = {".csv", ".frag", ".json", ".npz", ".sumocfg", ".vert", ".xml", ".yaml"}
 class Checkout:
     """Imports and digests of a checkout's files; its .cache/ keeps them, since parsing all takes seconds."""
 
-    def __init__(self, root: Path) -> None:
-        self.root, self._memory = root, root / ".cache" / "digests.json"
+    def __init__(self, root: Path, without: tuple[str, ...] = ()) -> None:
+        """With `without`, folders that never count."""
+        self.root, self._memory, self._without = root, root / ".cache" / "digests.json", without
         known = self._memory.read_text(encoding="utf-8") if self._memory.exists() else "{}"
         self._known: dict[str, tuple[str, list[str]]] = json.loads(known)
         self._read: dict[str, tuple[str, list[str]] | None] = {}
@@ -42,7 +43,7 @@ class Checkout:
         to_do, found = [path for entry in entries for path in self._expanded(entry)], {}
         while to_do:
             path = to_do.pop()
-            if path not in found and (look := self._look(path)) is not None:
+            if path not in found and not path.startswith(self._without) and (look := self._look(path)) is not None:
                 found[path] = look[0]
                 to_do += self.next_files(path)
         self._remember()
@@ -58,7 +59,8 @@ class Checkout:
 
     def changed(self, files: dict[str, str]) -> list[str]:
         """The files whose digests have changed, or that are gone."""
-        paths = [path for path, digest in files.items() if (self._look(path) or ("",))[0] != digest]
+        counting = {path: digest for path, digest in files.items() if not path.startswith(self._without)}
+        paths = [path for path, digest in counting.items() if (self._look(path) or ("",))[0] != digest]
         self._remember()
         return paths
 

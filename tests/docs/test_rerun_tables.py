@@ -327,6 +327,13 @@ def test_imports_are_followed_where_they_are_late_or_lazy(docs: Callable[[str], 
         assert path in files
     assert "fogsim/study/plan.py" not in files
     assert not any("__pycache__" in path for path in files)
+    counting = docs("table_stamps").Stamps(CHECKOUT).checkout()
+    unread = {path for path in files if path.startswith("fogsim/openscenario/")}
+    assert set(counting.files(["benchmarks/belief.py"])) == set(files) - unread
+    assert unread and not counting.changed(dict.fromkeys(unread, "another digest"))
+    assert not list(CHECKOUT.glob("scenarios/**/*.xosc")) and "xosc" not in " ".join(
+        command for one in docs("measured_tables").MEASUREMENTS for command in one.commands
+    )
 
 
 def test_every_table_of_the_pages_has_its_command(docs: Callable[[str], ModuleType]) -> None:

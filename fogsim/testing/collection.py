@@ -140,8 +140,8 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
     Parameters
     ----------
     names : iterable of str or Path
-        Files; folders, in which ``*.fog.yaml``, ``*.fog.yml`` and each ``scenario.yaml`` with ``expect`` are found at any
-        depth; or names of the catalogue.
+        Files; folders, in which ``*.fog.yaml``, ``*.fog.yml`` and each ``scenario.yaml`` with ``expect`` are found at
+        any depth; or names of the catalogue.
 
     Raises
     ------

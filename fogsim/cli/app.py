@@ -4,6 +4,7 @@ import contextlib
 import errno
 import json
 import os
+import shlex
 import sys
 import warnings
 from enum import StrEnum
@@ -51,7 +52,9 @@ def _new_command(
 
     for file in begin_scenario(name, source, parent):
         stdout.print(f"  {escape(str(file))}", soft_wrap=True)
-    stdout.print(f"next: edit {escape(str(parent / name))}/scenario.yaml, then fogsim run {escape(str(parent / name))}")
+    made = parent / name
+    again = f"next: edit {made}/scenario.yaml, then {shlex.join(['fogsim', 'run', str(made)])}"
+    stdout.print(escape(again), soft_wrap=True)
 
 
 def _schema_command(

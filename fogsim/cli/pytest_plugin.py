@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from fogsim.testing import CaseResult, FileOutcome, FogTest
 
-_SUFFIX = ".fog.yaml"
+_SUFFIXES = (".fog.yaml", ".fog.yml")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,7 +41,7 @@ def _number_of_processes(text: str) -> int:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FogFile | None:
     """Collect test files."""
-    return FogFile.from_parent(parent, path=file_path) if file_path.name.endswith(_SUFFIX) else None
+    return FogFile.from_parent(parent, path=file_path) if file_path.name.endswith(_SUFFIXES) else None
 
 
 class FogFile(pytest.File):

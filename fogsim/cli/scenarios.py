@@ -33,11 +33,11 @@ def list_command() -> None:
         table.add_row(escape(name), "test" if "expect" in written else "", escape(written["description"]))
     stdout.print(table)
     stdout.print()
-    stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")
+    stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}", soft_wrap=True)
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, CONTROLLERS, LIGHTING_POLICIES, SPEED_CHOICES, RENDERERS):
         # FogSim's own in order, then those of installed packages, then those that are files.
         names = ", ".join(dict.fromkeys((*registry, *registry.known, *(f"{kind}:FILE" for kind in registry.files))))
-        stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}")
+        stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}", soft_wrap=True)
 
 
 def validate_command(

@@ -62,6 +62,11 @@ def check_command(
         with begin_session(out, resume=resume):
             outcomes = _run(tests, out, number, exit_first=exit_first)
             kept = _evidence(outcomes, out, number) if evidence else {}
+            # Before anything is printed, as into a pipe that head has closed.
+            if junit is not None:
+                write_junit(junit, outcomes, chosen)
+            if html is not None:
+                write_page(html, PageContent(outcomes, kept, time.monotonic() - begun, chosen))
             for outcome in outcomes:
                 _print_outcome(outcome, chosen)
                 if shrink:
@@ -71,12 +76,7 @@ def check_command(
             "Interrupted; cases that are done are kept, and the same command with --resume goes on.", soft_wrap=True
         )
         raise typer.Exit(INTERRUPTED) from None
-    seconds = time.monotonic() - begun
-    stdout.print(f"\n{totals_text(outcomes, seconds)}")
-    if junit is not None:
-        write_junit(junit, outcomes, chosen)
-    if html is not None:
-        write_page(html, PageContent(outcomes, kept, seconds, chosen))
+    stdout.print(f"\n{totals_text(outcomes, time.monotonic() - begun)}", soft_wrap=True)
     for path in dict.fromkeys([*(one for found in kept.values() for one in found.files), junit, html]):
         if path is not None:
             stdout.print(f"  {escape(path)}", soft_wrap=True)

@@ -102,7 +102,7 @@ def _all_of(first: _Test, second: _Test) -> _Test:
     return lambda names: first(names) and second(names)
 
 
-_PATTERN = "*.fog.yaml"
+_PATTERNS = ("*.fog.yaml", "*.fog.yml")
 """Names of test files; a folder's scenario.yaml is also one, if it has expectations."""
 
 _EXPECT = "expect"
@@ -140,8 +140,8 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
     Parameters
     ----------
     names : iterable of str or Path
-        Files; folders, in which ``*.fog.yaml`` and each ``scenario.yaml`` with ``expect`` are found at any depth; or
-        names of the catalogue.
+        Files; folders, in which ``*.fog.yaml``, ``*.fog.yml`` and each ``scenario.yaml`` with ``expect`` are found at
+        any depth; or names of the catalogue.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
-    files = {*folder.rglob(_PATTERN), *folder.rglob(SCENARIO_FILE)}
+    files = {file for name in (*_PATTERNS, SCENARIO_FILE) for file in folder.rglob(name)}
     for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
         if file.name != SCENARIO_FILE or _EXPECT in read_scenario_document(file).data:
             yield file

@@ -76,7 +76,7 @@ def judge(test: FogTest, results: Sequence[CaseResult]) -> Iterator[Judgement]:
         shown = FindingVerdict.FAILED if numbers[1] else FindingVerdict(str(outcome))
         of_it = (one for one in findings if one[1].verdict is shown)
         run, telling = next(of_it, findings[0])
-        yield Judgement(name, clause, outcome, numbers, telling, run, why if len(findings) > 1 else "")
+        yield Judgement(name, clause, outcome, numbers, telling, run, why if len(test.runs) > 1 else "")
 
 
 def _counted(findings: Sequence[tuple[StudyRun, Finding]]) -> tuple[int, int, int]:
@@ -100,6 +100,7 @@ def _outcome(numbers: tuple[int, int, int], verdict: Verdict) -> tuple[Outcome, 
         )
     if high < verdict.pass_rate:
         return Outcome.FAILED, text
-    if tried < verdict.conclusive * of_all:
+    # Not multiplied: 0.55 * 100 is more than 55.
+    if tried / of_all < verdict.conclusive:
         return Outcome.INCONCLUSIVE, f"{text}; {100 * verdict.conclusive:.4g} % of them must show something"
     return (Outcome.PASSED if low >= verdict.pass_rate else Outcome.INCONCLUSIVE), text

@@ -47,6 +47,13 @@ verdict: {pass_rate: 95 %, confidence: 90 %}
 """
 
 
+def test_both_endings_of_yaml_are_found(tmp_path: Path) -> None:
+    files = [tmp_path / "a.fog.yaml", tmp_path / "b.fog.yml"]
+    for file in files:
+        file.touch()
+    assert find_files([tmp_path]) == files
+
+
 def test_cases_and_expectations_are_those_that_are_asked_for(write: Write) -> None:
     file = write("a.fog.yaml", SWEPT)
     (whole,) = collect([file])

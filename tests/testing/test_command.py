@@ -1,5 +1,6 @@
 """``fogsim test`` from file to exit code, and the plug-in for pytest."""
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -67,6 +68,20 @@ def test_a_sweep_from_file_to_exit_code(file: Path, command: Command, monkeypatc
     assert (file.parent / "ci" / "j.xml").is_file()
     session = json.loads((file.parent / "runs" / "tests" / "session.json").read_text())
     assert session["not_passed"] == {str(file): ["visibility=60 m", "visibility=5 km"]}
+
+
+def test_reports_are_written_though_the_output_is_not_read(
+    file: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
+
+    def closed(*_: object) -> None:
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+    monkeypatch.setattr("fogsim.cli.test._print_outcome", closed)
+    command("test", str(file), "--no-evidence", "--junit", "j.xml", "--html", "page.html", cwd=file.parent)
+    assert (file.parent / "j.xml").is_file()
+    assert (file.parent / "page.html").is_file()
 
 
 def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -> None:

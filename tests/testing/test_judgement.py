@@ -48,6 +48,17 @@ def test_without_a_rate_none_may_fail_and_half_must_show_something() -> None:
         ("iii", Outcome.INCONCLUSIVE),
     ]:
         assert judged(verdicts).outcome is outcome
+    # In floating point 0.55 × 100 is more than 55.
+    assert judged("p" * 55 + "i" * 45, Verdict(conclusive=0.55)).outcome is Outcome.PASSED
+
+
+def test_a_single_case_left_by_failed_runs_has_its_reason() -> None:
+    run = StudyRun(0, {"run": "0"}, 0, None, "0")  # type: ignore[arg-type]  # unused
+    finding = Finding("safe", "never", FindingVerdict.PASSED, "no collision", "", None, None, "")
+    test = FogTest(Path("a"), "a", {"safe": "a:1"}, (run,) * 2, Verdict(pass_rate=0.5))
+    (judgement,) = judge(test, [CaseResult(run, None, (finding,))])
+    assert judgement.outcome is Outcome.INCONCLUSIVE
+    assert judgement.why.startswith("1 of 1 cases passed: a rate of 10.0")
 
 
 def test_a_rate_is_shown_or_refuted_or_neither() -> None:

@@ -56,7 +56,7 @@ def study_command(
     may_import = import_nothing if check else CodeNotice()
     with counting_bar(stderr, "checking the scenario of each cell") as watch:
         loaded = load_study(study, with_timeout(None, method_timeout), may_import, watch)
-    stdout.print(escape(f"{loaded.name}: {grid_text(loaded)}"), soft_wrap=True)
+    stdout.print(escape(f"{loaded.name}: {grid_text(loaded)}"))
     cells = loaded.cells()
     if (warning := next(filter(None, map(empty_start, cells.values())), None)) is not None:
         stderr.print(f"[yellow]{escape(warning)}[/]", soft_wrap=True)

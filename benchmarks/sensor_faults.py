@@ -37,14 +37,14 @@ FAULTS = {
     "sun 15° aside, dirty glass": "fault: glare, azimuth: 15 deg, haze: 10",
     "pitch + 0.5°": "fault: calibration, pitch: 0.5 deg",
     "pitch + 2°": "fault: calibration, pitch: 2 deg",
-    "pitch + 2°, told as unsure": "fault: calibration, pitch: 2 deg",
+    "pitch + 2°, stated as unsure": "fault: calibration, pitch: 2 deg",
     "roll + 2°": "fault: calibration, roll: 2 deg",
     "focal length + 5 %": "fault: calibration, focal_length: 5 %",
     "radar lost": "fault: dropout",
     "radar + 5 m": "fault: bias, distance: 5 m",
     "radar noise × 10": "fault: noise",
 }
-UNSURE = {"pitch + 2°, told as unsure"}
+UNSURE = {"pitch + 2°, stated as unsure"}
 """Methods with the `pitch_deviation` [rad] of a pitch that is not known well, as far as they have that parameter."""
 
 UNSURE_PITCH = 0.01

@@ -19,7 +19,7 @@ _WHITE, RED, _DARK, YELLOW, _BLUE = 0.66, 0.107, 0.022, 0.42, 0.076
 class Outline(Enum):
     """Shape of a face, as the directions of its sides' normals, to the right and down [rad]; a disc has none."""
 
-    DISC = ()
+    DISC = None  # not (), since Python 3.11.2 takes that for no value
     OCTAGON = tuple(math.pi / 4 * i for i in range(8))
     SQUARE = (0.0, math.pi / 2, math.pi, -math.pi / 2)
     DIAMOND = tuple(math.pi / 4 + math.pi / 2 * i for i in range(4))

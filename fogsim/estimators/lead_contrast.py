@@ -306,10 +306,10 @@ class LeadContrast:
         extinction, deviation = likely + weight * (fit.extinction - likely), math.sqrt(weight) * fit.deviation
         if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
             reason = "the contrast does not fall with the range as Duntley's law has it"
-        elif deviation > _WORST * extinction and extinction + 2.0 * deviation > _CLEAR:
-            reason = "the range has not changed enough yet"
         elif abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
             reason = "the vehicle's contrast and its decrease with range disagree: the fog may be uneven"
+        elif deviation > _WORST * extinction and extinction + 2.0 * deviation > _CLEAR:
+            reason = "the range has not changed enough yet"
         elif road is not None and road.is_lit(extinction, deviation):
             reason = "lamps light the road: this is a daytime method"
         if reason:

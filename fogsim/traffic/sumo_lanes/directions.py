@@ -43,10 +43,9 @@ class LaneDirections:
 
     def is_against(self, vehicle: str, lane: str) -> bool:
         """Whether a vehicle drives against the direction of its lane; read again only where the lane is another."""
-        known = self._known.get(vehicle)
-        if known is None or known[0] != lane:
-            known = self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
-        return known[1]
+        if vehicle not in self._known or self._known[vehicle][0] != lane:
+            self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
+        return self._known[vehicle][1]
 
     def against(self, vehicles: Sequence[str], lanes: Sequence[str]) -> list[int]:
         """Rows of those of some vehicles that drive against the direction of their lanes."""

@@ -48,15 +48,15 @@ def test_the_net_is_drawn_and_the_route_is_as_long_as_the_way_across_its_junctio
     assert position[-1] == pytest.approx(snapshots[0].route_length, abs=5.0)
 
 
-@pytest.mark.parametrize(("vaporizing", "ending"), [("ew1", Ending.ARRIVED), ("we1", Ending.LEFT_NETWORK)])
+@pytest.mark.parametrize(("taken_on", "ending"), [("ew1", Ending.ARRIVED), ("we2", Ending.LEFT_NETWORK)])
 def test_an_ego_arrives_at_its_place_and_not_where_it_is_taken_away(
-    tmp_path: Path, vaporizing: str, ending: Ending
+    tmp_path: Path, taken_on: str, ending: Ending
 ) -> None:
     """It arrives at 100 m of its last edge; SUMO reports one that a vaporizer takes as arrived, too."""
-    demand = """<routes><route id="r" edges="we1 we2"/><vType id="t" sigma="0" lcOpposite="0"/>
+    demand = """<routes><route id="r" edges="we1 we2 ew2"/><vType id="t" sigma="0" lcOpposite="0"/>
     <vehicle id="ego" type="t" route="r" depart="0" departPos="50" departSpeed="20" arrivalPos="100"/></routes>"""
-    (tmp_path / "gone.add.xml").write_text(f'<a><vaporizer id="{vaporizing}" begin="5" end="100"/></a>', encoding="utf-8")
-    net = DATA / "sumo_cases" / "overtaking.net.xml"
+    (tmp_path / "gone.add.xml").write_text(f'<a><vaporizer id="{taken_on}" begin="0" end="200"/></a>')
+    net = DATA / "sumo_cases" / "overtaking_lights.net.xml"
     path = configured(tmp_path, net, demand, additional="gone.add.xml")
     settings = ("renderer=none", "estimators=[]", "fog.visibility_m=5000", "duration_s=200")
     *_, last = fogsim.run(scenario_from_config(path, "ego", settings), seed=1)

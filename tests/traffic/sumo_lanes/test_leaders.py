@@ -145,7 +145,8 @@ def test_leaders_that_turn_round_are_sumos(link: LibsumoLink, tmp_path: Path) ->
     """Inside a junction even a short vehicle's angle, that of the chord between its ends, may be against its lane."""
     (tmp_path / "a.rou.xml").write_text(
         """<routes><route id="r" edges="we2 ew2 ew1 we1 ew1"/>
-        <vType id="c" lcOpposite="0"/><flow id="f" type="c" route="r" begin="0" end="60" period="5" departPos="400" departSpeed="max"/></routes>"""
+        <vType id="c" lcOpposite="0"/>
+        <flow id="f" type="c" route="r" begin="0" end="60" period="5" departPos="400" departSpeed="max"/></routes>"""
     )
     names = ("-n", str(CASES / "overtaking_lights.net.xml"), "-r", str(tmp_path / "a.rou.xml"))
     api = link.begin([*names, *QUIET])

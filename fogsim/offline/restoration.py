@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.errors import InputError
-from fogsim.offline.estimation import estimates_of, place_of
+from fogsim.offline.estimation import estimates_of, place_of, unless_none_fits
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source
 from fogsim.offline.video_source import VideoWriter, refuse_unfit_video
@@ -74,29 +74,30 @@ def _restored_images(source: Source, camera: Camera, wish: RestorationWish) -> I
     """Restore the images of a source in turn.
 
     `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept. An image that
-    does not fit the camera is not restored; if it is the first, the calibration is of another camera.
+    does not fit the camera is not restored.
     """
+    return unless_none_fits(_judged(source, camera, wish))
+
+
+def _judged(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Restored, str | None]]:
+    """Restored images, and why an image does not fit; see `unless_none_fits`."""
     last: Estimate | None = None
-    fitted = False
     for picture, estimate in _estimated(source, camera, wish):
         if picture.image is None:
-            yield Restored(picture, None, reason=picture.error)
+            yield Restored(picture, None, reason=picture.error), None
             continue
         held = False
         if estimate is not None:
             held = not estimate.valid and source.temporal and last is not None
             last = estimate if estimate.valid or not source.temporal else last
             if last is None or not last.valid:
-                yield Restored(picture, None, reason=f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}")
+                reason = f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}"
+                yield Restored(picture, None, reason=reason), ""
                 continue
         try:
-            done = _restored(picture, picture.image, camera, wish, last, held)
+            yield _restored(picture, picture.image, camera, wish, last, held), ""
         except InputError as error:
-            if not fitted:
-                raise InputError(f"{place_of(source, picture)}: {error}") from error
-            done = Restored(picture, None, reason=str(error))
-        fitted = True
-        yield done
+            yield Restored(picture, None, reason=str(error)), f"{place_of(source, picture)}: {error}"
 
 
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:

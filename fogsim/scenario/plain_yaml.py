@@ -133,7 +133,7 @@ class _Walk:
             for index, value in enumerate(node.value):
                 self._lines[(*at, index)] = _line(value)
                 self.visit(value, (*at, index), depth + 1)
-        elif node.tag == _FLOAT and math.isinf(float(node.value.replace(".inf", "0"))):
+        elif node.tag == _FLOAT and not node.value.lower().endswith(("inf", "nan")) and math.isinf(float(node.value)):
             where = f"{dotted(at)}: " if at else ""
             raise PlainYamlError(f"{where}expected a finite number, or .inf, got {shown(node.value)}", _line(node))
 

@@ -4,6 +4,7 @@ import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
+from numbers import Real
 from typing import Annotated, Any
 
 import gymnasium
@@ -133,7 +134,7 @@ def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
     if not is_highway_environment(made):
         raise InputError(f"environment must be an id of highway-env, such as 'highway-v0'; got {environment!r}")
     for name, value in config.items():
-        if isinstance(value, float | np.floating) and not math.isfinite(value):
+        if isinstance(value, Real) and not math.isfinite(value):
             raise InputError(f"config[{name!r}] must be a finite number, got {value!r}")
     # Leaders across the joints of roads are seen too, unless the user says otherwise.
     made.configure({"neighbour_vehicles_connected_lanes": True, **config})

@@ -3,8 +3,8 @@
 import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
 from numbers import Real
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import gymnasium

@@ -165,7 +165,8 @@ class Node:
             return default
         with contextlib.suppress(ValueError):
             value = float(text)
-            if not (math.isnan(value) or (is_finite and math.isinf(value))):
+            is_endless = not is_finite and "inf" in text.lower()
+            if math.isfinite(value) or (is_endless and not math.isnan(value)):
                 return value
         self.refuse(f"expected a number for {key}, got {shown(text or 'nothing')}", is_whole=False)
         return 0.0

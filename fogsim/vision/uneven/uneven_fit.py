@@ -387,7 +387,7 @@ def _front(
 ) -> tuple[float, float]:
     """Nearest row, of those from near to far, from which on airlight is seen, and that of ground before it.
 
-    Both below the horizon [px]; NaN if there is no such step. Takes `flat` (a flat road's horizon), `shift`, `least` [px].
+    Both below the horizon [px]; NaN if there is no step. Takes `flat` (a flat road's horizon), `shift`, `least` [px].
     """
     below, far, count = geometry.below - shift, np.empty(geometry.below.size, np.int64), 0
     for i in range(below.size):

@@ -4,12 +4,12 @@ import hashlib
 from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim import __version__
 from fogsim.core.files.atomic import write_text
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.errors import InputError
@@ -191,7 +191,7 @@ def _digest(source: Source, camera: Camera, wish: RestorationWish) -> str:
     calibration = source.straightener.calibration if isinstance(source, StraightenedSource) else camera
     stats = [(path, path.stat()) for path in source.paths if path.exists()]
     files = [(path, found.st_size, found.st_mtime_ns) for path, found in stats]
-    return hashlib.sha256(repr((__version__, source.temporal, calibration, wish, files)).encode()).hexdigest()
+    return hashlib.sha256(repr((version("fogsim"), source.temporal, calibration, wish, files)).encode()).hexdigest()
 
 
 def _finished(targets: tuple[Path, ...], mark: Path, digest: str) -> frozenset[Path]:

@@ -1,10 +1,13 @@
 """Leaders in the sublane model against geometry: positions, lengths and widths on a straight road along x."""
 
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import sumo
+import sumolib
 
 import fogsim
 from fogsim.metrics.following import find_following
@@ -158,3 +161,36 @@ def test_leaders_that_turn_round_are_sumos(link: LibsumoLink, tmp_path: Path) ->
             assert (ours and ours.vehicle_id) == (sumos and sumos[0])
             turning += sumos is not None and api.vehicle.getLaneID(sumos[0]) in (":e_0_0", ":m_7_0", ":w_0_0")
     assert turning > 20
+
+
+KINDS = {
+    "random": ("--rand", "--rand.iterations", "60", "--rand.random-lanenumber", "1", "-L", "3", "--tls.guess"),
+    "left-hand": ("--rand", "--rand.iterations", "60", "--lefthand", "-L", "2"),
+    "grid": ("--grid", "--grid.number", "4", "-L", "2", "--turn-lanes", "1"),
+    "spider": ("--spider", "--spider.arm-number", "6", "--spider.circle-number", "4"),
+    "without inner lanes": ("--rand", "--rand.iterations", "60", "--no-internal-links"),
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_random_networks_leaders_are_sumos(link: LibsumoLink, tmp_path: Path, kind: str, seed: int) -> None:
+    net, trips = str(tmp_path / "a.net.xml"), tmp_path / "a.trips.xml"
+    generate = str(Path(sumo.SUMO_HOME, "bin", "netgenerate"))
+    subprocess.run([generate, *KINDS[kind], "--seed", str(seed), "-o", net], check=True, capture_output=True)
+    edges = [edge.getID() for edge in sumolib.net.readNet(net).getEdges()]
+    ends = np.random.default_rng(seed).choice(edges, (150, 2))
+    rows = (f'<trip id="{n}" depart="{n}" from="{a}" to="{b}"/>' for n, (a, b) in enumerate(ends))
+    trips.write_text(f"<routes>{''.join(rows)}</routes>")
+    api = link.begin(["-n", net, "-r", str(trips), "--ignore-route-errors", "--step-length", "0.5", *QUIET])
+    leaders, compared = Leaders(api), 0
+    for _ in range(500):
+        link.step()
+        for vehicle in api.vehicle.getIDList():
+            sumos, ours = api.vehicle.getLeader(vehicle, 500.0), leaders.of_ego(vehicle)
+            assert (ours and ours.vehicle_id) == (sumos and sumos[0])
+            if ours:
+                assert ours.gap == pytest.approx(sumos[1] + api.vehicle.getMinGap(vehicle))
+                compared += 1
+    assert compared > 1000

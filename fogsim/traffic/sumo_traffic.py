@@ -335,7 +335,7 @@ class SumoTraffic:
             route, self._route, last, self._last = self._route, None, self._last, None
             if last is None or route is None:
                 return None
-            may_arrive = self._arrived and not self._link.shared and route.may_end(last.state, run.roster.time)
+            may_arrive = self._arrived and route.may_end(last.state, run.roster.time)
             if not may_arrive and not run.collisions.includes(ego):
                 return None
             # A collision took it, or it arrived: it is shown once more where it was.

@@ -82,6 +82,12 @@ class AttachedTraffic(SumoTraffic):
             self._running.roster.check_count()
         super().obey(command)
 
+    def look(self) -> float:
+        """Read the last step; return its time [s]. An ego that arrives is gone at once."""
+        time = super().look()
+        self._arrived = False
+        return time
+
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""
         return self._unplayed(self._seen)

@@ -229,5 +229,5 @@ def _written(element: Element) -> Iterator[str]:
 
 
 def _named(config: Path, root: Element, options: tuple[str, ...]) -> tuple[Path, ...]:
-    names = [name.strip() for value in _values(root, options) for name in value.split(",")]
+    names = [name.strip() for value in _values(root, options) for name in expanded(value).split(",")]
     return tuple(config.parent / name for name in names if name)

@@ -14,6 +14,7 @@ from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import structures
+from fogsim.traffic.road.unsafe_outputs import expanded
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api
 from fogsim.values import RoadNetwork, SignMap, Structure
@@ -76,7 +77,7 @@ def check_step_length(api: Api, step_length: float) -> None:
 
 def loaded_net(api: Api) -> Path:
     """Network file that a running simulation has loaded."""
-    path = Path(api.simulation.getOption("net-file"))
+    path = Path(expanded(api.simulation.getOption("net-file")))
     if not path.is_file():
         raise SimulationError(
             f"SUMO says that its network is {str(path)!r}, and there is no such file as seen from {Path.cwd()}: "
@@ -87,7 +88,7 @@ def loaded_net(api: Api) -> Path:
 
 def loaded_additional(api: Api) -> tuple[Path, ...]:
     """Additional files of a running simulation, as far as they are here to be read."""
-    names = api.simulation.getOption("additional-files").split(",")
+    names = expanded(api.simulation.getOption("additional-files")).split(",")
     return tuple(path for name in names if (path := Path(name.strip())).is_file())
 
 

@@ -69,7 +69,9 @@ class Leaders:
         self._now = getter(api, "simulation", "getTime")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
         self._lane_length, self._links = getter(api, "lane", "getLength"), getter(api, "lane", "getLinks")
-        self._in_lane, self._speed = vehicle_getter(api, "getLeader"), vehicle_getter(api, "getSpeed")
+        reach = {"getLeader": ("d", _EGO_REACH)}
+        (self._in_lane,) = vehicle_getters(api, remote and self._spots.is_divided, ("getLeader",), reach)
+        self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
         self._sizes: dict[str, tuple[float, float]] = {}
         self._ways: dict[tuple[str, str], tuple[str, ...]] = {}
@@ -103,13 +105,14 @@ class Leaders:
         if not lane:
             return None
         own = self._spot(vehicle, lane)
-        best, gap = "", reach
+        best, gap, passed = "", reach, set[str]()
         for begin, current in self._lanes_ahead(own, reach):
             if begin - own.station - _LONGEST > gap:
                 break
             across = own.across - self._spots.middle(lane) + self._spots.middle(current)
-            least = own.station if begin == 0.0 else -1.0
-            for other in self._from(current.rpartition("_")[0], least):
+            least, edge = own.station if begin == 0.0 else -1.0, current.rpartition("_")[0]
+            passed.add(edge)
+            for other in self._from(edge, least):
                 if begin + other.station - own.station - _LONGEST > gap:
                     break
                 is_beside = abs(other.across - across) >= 0.5 * (other.width + own.width)
@@ -118,7 +121,14 @@ class Leaders:
                 apart = begin + other.station - other.length - own.station
                 if apart < gap:
                     best, gap = other.vehicle, apart
-        return (best, gap - float(self._minimum_gap(vehicle))) if best else None
+        minimum = float(self._minimum_gap(vehicle))
+        # Only SUMO's own names whoever turns off with its rear still in the way, or comes into it inside a junction.
+        found = None if own.is_against else self._in_lane(vehicle, _EGO_REACH)
+        if found and found[0] and found[1] + minimum < gap:
+            lane = self._lane(found[0])
+            if lane and lane.rpartition("_")[0] not in passed and not self._directions.is_against(found[0], lane):
+                return found[0], found[1]
+        return (best, gap - minimum) if best else None
 
     def _lanes_ahead(self, own: _Spot, reach: float) -> Iterator[tuple[float, str]]:
         """Lanes on a vehicle's way, and where each begins, from the beginning of its own [m]."""

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.sumo.loaded_files import (
     LoadedRoads,
     check_step_length,
@@ -15,6 +16,7 @@ from fogsim.traffic.sumo.loaded_files import (
     loaded_net,
 )
 from tests.helpers.attached import GRID
+from tests.traffic.common import configured
 
 
 def simulation(step: float = 0.1, **options: str) -> Any:
@@ -52,3 +54,14 @@ def test_a_network_without_the_egos_way_is_refused() -> None:
     expected = r"grid\.net\.xml: the ego drives on edge 'A0B9', which this network does not have \(nearest: A0B0, "
     with pytest.raises(InputError, match=expected):
         roads.along(simulation(additional_files=""), ("A0B0", "A0B9"))
+
+
+def test_names_of_files_may_have_environment_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TOWN", str(tmp_path / "town"))
+    net, signs = tmp_path / "town.net.xml", tmp_path / "town.add.xml"
+    net.write_text("<net/>")
+    signs.write_text("<additional/>")
+    api = simulation(net_file="${TOWN}.net.xml", additional_files="${TOWN}.add.xml")
+    assert (loaded_net(api), loaded_additional(api)) == (net, (signs,))
+    config = configured(tmp_path, Path("${TOWN}.net.xml"), "<routes/>", additional="${TOWN}.add.xml")
+    assert configured_files(config) == (net, (signs,))

@@ -172,18 +172,40 @@ KINDS = {
 }
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("kind", KINDS)
-def test_on_random_networks_leaders_are_sumos(link: LibsumoLink, tmp_path: Path, kind: str, seed: int) -> None:
-    net, trips = str(tmp_path / "a.net.xml"), tmp_path / "a.trips.xml"
+def crowded(link: LibsumoLink, folder: Path, kind: str, seed: int, *options: str) -> Any:
+    """A network by netgenerate, and traffic from anywhere to anywhere."""
+    net, trips = str(folder / "a.net.xml"), folder / "a.trips.xml"
     generate = str(Path(sumo.SUMO_HOME, "bin", "netgenerate"))
     subprocess.run([generate, *KINDS[kind], "--seed", str(seed), "-o", net], check=True, capture_output=True)
     edges = [edge.getID() for edge in sumolib.net.readNet(net).getEdges()]
     ends = np.random.default_rng(seed).choice(edges, (150, 2))
     rows = (f'<trip id="{n}" depart="{n}" from="{a}" to="{b}"/>' for n, (a, b) in enumerate(ends))
     trips.write_text(f"<routes>{''.join(rows)}</routes>")
-    api = link.begin(["-n", net, "-r", str(trips), "--ignore-route-errors", "--step-length", "0.5", *QUIET])
+    return link.begin(["-n", net, "-r", str(trips), "--ignore-route-errors", "--step-length", "0.5", *QUIET, *options])
+
+
+def test_in_the_sublane_model_no_near_leader_of_sumos_is_missed(link: LibsumoLink, tmp_path: Path) -> None:
+    """Nor one that turns off with its rear in the way; on single lanes none is next to the follower."""
+    api = crowded(link, tmp_path, "spider", 1, "--lateral-resolution", "0.8")
+    leaders, turning = Leaders(api), 0
+    for _ in range(300):
+        link.step()
+        for vehicle in api.vehicle.getIDList():
+            sumos = api.vehicle.getLeader(vehicle, 60.0)
+            if sumos is None:
+                continue
+            ours = leaders.of_ego(vehicle)
+            assert ours is not None
+            assert ours.gap <= sumos[1] + api.vehicle.getMinGap(vehicle) + 0.1
+            turning += api.vehicle.getRoadID(sumos[0]) not in api.vehicle.getRoute(vehicle)
+    assert turning > 100
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_random_networks_leaders_are_sumos(link: LibsumoLink, tmp_path: Path, kind: str, seed: int) -> None:
+    api = crowded(link, tmp_path, kind, seed)
     leaders, compared = Leaders(api), 0
     for _ in range(500):
         link.step()

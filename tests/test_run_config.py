@@ -9,6 +9,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.sensors import Gps
 from fogsim.simulation import AdviceConfig, FogConfig, Periods, RunConfig, TrafficSetup, WorldConfig
 from fogsim.simulation.recording import record_run
 from fogsim.simulation.road_advice import RoadAdvice
@@ -53,6 +54,10 @@ def test_clocks_that_do_not_fit_are_refused() -> None:
             "estimators must differ, got joint_road, joint",
         ),
         (lambda: replace(CONFIG, camera=CONFIG.camera.camera), "camera must be a CameraConfig"),
+        (
+            lambda: replace(CONFIG, sensors=replace(CONFIG.sensors, gps=Gps(float("nan")))),
+            r"RunConfig: sensors\.gps\.position_deviation must be a number, got nan",
+        ),
     ],
 )
 def test_mistakes_in_its_parts_are_named(make: Any, message: str) -> None:

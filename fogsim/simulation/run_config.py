@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Annotated, Any, ClassVar, Protocol
 
 from fogsim.atmosphere import FogConfig
@@ -369,12 +369,14 @@ class RunConfig(ScenarioLike):
     description: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse clocks that do not fit, and estimators that would count twice."""
+        """Refuse clocks that do not fit, estimators that would count twice, and NaN in any part."""
         step, steps, period = self.traffic.step_length, self.periods.traffic_steps, self.periods.camera_period
         if not math.isclose(step * steps, period, rel_tol=1e-5):
             raise InputError(f"periods: {steps} traffic steps of {step:g} s are not one camera period, {period:g} s")
         if len({one.name for one in self.estimators}) < len(self.estimators):
             raise InputError(f"estimators must differ, got {', '.join(one.name for one in self.estimators)}")
+        if where := _not_a_number(self):
+            raise InputError(f"RunConfig: {where} must be a number, got nan")
 
     @property
     def has_equipped(self) -> bool:
@@ -384,6 +386,19 @@ class RunConfig(ScenarioLike):
     def run_config(self) -> "RunConfig":
         """Return this configuration itself."""
         return self
+
+
+def _not_a_number(part: object, where: str = "") -> str:
+    """Key path of the first NaN in a configuration; empty without one."""
+    if isinstance(part, float):
+        return where if math.isnan(part) else ""
+    if isinstance(part, tuple):
+        inner = [(f"{where}[{number}]", one) for number, one in enumerate(part)]
+    elif is_dataclass(part):
+        inner = [(f"{where}.{one.name}".lstrip("."), getattr(part, one.name)) for one in fields(part)]
+    else:
+        return ""
+    return next(filter(None, (_not_a_number(one, path) for path, one in inner)), "")
 
 
 def check_ego(ego: str | None, who: str) -> None:

@@ -142,6 +142,8 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         options : dict or None
             Of the environment.
         """
+        # None until there is a frame, so that an interrupted episode does not go on.
+        self._fleet = None
         observation, info = self.env.reset(seed=None if seed is None else int(seed), options=options)
         if seed is not None:
             self._noise = np.random.default_rng(seed)
@@ -152,8 +154,8 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
             self._equipment = EgoEquipment(self._config)
         self._describe_observation()
         environment: Any = self.env.unwrapped
-        self._fleet = Fleet(environment, environment.vehicle)
-        self._fleet.ego_lamps = _COMMAND.lamps
+        fleet = Fleet(environment, environment.vehicle)
+        fleet.ego_lamps = _COMMAND.lamps
         network = road_network(environment.road, environment.vehicle)
         if self._network is not None and not same_roads(self._network, network):
             self._equipment.close()
@@ -161,9 +163,11 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._network, self._progress = network, RouteProgress(network.route)
         streams = spawn_streams(int(self._noise.integers(2**31)))
         fog = self._equipment.start_run(streams, lambda: (network, SignMap()))
-        self._drivers_fog = self._take_over_drivers(fog, self._fleet, streams.traffic_seed)
+        self._drivers_fog = self._take_over_drivers(fog, fleet, streams.traffic_seed)
         self._step = None
-        return self._with_frame(observation), self._with_truth(info)
+        framed = self._with_frame(observation, fleet, self._progress)
+        self._fleet = fleet
+        return framed, self._with_truth(info)
 
     def _take_over_drivers(self, fog: FogField, fleet: Fleet, seed: int) -> DriversFog:
         """Play the script, and put the fog about the environment's drivers if it concerns them."""
@@ -182,20 +186,22 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         action : object
             Of the environment's own action space.
         """
-        if self._fleet is not None:
-            self._drivers_fog.set_time(self._fleet.time)
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._with_frame(observation), reward, terminated, truncated, self._with_truth(info)
-
-    def _with_frame(self, observation: Any) -> dict[str, Any]:
-        """Observation with the frame of now; with the last one if the vehicle is no longer there."""
-        if self._fleet is None or self._progress is None:
+        fleet, self._fleet = self._fleet, None
+        if fleet is None or self._progress is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        snapshot = read_snapshot(self._fleet, self._progress, (), self._config.traffic.reading_radius)
+        self._drivers_fog.set_time(fleet.time)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        framed = self._with_frame(observation, fleet, self._progress)
+        self._fleet = fleet
+        return framed, reward, terminated, truncated, self._with_truth(info)
+
+    def _with_frame(self, observation: Any, fleet: Fleet, progress: RouteProgress) -> dict[str, Any]:
+        """Observation with the frame of now; with the last one if the vehicle is no longer there."""
+        snapshot = read_snapshot(fleet, progress, (), self._config.traffic.reading_radius)
         if snapshot is not None:
             index = 0 if self._step is None else self._step.index + 1
-            sent = self._equipment.look_from_roadside(self._fleet.time, snapshot.state)
-            self._step = self._equipment.complete_step(index, self._fleet.time, snapshot, _COMMAND, None, sent)
+            sent = self._equipment.look_from_roadside(fleet.time, snapshot.state)
+            self._step = self._equipment.complete_step(index, fleet.time, snapshot, _COMMAND, None, sent)
         if self._step is None:
             raise gymnasium.error.ResetNeeded("the controlled vehicle is not on the road: call reset()")
         own = observe(self._step)

@@ -220,6 +220,23 @@ def test_the_wrapper_needs_a_reset() -> None:
     env.close()
 
 
+def test_the_wrapper_needs_a_reset_after_an_interruption(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    plain = gymnasium.make("highway-v0", config=FEW)
+    env: Any = FogCameraWrapper(plain, image_size=(64, 48), overrides=[QUICK])
+    for call in (env.reset, lambda: env.step(1)):
+        env.reset(seed=1)
+        with monkeypatch.context() as patch:
+            patch.setattr(env._equipment, "complete_step", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                call()
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            env.step(1)
+    env.close()
+
+
 def test_the_wrapper_takes_what_python_and_numpy_give() -> None:
     plain = gymnasium.make("highway-v0", config={**FEW, "simulation_frequency": np.int64(15)})
     env: Any = FogCameraWrapper(plain, image_size=(64, 48), overrides=(text for text in [QUICK]))

@@ -147,6 +147,28 @@ def test_an_interrupted_folder_is_resumed(folder: Path, method: str) -> None:
         next(restore_files(source, camera, RestorationWish(method), out))
 
 
+def test_an_interruption_of_a_folder_says_how_to_go_on(
+    folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*given: object, **options: object) -> Generator[Restored]:
+        yield next(restore_files(*given, **options))  # type: ignore[arg-type]
+        raise KeyboardInterrupt
+
+    for number in range(3):
+        (folder / f"f{number}.png").write_bytes((folder / "fog.png").read_bytes())
+    line = ("restore", "f?.png", "--stills", *FOG, "--out", "clear")
+    with monkeypatch.context() as patch:
+        patch.setattr("fogsim.offline.restoration.restore_files", interrupted)
+        done = command(*line, cwd=folder)
+    assert done.returncode == 130
+    assert done.stdout.endswith(
+        "clear: 1 image restored by planar, visibility 80 m\nInterrupted; the same command continues it.\n"
+    )
+    done = command(*line, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "clear: 2 images restored by planar\n1 more had been restored before an interruption\n"
+
+
 def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, command: Command) -> None:
     cv2.imwrite(str(folder / "deep.png"), np.full((240, 320), 40_000, np.uint16))
     (folder / "deep.png").rename(folder / "deep.bmp")

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -157,10 +158,18 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
-    files = {file for name in (*_PATTERNS, SCENARIO_FILE) for file in folder.rglob(name)}
+    files = {file for one in _folders(folder) for name in (*_PATTERNS, SCENARIO_FILE) for file in one.glob(name)}
     for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
         if file.name != SCENARIO_FILE or _EXPECT in read_scenario_document(file).data:
             yield file
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """A folder and all within it, also through links, but for hidden ones and those that it is in."""
+    for path, names, _ in os.walk(folder, followlinks=True):
+        above = {one.resolve() for one in (Path(path), *Path(path).parents)}
+        names[:] = [one for one in names if not one.startswith(".") and Path(path, one).resolve() not in above]
+        yield Path(path)
 
 
 def _is_hidden(path: Path) -> bool:

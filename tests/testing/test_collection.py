@@ -63,6 +63,8 @@ def test_tests_in_linked_folders_are_found_once(tmp_path: Path) -> None:
     (tmp_path / "elsewhere" / "deep" / "back").symlink_to(tmp_path)
     suite = tmp_path / "suite"
     assert find_files([suite]) == [suite / "a.fog.yaml", suite / "again" / "a.fog.yaml"]
+    (suite / "gone.fog.yaml").symlink_to("nowhere.fog.yaml")
+    assert suite / "gone.fog.yaml" in find_files([suite])
 
 
 def test_cases_and_expectations_are_those_that_are_asked_for(write: Write) -> None:

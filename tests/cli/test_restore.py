@@ -68,6 +68,8 @@ def test_several_images_go_into_a_folder_and_are_replaced_if_asked(folder: Path,
     assert refused.returncode == 2
     assert "fog.png already exists" in refused.stderr
     assert command(*line, "--overwrite", cwd=folder).returncode == 0
+    refused = command(*line[:-1], "clear.png", cwd=folder)
+    assert refused.stderr == "error: --out clear.png: 2 images go into a folder, and this is the name of an image\n"
 
 
 def test_an_image_without_road_is_named_and_not_written(folder: Path, command: Command) -> None:
@@ -253,7 +255,7 @@ def test_an_image_of_another_size_is_refused(folder: Path, command: Command) -> 
     assert "small.png: the image has 32 × 24 pixels, the camera 320 × 240" in done.stderr
     done = command("restore", "fog.png", "small.png", "fog2.png", *FOG, "--out", "clear", cwd=folder)
     assert done.returncode == 2
-    assert "  small.png: the image has 32 × 24 pixels" in done.stderr
+    assert "error: 1 of the images could not be restored:\n  small.png: the image has 32 × 24 pixels" in done.stderr
     assert sorted(path.name for path in (folder / "clear").iterdir()) == ["fog.png", "fog2.png"]
 
 

@@ -11,6 +11,7 @@ from fogsim.cli.images.sources import Images, IsSequence, Rate, found_source
 from fogsim.cli.option_values import pixel_values
 from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, print_error, print_remarks, stderr, stdout
 from fogsim.cli.progress import progress_bar
+from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -47,6 +48,7 @@ def restore_command(
 ) -> None:
     """Restore contrast that daytime fog removed from your own images or video (docs/how_to/restoration.md)."""
     from fogsim.offline import load_calibration, straightened
+    from fogsim.offline.image_files import IMAGE_ENDINGS
     from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
     from fogsim.offline.source import ImageFiles
     from fogsim.offline.video_source import left_out
@@ -60,6 +62,8 @@ def restore_command(
     given = found_source(images, sequence, rate)
     source, pinhole = straightened(given, calibration)
     is_files = isinstance(given, ImageFiles)
+    if given.count > 1 and out.suffix.lower() in IMAGE_ENDINGS and not out.is_dir():
+        raise InputError(f"--out {out}: {given.count} images go into a folder, and this is the name of an image")
     tally, is_interrupted = _Tally(is_files), False
     restore = restore_files if is_files else restore_video
     try:
@@ -128,6 +132,7 @@ def _report_missing(lacking: list[str]) -> None:
     """Report why images were not restored."""
     if not lacking:
         return
-    print_error(f"{len(lacking)} of the images could not be restored (--visibility does without an estimate):")
+    advice = " (--visibility does without an estimate)" if any("no visibility: " in one for one in lacking) else ""
+    print_error(f"{len(lacking)} of the images could not be restored{advice}:")
     for reason in lacking:
         stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)

@@ -5,13 +5,16 @@ import errno
 import json
 import os
 import shlex
+import signal
 import sys
 import warnings
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from fogsim import __version__
 from fogsim.cli.calibrate import calibrate
@@ -24,7 +27,7 @@ from fogsim.cli.images.estimate import estimate_command
 from fogsim.cli.images.fog import fog_command
 from fogsim.cli.images.restore import restore_command
 from fogsim.cli.option_values import check_values
-from fogsim.cli.printing import BAD_INPUT, FAILED, escape, print_error, print_remarks, stdout
+from fogsim.cli.printing import BAD_INPUT, FAILED, escape, print_error, print_remarks, stderr, stdout
 from fogsim.cli.reproduce import reproduce_command
 from fogsim.cli.run import recover_command, run_command
 from fogsim.cli.scenarios import list_command, signs_command, validate_command
@@ -33,6 +36,9 @@ from fogsim.cli.test import check_command
 from fogsim.cli.view import view_command
 from fogsim.core.interruption import ProgramSignals, leave, leave_on_signals
 from fogsim.errors import FogSimError, MethodError
+
+_UNREAD = 128 + signal.SIGPIPE
+"""Exit code of a command whose output nothing reads any more, as that of other programs."""
 
 
 class _FileKind(StrEnum):
@@ -119,6 +125,9 @@ check_values(app)
 
 def main() -> None:
     """Run the command line; user errors end in one message and exit code 2, signals in one line."""
+    # By default, rich ends the command.
+    for console, descriptor in ((stdout, 1), (stderr, 2)):
+        console.on_broken_pipe = partial(_discard, console, descriptor)  # type: ignore[method-assign]
     signals = ProgramSignals()
     signals.listen()
     code: object = 0
@@ -146,7 +155,8 @@ def _run_app() -> object:
             warnings.showwarning = lambda message, *_, **__: print_remarks("warning", (message,), in_one_line=False)
             app()
     except SystemExit as end:
-        code = end.code
+        is_unread = isinstance(end.__context__, BrokenPipeError)  # which typer makes a failure
+        code = _UNREAD if is_unread else end.code
     except FogSimError as error:
         print_error(error)
         code = FAILED if isinstance(error, MethodError) else BAD_INPUT
@@ -157,7 +167,7 @@ def _run_app() -> object:
 
 
 def _flush_stdout() -> bool:
-    """Flush stdout, and return whether it could be written."""
+    """Flush stdout, and return whether it could be written, or has no reader any more."""
     try:
         sys.stdout.flush()
     except OSError as error:
@@ -165,5 +175,11 @@ def _flush_stdout() -> bool:
             print_error(f"stdout: cannot be written: {error.strerror}")
         # Python would try again when it ends, and print a traceback.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return False
+        return error.errno == errno.EPIPE
     return True
+
+
+def _discard(console: Console, descriptor: int) -> None:
+    """Print nothing more to a reader that has gone, as ``head``: files and exit code are those of the whole command."""
+    console.quiet = True
+    os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)

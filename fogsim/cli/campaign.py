@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fogsim.cli.earlier_reports import remove_earlier
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stdout
 from fogsim.cli.progress import tally_bar
 from fogsim.cli.scenario_options import CaseValues, CodeNotice, MethodTimeout, Settings, with_timeout
@@ -71,6 +72,7 @@ def campaign_command(
     """Find where a scenario with `space:` fails, and how often; exit code 0 (all passed), 1 (not all) or 2."""
     from fogsim.testing.campaign.running import load_campaign, run_campaign, smallest_failing
 
+    remove_earlier(junit)
     _refuse_clashes(file, out, junit, against, {"--budget": budget, "--seed": seed, "--first": first})
     if address is not None and engine is _CampaignEngine.LOCAL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")

@@ -172,11 +172,15 @@ def _camera_processes(scenario: "Scenario", wanted: int | None) -> int:
 
 def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
     """Whether to write a video: by default, if there is a camera for it."""
+    from fogsim.simulation.run_config import NO_RENDERER
+
     if wanted and not scenario.traffic.has_ego:
         raise InputError(
             "--video shows what an ego's camera sees, and traffic.ego is none; leave it out, or name an ego"
         )
-    return scenario.traffic.has_ego if wanted is None else wanted
+    if wanted and scenario.renderer == NO_RENDERER:
+        raise InputError("--video shows frames, and renderer is none; leave it out, or --set renderer=auto")
+    return scenario.traffic.has_ego and scenario.renderer != NO_RENDERER if wanted is None else wanted
 
 
 def _print_result(result: "RecordedRun", shown: Mapping[str, tuple[str, str]]) -> None:

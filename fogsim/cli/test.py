@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fogsim.cli.earlier_reports import remove_earlier
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import counting_bar, tally_bar
 from fogsim.cli.scenario_options import CaseValues, CodeNotice, Maps, MethodTimeout, Settings, with_timeout
@@ -54,6 +55,7 @@ def check_command(
     from fogsim.testing.session import begin_session
 
     begun, chosen = time.monotonic(), with_timeout(settings, method_timeout)
+    remove_earlier(junit, html)
     found = find_files(files or ["."])
     _refuse_outputs(found, out, {"--junit": junit, "--html": html})
     tests = _asked_for(found, keywords, case, chosen, out if of_last else None)
@@ -65,8 +67,9 @@ def check_command(
             # Before anything is printed, as into a pipe that head has closed.
             if junit is not None:
                 write_junit(junit, outcomes, chosen)
+            seconds = time.monotonic() - begun
             if html is not None:
-                write_page(html, PageContent(outcomes, kept, time.monotonic() - begun, chosen))
+                write_page(html, PageContent(outcomes, kept, seconds, chosen))
             for outcome in outcomes:
                 _print_outcome(outcome, chosen)
                 if shrink:
@@ -76,7 +79,7 @@ def check_command(
             "Interrupted; cases that are done are kept, and the same command with --resume goes on.", soft_wrap=True
         )
         raise typer.Exit(INTERRUPTED) from None
-    stdout.print(f"\n{totals_text(outcomes, time.monotonic() - begun)}", soft_wrap=True)
+    stdout.print(f"\n{totals_text(outcomes, seconds)}", soft_wrap=True)
     for path in dict.fromkeys([*(one for found in kept.values() for one in found.files), junit, html]):
         if path is not None:
             stdout.print(f"  {escape(path)}", soft_wrap=True)
@@ -167,4 +170,4 @@ def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> Non
 
     if os.environ.get("GITHUB_ACTIONS") == "true":
         for line in annotations(outcomes, settings):
-            typer.echo(line)
+            stdout.print(line, markup=False, soft_wrap=True)

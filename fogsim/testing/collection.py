@@ -2,10 +2,12 @@
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 
 from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError, shown
@@ -157,10 +159,22 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
-    files = {file for name in (*_PATTERNS, SCENARIO_FILE) for file in folder.rglob(name)}
-    for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
+    files = {file for one in _folders(folder) for name in (*_PATTERNS, SCENARIO_FILE) for file in one.glob(name)}
+    for file in sorted(one for one in files if not one.is_dir() and not _is_hidden(one.relative_to(folder))):
         if file.name != SCENARIO_FILE or _EXPECT in read_scenario_document(file).data:
             yield file
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """A folder and all within it, also through links, but for hidden ones and those that it is in."""
+    for path, names, _ in os.walk(folder, onerror=_refuse_unreadable, followlinks=True):
+        above = {one.resolve() for one in (Path(path), *Path(path).parents)}
+        names[:] = [one for one in names if not one.startswith(".") and Path(path, one).resolve() not in above]
+        yield Path(path)
+
+
+def _refuse_unreadable(error: OSError) -> NoReturn:
+    raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
 
 
 def _is_hidden(path: Path) -> bool:

@@ -112,6 +112,7 @@ def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, comman
         (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),
         (["run", "--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--video"], "--video shows what an ego's"),
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
+        (["run", "emergency_brake_in_fog", "--video"], "--video shows frames, and renderer is none"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a"], "there is no file 'no.sumocfg'"),
         (["validate", "motorway_fog_bank", "--maps", "nowhere"], "--maps nowhere is not a folder"),
         (["schema", "scenery"], "KIND: expected scenario or study, got 'scenery'"),

@@ -1,5 +1,9 @@
 """How the program ends when memory is short, and when a user's method has left threads."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from fogsim import __main__
@@ -32,3 +36,17 @@ def test_too_little_memory_ends_in_one_line(
 def test_threads_that_were_left_do_not_keep_the_program() -> None:
     done = run_python("-c", LEFT)
     assert (done.returncode, done.stdout[:7]) == (0, "fogsim ")
+
+
+@pytest.mark.parametrize(("name", "code"), [("motorway_fog_bank", 0), ("nowhere", 2)])
+def test_a_reader_that_has_gone_changes_no_exit_code(name: str, code: int) -> None:
+    ours, theirs = os.pipe()
+    os.close(ours)
+    try:
+        command = [sys.executable, "-m", "fogsim", "validate", "motorway_fog_bank", name]
+        done = subprocess.run(command, stdout=theirs, stderr=subprocess.PIPE, text=True, check=False)
+    finally:
+        os.close(theirs)
+    assert done.returncode == code
+    assert ("nowhere" in done.stderr) == bool(code)
+    assert "roken" not in done.stderr

@@ -113,6 +113,14 @@ def test_a_sequence_is_summed_up(estimate) -> None:
     assert "joint_road" in Path("v.svg").read_text(encoding="utf-8")
 
 
+def test_what_is_assumed_of_images_or_left_out_is_printed(estimate, folder: Path) -> None:
+    (folder / "drive" / "3.heic").touch()
+    for command, *options in (["estimate"], ["restore", "--out", "clear"]):
+        err = estimate.func(command, "drive", "--camera", "camera.yaml", *options).stderr
+        assert "warning: 3 images are taken as one drive, 10 a second, since no EXIF times say otherwise: --rate" in err
+        assert "warning: drive: left out, since only .png, " in err
+
+
 @pytest.mark.parametrize("as_json", [False, True])
 def test_what_was_done_before_ctrl_c_is_summed_up(estimate, monkeypatch: pytest.MonkeyPatch, as_json: bool) -> None:
     def interrupted(*given: object) -> Iterator[FrameEstimates]:

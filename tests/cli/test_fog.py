@@ -69,6 +69,13 @@ def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, fog: Fog) -> Non
         assert not (folder / "out.png").exists()
 
 
+def test_an_image_that_is_missing_or_a_folder_is_named(folder: Path, fog: Fog) -> None:
+    (folder / "image.png").unlink()
+    assert fog(folder, "--visibility", "80").stderr.startswith("error: image.png: there is no such file")
+    (folder / "image.png").mkdir()
+    assert fog(folder, "--visibility", "80").stderr == "error: image.png: expected one image or video\n"
+
+
 def test_fog_over_the_flat_road_needs_no_depth_map(
     folder: Path, command: Callable[..., "CompletedProcess[str]"]
 ) -> None:

@@ -68,6 +68,8 @@ def test_several_images_go_into_a_folder_and_are_replaced_if_asked(folder: Path,
     assert refused.returncode == 2
     assert "fog.png already exists" in refused.stderr
     assert command(*line, "--overwrite", cwd=folder).returncode == 0
+    refused = command(*line[:-1], "clear.png", cwd=folder)
+    assert refused.stderr == "error: --out clear.png: 2 images go into a folder, and this is the name of an image\n"
 
 
 def test_an_image_without_road_is_named_and_not_written(folder: Path, command: Command) -> None:
@@ -145,6 +147,28 @@ def test_an_interrupted_folder_is_resumed(folder: Path, method: str) -> None:
     assert sorted(path.name for path in out.iterdir()) == ["0.png", "1.png", "2.png"]
     with pytest.raises(InputError, match=r"0\.png already exists"):
         next(restore_files(source, camera, RestorationWish(method), out))
+
+
+def test_an_interruption_of_a_folder_says_how_to_go_on(
+    folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*given: object, **options: object) -> Generator[Restored]:
+        yield next(restore_files(*given, **options))  # type: ignore[arg-type]
+        raise KeyboardInterrupt
+
+    for number in range(3):
+        (folder / f"f{number}.png").write_bytes((folder / "fog.png").read_bytes())
+    line = ("restore", "f?.png", "--stills", *FOG, "--out", "clear")
+    with monkeypatch.context() as patch:
+        patch.setattr("fogsim.offline.restoration.restore_files", interrupted)
+        done = command(*line, cwd=folder)
+    assert done.returncode == 130
+    assert done.stdout.endswith(
+        "clear: 1 image restored by planar, visibility 80 m\nInterrupted; the same command continues it.\n"
+    )
+    done = command(*line, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "clear: 2 images restored by planar\n1 more had been restored before an interruption\n"
 
 
 def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, command: Command) -> None:
@@ -231,7 +255,7 @@ def test_an_image_of_another_size_is_refused(folder: Path, command: Command) -> 
     assert "small.png: the image has 32 × 24 pixels, the camera 320 × 240" in done.stderr
     done = command("restore", "fog.png", "small.png", "fog2.png", *FOG, "--out", "clear", cwd=folder)
     assert done.returncode == 2
-    assert "  small.png: the image has 32 × 24 pixels" in done.stderr
+    assert "error: 1 of the images could not be restored:\n  small.png: the image has 32 × 24 pixels" in done.stderr
     assert sorted(path.name for path in (folder / "clear").iterdir()) == ["fog.png", "fog2.png"]
 
 

@@ -54,6 +54,19 @@ def test_both_endings_of_yaml_are_found(tmp_path: Path) -> None:
     assert find_files([tmp_path]) == files
 
 
+def test_tests_in_linked_folders_are_found_once(tmp_path: Path) -> None:
+    for folder in ("suite", "elsewhere/deep"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "a.fog.yaml").touch()
+    (tmp_path / "suite" / "linked").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "suite" / "again").symlink_to(tmp_path / "elsewhere" / "deep")
+    (tmp_path / "elsewhere" / "deep" / "back").symlink_to(tmp_path)
+    suite = tmp_path / "suite"
+    assert find_files([suite]) == [suite / "a.fog.yaml", suite / "again" / "a.fog.yaml"]
+    (suite / "gone.fog.yaml").symlink_to("nowhere.fog.yaml")
+    assert suite / "gone.fog.yaml" in find_files([suite])
+
+
 def test_cases_and_expectations_are_those_that_are_asked_for(write: Write) -> None:
     file = write("a.fog.yaml", SWEPT)
     (whole,) = collect([file])

@@ -64,7 +64,9 @@ def test_a_sweep_from_file_to_exit_code(file: Path, command: Command, monkeypatc
     assert any(line.startswith("INCONCLUSIVE stops.whenever: 2 of 2 cases inconclusive") for line in lines)
     assert any(line.startswith("1 passed, 1 failed, 1 inconclusive; 2 runs of 1 file in") for line in lines)
     assert sum(line.startswith("::error file=") for line in lines) == 2
-    assert "data:image/svg+xml" in (file.parent / "ci" / "page.html").read_text(encoding="utf-8")
+    page = (file.parent / "ci" / "page.html").read_text(encoding="utf-8")
+    assert "data:image/svg+xml" in page
+    assert next(line for line in lines if line.startswith("1 passed, 1 failed")) in page
     assert (file.parent / "ci" / "j.xml").is_file()
     session = json.loads((file.parent / "runs" / "tests" / "session.json").read_text())
     assert session["not_passed"] == {str(file): ["visibility=60 m", "visibility=5 km"]}
@@ -80,8 +82,14 @@ def test_reports_are_written_though_the_output_is_not_read(
 
     monkeypatch.setattr("fogsim.cli.test._print_outcome", closed)
     command("test", str(file), "--no-evidence", "--junit", "j.xml", "--html", "page.html", cwd=file.parent)
-    assert (file.parent / "j.xml").is_file()
-    assert (file.parent / "page.html").is_file()
+    reports = [file.parent / "j.xml", file.parent / "page.html"]
+    assert all(report.is_file() for report in reports)
+    # A call that fails leaves none of an earlier one, nor removes a file that is no report.
+    for junit in ("j.xml", file.name):
+        done = command("test", "none.fog.yaml", "--junit", junit, "--html", "page.html", cwd=file.parent)
+        assert done.returncode == 2
+    assert not any(report.exists() for report in reports)
+    assert file.is_file()
 
 
 def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -> None:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, print_error, print_remarks, stderr
+from fogsim.cli.images.sources import Images, IsSequence, Rate, found_source
+from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, print_error, print_remarks, stderr, stdout
 from fogsim.cli.progress import counting_bar, progress_bar
 from fogsim.errors import InputError, printable
 
@@ -26,10 +27,7 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 
 def estimate_command(
-    images: Annotated[
-        list[str],
-        typer.Argument(metavar="IMAGES|VIDEO", help="Image files, folders, patterns like 'a/*.png', or a video."),
-    ],
+    images: Images,
     camera: Annotated[
         Path | None, typer.Option(help="camera.yaml: the calibration. Default: guessed from the images.")
     ] = None,
@@ -45,15 +43,8 @@ def estimate_command(
     overlay: Annotated[
         Path | None, typer.Option(help="Draw the results over the images: .mp4, or .png for one image.")
     ] = None,
-    sequence: Annotated[
-        bool | None,
-        typer.Option(
-            "--sequence/--stills", help="Read images as a sequence, or each by itself. Default: by their names."
-        ),
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option(min=1e-6, max=1e6, help="Images per second of a sequence. Default: 10.")
-    ] = None,
+    sequence: IsSequence = None,
+    rate: Rate = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an overlay, a plot or a guessed camera file.")
     ] = False,
@@ -98,7 +89,7 @@ def estimate_command(
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
-    from fogsim.offline import chosen_methods, find_source
+    from fogsim.offline import chosen_methods
 
     if track is None:
         _refuse_given({"--track-offset": track_offset or None}, "goes with --track")
@@ -110,7 +101,7 @@ def estimate_command(
         by_night = {"--night": night, "--lamps": lamps, "--setback": setback, "--head-lamps": head_lamps}
         unused = {**estimating, "--signs": signs, **by_night, "--halos": halos}
         _refuse_given(unused, "does not go with --guess-camera, which estimates no visibility")
-        _guess(find_source(images, sequence=sequence, rate=rate), camera, overwrite, guessing)
+        _guess(found_source(images, sequence, rate), camera, overwrite, guessing)
         return
     if camera is not None:
         guessing.refuse_all()
@@ -120,7 +111,7 @@ def estimate_command(
         raise InputError("--json and --csv both go to stdout: give one of them")
     drive = _night_drive(night, lamps, setback, head_lamps, halos)
     methods = chosen_methods(_methods(method, drive, mapped=signs is not None))
-    source = find_source(images, sequence=sequence, rate=rate)
+    source = found_source(images, sequence, rate)
     if overlay is None and not source.temporal:
         _refuse_given({"--rate": rate}, "is for a sequence or an overlay; these are stills, unless --sequence is given")
     outputs = _Outputs(as_json, as_csv, overlay, plot, overwrite)
@@ -296,6 +287,8 @@ def _each(
             if drawn:
                 drawn.add(result)
             progress.advance(task)
+            if stdout.quiet and not (drawn or outputs.plot):
+                break  # who read the results has gone
 
 
 def _check_plot(outputs: _Outputs, source: "Source") -> None:
@@ -377,8 +370,11 @@ class _Rows:
 
 def _say(line: str) -> None:
     # Through sys.stdout as it is now: on a terminal rich has put itself there, to move its bar out of the way.
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
+    try:
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        stdout.on_broken_pipe()
 
 
 def _guess(source: "Source", camera_file: Path, overwrite: bool, guessing: _Guessing) -> None:

@@ -67,6 +67,11 @@ def fog_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Add homogeneous fog to an image or video, by Koschmieder's law on light and slant range."""
+    from fogsim.core.files.readers import nearest_file
+
+    if not image.is_file():
+        lacking = "expected one image or video" if image.exists() else f"there is no such file{nearest_file(image)}"
+        raise InputError(f"{image}: {lacking}")
     light = None if airlight is None else pixel_values(airlight)
     layer = _layer(ground_albedo, layer_height)
     geometry = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}

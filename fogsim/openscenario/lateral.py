@@ -73,6 +73,11 @@ class Effect:
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
+    def conflicts(self, other: "Effect") -> bool:
+        """Whether another effect takes a subject's speed that changes for some time, or its trajectory, from it."""
+        taken = any(map(self.changes_speed, self.moved() & other.moved()))
+        return taken or any(self.has_path(one) and other.has_path(one) for one in self.do)
+
     def has_path(self, subject: str, has_times: bool | None = None) -> bool:
         """Whether a subject follows a trajectory: any, one with times, or one without."""
         path = None if subject in self.once_there else self.do.get(subject, {}).get("path")
@@ -111,7 +116,7 @@ class LateralActions:
         pace = {"distance_m": value} if by == "distance" else {"duration_s": _allowed(value)}
         effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
         effect.ends_itself = by == "distance"
-        offset = sense(begins) * action.number("targetLaneOffset", 0.0)
+        offset = self.positions.leftward(sense(begins)) * action.number("targetLaneOffset", 0.0)
         if offset or self._offset(actor):
             pace["offset_m"] = self.offsets[actor] = begins.shifted(offset).offset
         effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
@@ -119,7 +124,7 @@ class LateralActions:
     def lane_offset_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`change_lane` with `offset_m`, along half a wave of a cosine, at `maxLateralAcc` at most."""
         (dynamics, to), begins = self._parts(action), self._begin(actor)
-        offset, across, lanes = sense(begins) * to.number("value"), 0.0, {}
+        offset, across, lanes = self.positions.leftward(sense(begins)) * to.number("value"), 0.0, {}
         if to.tag.startswith("Relative"):
             name, other = self.vehicles.of(to).named, self.spots.get(to.get("entityRef"))
             offset += self._offset(to.get("entityRef"))
@@ -139,7 +144,8 @@ class LateralActions:
         if spot is None:
             message = "give a lane, or one by a vehicle that drives along its own"
             raise ValueError(f"{actor} drives against its lane: {message}")
-        offset = sense(spot) * (action.number("targetLaneOffset", 0.0) if is_change else value)
+        offset = action.number("targetLaneOffset", 0.0) if is_change else value
+        offset *= self.positions.leftward(sense(spot))
         if to.tag == "RelativeTargetLane":
             spot = self.positions.lanes.beside(spot, int(value))
         elif is_change:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.environment import Vehicle, Vehicles
-from fogsim.openscenario.parameters import Catalogs
+from fogsim.openscenario.parameters import Catalogs, is_of_carla
 from fogsim.openscenario.shapes import positions_of, sampled, shape_of
 from fogsim.openscenario.xml_tree import REFUSED, Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
@@ -155,7 +155,8 @@ class Positions:
         road, lane, s = node.get("roadId"), node.get("laneId"), node.number("s")
         if any(f"{road}_{lane}" in one.origins for one in self.lanes.lanes) or road not in self.lanes.roads:
             return self._shifted(self.lanes.on_lane(road, lane, s), node)
-        t = self.lanes.middle(road, lane, s) + node.number("offset", 0.0)
+        along = 1.0 if lane.startswith("-") else -1.0
+        t = self.lanes.middle(road, lane, s) + along * self.leftward(along) * node.number("offset", 0.0)
         return self.lanes.across(road, s, t)
 
     def road_position(self, node: Node) -> Point:
@@ -255,9 +256,13 @@ class Positions:
         points[-1].get("routeStrategy")
         return known[0], edges
 
+    def leftward(self, along: float) -> float:
+        """1 if offsets grow to the left of a lane, by its `sense`; for ScenarioRunner they grow to the right."""
+        return -1.0 if is_of_carla(self.catalogs.root) else along
+
     def _shifted(self, spot: Spot, node: Node, key: str = "offset") -> Spot | Point:
         """The place so far from its lane's middle, in the direction of t; beyond the lane a point."""
-        offset = sense(spot) * node.number(key, 0.0)
+        offset = self.leftward(sense(spot)) * node.number(key, 0.0)
         try:
             return spot.shifted(offset)
         except ValueError:

@@ -19,7 +19,8 @@ from fogsim.openscenario.initial import Beginning
 from fogsim.openscenario.lateral import MOTION
 from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
-from fogsim.openscenario.storyboard import Storyboard, free_name
+from fogsim.openscenario.states import free_name
+from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import NEAR_THE_END, Trigger, Triggers, timeline_entry
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.appearance import BODY_PARAMETER

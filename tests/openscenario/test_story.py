@@ -197,12 +197,6 @@ def test_what_is_repeated_ends_each_time(tmp_path: Path) -> None:
         assert steps[-1].time == pytest.approx(ends, abs=0.41)
 
 
-def test_what_is_repeated_begins_again_once_it_is_overridden(tmp_path: Path) -> None:
-    events = event("up", speed(30, linear(8)), after(1.0), count=2) + event("down", speed(10), after(3.0))
-    times = begun(run(_two_cars(tmp_path, events, after(4.0))))
-    assert (times["down"], times["up_2"]) == pytest.approx((3.0, 3.1), abs=0.21)
-
-
 def test_a_speed_that_another_event_replaces_is_over(tmp_path: Path) -> None:
     up = event("up", speed(40, RATE), after(1.0))
     down = event("down", speed(10, linear(1)), after(2.0)).replace("override", "parallel")
@@ -298,7 +292,7 @@ def test_each_condition_of_a_group_has_its_delay(tmp_path: Path) -> None:
     file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + second}, visibility=5000.0)
     times = begun(run(file))
     assert times["second"] - times["first"] == pytest.approx(2.0, abs=0.31)
-    second = event("second", speed(5), group(state("event", "first", "startTransition"), _faster_than(10, delay=2.5)))
+    second = event("second", speed(5), group(state("event", "first", "completeState"), _faster_than(10, delay=2.5)))
     file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + second}, visibility=5000.0)
     times = begun(run(file))
     # It was so fast from the beginning, which was 2.5 s ago.

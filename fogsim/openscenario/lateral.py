@@ -100,6 +100,8 @@ class LateralActions:
         value = node.number("value", 0.0 if shape == "step" else None, is_finite=by != "rate")
         if shape != "step":
             by = node.word("dynamicsDimension", ("time", "rate", "distance"))
+        if shape == "step" and value and by != "rate":
+            node.remark(f"value: a step is over at once; {value:g} is left out")
         is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
         return None if is_at_once else (shape, by, abs(value))
 
@@ -107,6 +109,7 @@ class LateralActions:
         """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
         dynamics, to = self._parts(action)
         shape, by, value = self.dynamics(dynamics) or ("step", "time", 0.0)
+        _name_curve(dynamics, shape)
         if by == "rate" and value == 0.0:
             dynamics.refuse("value: expected a rate above 0")
         begins = self._begin(actor)
@@ -155,6 +158,7 @@ class LateralActions:
         across = (to_y - y) * math.cos(heading) - (to_x - x) * math.sin(heading)
         if is_change:
             shape, by, value = self.dynamics(dynamics) or ("step", "time", 0.0)
+            _name_curve(dynamics, shape)
             if by == "distance":
                 raise ValueError(f"dynamicsDimension: {actor} drives against its lane; give a time or rate")
             lasts = value if by == "time" else STEEPEST[shape] * abs(across) / (value or 1.0)
@@ -189,6 +193,7 @@ class LateralActions:
         """Time that so wide a move [m] takes along half a wave of a cosine at `maxLateralAcc` at most [s]."""
         shape = dynamics.word("dynamicsShape", tuple(SHAPES))
         most = dynamics.number("maxLateralAcc", math.inf, is_finite=False)
+        _name_curve(dynamics, shape)
         return 0.0 if shape == "step" or not across else math.pi * math.sqrt(0.5 * across / max(most, _TINY))
 
     def _across(self, to: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
@@ -229,6 +234,11 @@ class LateralActions:
         road = road_of(spot)
         there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
         return there == {f"{road}_1", f"{road}_-1"}
+
+
+def _name_curve(dynamics: Node, shape: str) -> None:
+    if shape == "linear":
+        dynamics.remark("dynamicsShape: vehicles move across along a smooth curve; linear is read as sinusoidal")
 
 
 def _allowed(time: float) -> float:

@@ -13,6 +13,7 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any
 _ON_PATH = 0.5  # Distance up to which a position is on a path [m]
+_ASIDE = 0.3  # Distance across up to which a lane is where its file has it [m]
 ALONG = math.cos(0.3)  # Of the angle to a lane at which a vehicle still stands along it
 
 
@@ -154,7 +155,14 @@ class Positions:
         """That lane at s, and `offset` from its middle."""
         road, lane, s = node.get("roadId"), node.get("laneId"), node.number("s")
         if any(f"{road}_{lane}" in one.origins for one in self.lanes.lanes) or road not in self.lanes.roads:
-            return self._shifted(self.lanes.on_lane(road, lane, s), node)
+            spot = self.lanes.on_lane(road, lane, s)
+            x, y, heading = spot.world
+            there_x, there_y, _ = self.lanes.across(road, s, self.lanes.middle(road, lane, s))
+            aside = (there_y - y) * math.cos(heading) - (there_x - x) * math.sin(heading)
+            if abs(aside) > _ASIDE:
+                where = f"{abs(aside):.1f} m to the {'left' if aside > 0.0 else 'right'} of where FogSim has it"
+                node.remark(f"lane {lane} is {where}: netconvert gives lanes that widen, or shift, one width and place")
+            return self._shifted(spot, node)
         along = 1.0 if lane.startswith("-") else -1.0
         t = self.lanes.middle(road, lane, s) + along * self.leftward(along) * node.number("offset", 0.0)
         return self.lanes.across(road, s, t)

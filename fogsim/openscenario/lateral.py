@@ -1,10 +1,11 @@
 """What an event does, and actions across lanes: changes of lane, and places within lanes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from fogsim.openscenario.parameters import is_of_carla
 from fogsim.openscenario.positions import Positions, road_of, sense
 from fogsim.openscenario.xml_tree import Node, NodeError
 from fogsim.traffic.road.opendrive_lanes import Spot
@@ -33,20 +34,24 @@ class Effect:
     once_there: dict[str, dict[str, Any]] = field(default_factory=dict)  # For vehicles that it brings onto the road
     is_at_start: bool = False
     reached: dict[str, str] = field(default_factory=dict)  # When an actor keeps its speed again
+    added: set[tuple[str, str]] = field(default_factory=set)  # Subjects and keys of its own blocks
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
+        self.added.update((subject, key) for key in blocks)
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
 
     def part(self) -> "Effect":
         """Effect of one of several actions: it does all of it, and its end is its own; `join` adds the end."""
-        return replace(self, lasts=0.0, ends=[], ends_itself=False, is_endless=False, has_unknown_end=False)
+        new = replace(self, lasts=0.0, ends=[], ends_itself=False, is_endless=False, has_unknown_end=False)
+        return replace(new, added=set())
 
     def join(self, part: "Effect") -> None:
         """Last as long as a part, too."""
         self.lasts, self.ends = max(self.lasts, part.lasts), [*self.ends, *part.ends]
+        self.added |= part.added
         self.ends_itself |= part.ends_itself
         self.is_endless |= part.is_endless
         self.has_unknown_end |= part.has_unknown_end
@@ -73,15 +78,30 @@ class Effect:
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
-    def conflicts(self, other: "Effect") -> bool:
-        """Whether another effect takes a subject's speed that changes for some time, or its trajectory, from it."""
-        taken = any(map(self.changes_speed, self.moved() & other.moved()))
-        return taken or any(self.has_path(one) and other.has_path(one) for one in self.do)
+    def ordered(self) -> set[tuple[str, str]]:
+        """Subjects, and what of each it orders: ``speed``, ``path``, ``change_lane`` or others."""
+        return {(subject, "speed" if key in MOTION else key) for subject, key in self.added}
+
+    def lasting(self) -> set[tuple[str, str]]:
+        """Those that are ``ordered`` and take some time."""
+        return {(one, key) for one, key in self.ordered() if key in _TIMED and _TIMED[key](self, one)}
+
+    def moves_across(self, subject: str) -> bool:
+        """Whether a subject changes lane, or moves in its lane, for some time."""
+        move = self.do.get(subject, {}).get("change_lane", {})
+        return "distance_m" in move or move.get("duration_s", 0.0) > 0.0
 
     def has_path(self, subject: str, has_times: bool | None = None) -> bool:
         """Whether a subject follows a trajectory: any, one with times, or one without."""
         path = None if subject in self.once_there else self.do.get(subject, {}).get("path")
         return path is not None and has_times in (None, "at_s" in path)
+
+
+_TIMED: Mapping[str, Callable[[Effect, str], bool]] = {
+    "speed": Effect.changes_speed,
+    "path": Effect.has_path,
+    "change_lane": Effect.moves_across,
+}
 
 
 @dataclass
@@ -100,8 +120,10 @@ class LateralActions:
         value = node.number("value", 0.0 if shape == "step" else None, is_finite=by != "rate")
         if shape != "step":
             by = node.word("dynamicsDimension", ("time", "rate", "distance"))
-        if shape == "step" and value and by != "rate":
-            node.remark(f"value: a step is over at once; {value:g} is left out")
+        if shape == "step" and value and is_of_carla(self.positions.catalogs.root):
+            node.remark(f"value: ScenarioRunner's action lasts for {value:g} ({by}); here a step is over at once")
+        if value < 0.0 and by != "rate":
+            node.refuse(f"value: expected 0 or more, got {value:g}")
         is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
         return None if is_at_once else (shape, by, abs(value))
 

@@ -28,6 +28,7 @@ class Entry:
     effect: Effect = field(default_factory=Effect)
     parts: dict[int, Effect] = field(default_factory=dict)  # Of several actions, by the identity of their elements
     trigger: Trigger = NEVER
+    skipped: str = ""  # Name of the entry that it is skipped, of one that may be
 
 
 @dataclass
@@ -144,25 +145,29 @@ class States:
 
     def _played(self, entry: Entry, part: Node | None = None, name: str = "", is_regular: bool = False) -> str:
         """Condition that an execution of an event (default: the last one) is over, or of an action that is its part."""
-        is_action, effect = False, None
-        if part is not None and part.tag == "Action":
-            is_action, effect = True, entry.parts.get(id(part))
+        is_action = part is not None and part.tag == "Action"
+        effect = entry.parts.get(id(part)) if is_action else None
         ended, cut = self._ends(entry, name or entry.names[-1], effect, is_action=is_action)
         parts = ended if is_regular and name else [*ended, *cut]
         for before in () if name else entry.names[:-1]:
             # What is overridden is not played again.
-            ended, cut = self._ends(entry, before, effect)
+            ended, cut = self._ends(entry, before)
             parts = parts + [f"({one} and not ({either(ended)}))" for one in cut]
-        return either(parts)
+        return either(parts + [f"happened({entry.skipped})"] * bool(entry.skipped and not name))
 
     def _ends(
         self, entry: Entry, name: str, effect: Effect | None = None, *, is_action: bool = False
     ) -> tuple[list[str], list[str]]:
         """Conditions that an execution of an event, or one of its actions, has ended by itself, or is overridden."""
+        if effect is None and entry.parts and not entry.effect.is_endless:
+            each = [self._ends(entry, name, part) for part in entry.parts.values()]
+            return [" and ".join(dict.fromkeys(either(one) for one, _ in each))], list(
+                dict.fromkeys(one for _, cut in each for one in cut)
+            )
         effect = effect or entry.effect
         if (key := (name, id(effect), is_action)) in self._known_ends:
             return self._known_ends[key]
-        own, (cut, replaced) = self._own_end(entry, name, effect), self._cuts(entry, name)
+        own, (cut, replaced) = self._own_end(entry, name, effect), self._cuts(entry, name, effect)
         if is_action:
             cut, replaced = [*cut, *replaced], []
         if own and not effect.ends:
@@ -190,17 +195,19 @@ class States:
             phrase = f"{phrase} for {effect.lasts:g} s"
         return [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
 
-    def _cuts(self, entry: Entry, name: str) -> tuple[list[str], list[str]]:
-        """When an execution of an event whose changes of speed would go on is overridden, and when replaced."""
-        effect, above = entry.effect, entry.node.above
-        goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
+    def _cuts(self, entry: Entry, name: str, effect: Effect) -> tuple[list[str], list[str]]:
+        """When what an execution of an event does would go on but is overridden, and when it is replaced."""
+        above, lasting = entry.node.above, effect.lasting()
+        # Changes of lane are completed.
+        is_cut = effect.is_endless or any(key != "change_lane" for _, key in lasting)
         begun = f"(happened({name}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
         overridden, replaced = list[str](), list[str]()
-        for one in (one for one in self.entries.values() if goes_on and one is not entry):
+        for one in (one for one in self.entries.values() if one is not entry):
+            # An action that another one replaces for an actor ends for all.
+            is_replaced = bool(lasting & one.effect.ordered())
             if one.node.above is above and one.node.get("priority") not in GENTLE:
-                overridden += map(begun.format, one.names)
-            elif effect.conflicts(one.effect):
-                # An action that another one replaces for an actor ends for all.
+                overridden += map(begun.format, one.names if is_cut or is_replaced else ())
+            elif is_replaced:
                 replaced += map(begun.format, one.names)
         return overridden, replaced
 
@@ -218,7 +225,7 @@ class States:
     def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
         """Condition that a trigger has fired: an entry of the timeline without action."""
         taken = {mark["name"] for _, mark in self.triggers.marks}
-        name = free_name(wanted, taken.union(*(one.names for one in self.entries.values())))
+        name = free_name(wanted, taken.union(*([*one.names, one.skipped] for one in self.entries.values())))
         self.triggers.marks.append(timeline_entry(node, name, trigger, {}))
         return f"happened({name})"
 

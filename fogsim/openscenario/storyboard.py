@@ -115,6 +115,10 @@ class Storyboard(States):
         taken = {name for one in self.entries.values() for name in one.names}
         stopped = [act for act in self._acts if any(one.children for one in act.all("StopTrigger"))]
         self._stops = {id(act): free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
+        for entry in self.entries.values():
+            if entry.node.get("priority") == "skip" and len(entry.names) == 1 and self._others(entry):
+                entry.skipped = free_name(f"{entry.names[0]}_skipped", taken)
+                taken.add(entry.skipped)
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
         comes: list[TimelineEntry] = []
@@ -178,7 +182,13 @@ class Storyboard(States):
                 running += [f"(happened({name}) and not ({self._played(one, None, name)}))" for name in one.names]
                 if earlier and one.trigger.condition:
                     running.append(f"({fires(one.trigger)} and not happened({one.names[0]}))")
-        return Trigger(f"{fires(entry.trigger)} and not ({' or '.join(running)})")
+        fired, runs = fires(entry.trigger), " or ".join(running)
+        if len(entry.names) > 1:
+            entry.node.remark("maximumExecutionCount: it counts executions, and not how often the event is skipped")
+            return Trigger(f"{fired} and not ({runs})")
+        skipped = Trigger(f"{fired} and not happened({entry.names[0]}) and ({runs})")
+        self.triggers.marks.append(timeline_entry(entry.node, entry.skipped, skipped, {}))
+        return Trigger(f"{fired} and not ({runs}) and not happened({entry.skipped})")
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
         """What an event does to others that run: those that it replaces for an actor end for all; see `_override`."""
@@ -186,9 +196,11 @@ class Storyboard(States):
             return []
         ended = [] if entry.node.get("priority") in GENTLE else self._override(entry)
         for one in self.entries.values():
-            if one is not entry and one.effect.conflicts(entry.effect):
-                slow = sorted(one.effect.moved() - entry.effect.moved())
-                ended.append((self._held(slow), [one] * any(map(one.effect.changes_speed, slow))))
+            for effect in [*one.parts.values()] or [one.effect]:
+                speeds = {actor for actor, key in effect.lasting() if key == "speed"}
+                if one is not entry and speeds & entry.effect.moved():
+                    slow = sorted(speeds - entry.effect.moved())
+                    ended.append((self._held(slow), [one] * bool(slow)))
         written: list[TimelineEntry] = []
         for done, others in ended:
             for running in joined_by((part for one in others for part in self._running(one)), " or "):

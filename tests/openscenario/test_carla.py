@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, DATA, PERSON, TIMED, TWO_LANES, after, changes_lane, event, follows, lane, motion_at, run, speed, trajectory,
-    world, write,
+    CAR, DATA, PERSON, TIMED, TWO_LANES, after, changes_lane, event, follows, lane, linear, motion_at, run, speed,
+    trajectory, world, write,
 )  # fmt: skip
 
 
@@ -52,3 +52,10 @@ def test_positions_in_catalogs_are_mirrored_once_their_parameters_have_values(tm
     done = (one["do"].get("Ann", {}) for one in read_openscenario(file).data["timeline"])
     (points,) = [one["path"]["points"] for one in done if "path" in one]
     assert [point[1] for point in points] == [-9.0, 9.0]
+
+
+def test_a_step_that_lasts_is_remarked(tmp_path: Path) -> None:
+    slow = event("slow", speed(5, linear(50, "distance").replace("linear", "step")), after(1.0))
+    file = _of_carla(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(10)}"}, {"Ego": slow}))
+    with pytest.warns(LeftOutWarning, match=r"ScenarioRunner's action lasts for 50 \(distance\)"):
+        read_openscenario(file)

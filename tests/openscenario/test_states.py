@@ -8,7 +8,7 @@ from fogsim.errors import LeftOutWarning
 from fogsim.openscenario import read_openscenario
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, after, begun, event, group, lane, linear, motion_at, on, run, speed, state, write,
+    CAR, after, begun, changes_lane, event, group, lane, linear, motion_at, on, run, speed, state, write,
 )  # fmt: skip
 
 
@@ -100,3 +100,20 @@ def test_a_time_that_is_past_when_its_act_begins_has_no_edge(tmp_path: Path) -> 
     file.write_text(text.format(f"</ManeuverGroup><StartTrigger>{after(3.0)}", ""), encoding="utf-8")
     with pytest.warns(LeftOutWarning, match=r"conditionEdge: it holds before its act begins at 3 s"):
         read_openscenario(file)
+
+
+def test_an_event_of_several_actions_ends_with_the_last_of_them(tmp_path: Path) -> None:
+    across = f"</Action><Action name='across'>{changes_lane(1, 'time', 4.0)}</Action>"
+    up = event("up", speed(30, linear(20)), after(1.0)).replace("</Action>", across, 1)
+    story = {"Lead": f"{up}</Maneuver><Maneuver name='n'>{event('down', speed(9), after(2.0))}"}
+    ends = [state("action", "up action", "completeState"), state("event", "up", "endTransition")]
+    story["Ego"] = "".join(event(name, speed(4), group(one)) for name, one in zip(("first", "both"), ends, strict=True))
+    times = begun(run(_three(tmp_path, story, 6.0)))
+    assert (times["first"], times["both"]) == pytest.approx((2.1, 5.0), abs=0.21)
+
+
+def test_a_change_of_lane_ends_once_another_one_begins(tmp_path: Path) -> None:
+    events = event("up", changes_lane(1, "time", 5.0), after(1.0)) + "</Maneuver><Maneuver name='n'>"
+    events += event("back", changes_lane(-1, "time", 2.0), after(3.0))
+    times = begun(run(_three(tmp_path, {"Lead": events, **_in_turn("endTransition")}, 6.0)))
+    assert times["at_endTransition"] == pytest.approx(3.1, abs=0.21)

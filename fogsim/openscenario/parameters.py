@@ -212,6 +212,8 @@ def to_standard(root: Node, entry: Node | None = None) -> None:
     """Give a file for ScenarioRunner, or a catalog's entry in it, the format's axes, and leave out criteria."""
     nodes = list((entry or root).walk()) if is_of_carla(root) else []
     for node in nodes:
+        if node.tag == "Orientation":
+            node.attributes.setdefault("type", "relative")
         mirrored = _MIRRORED if node.tag.endswith(("Position", "Orientation")) else _COUNTED.get(node.tag, set())
         for key in node.attributes.keys() & mirrored:
             # What is no number is found where it is read.

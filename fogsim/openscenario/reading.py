@@ -170,7 +170,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
         **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
         "timeline": timeline,
         **_ending(stop, timeline, storyboard),
-        "expect": {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()},
+        "expect": {name: {"happened": name} for name in story.expected(stop)},
     }
     return ScenarioData(data, {("timeline", i): node.line for i, (node, _) in enumerate(entries, start=len(first))})
 

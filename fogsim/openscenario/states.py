@@ -139,8 +139,9 @@ class States:
             if len(joined) > 1:
                 joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
             phrase = " and ".join(joined)
-            stop = None if is_regular else self._stops.get(id(act))
-            phrases += [f"(({phrase}) or happened({stop}))" if stop else phrase] * bool(entries)
+            if stop := self._stops.get(id(act)):
+                phrase = f"(({phrase}) {'and not' if is_regular else 'or'} happened({stop}))"
+            phrases += [phrase] * bool(entries)
         return " and ".join(phrases) if phrases else AT_ONCE.condition
 
     def _played(self, entry: Entry, part: Node | None = None, name: str = "", is_regular: bool = False) -> str:

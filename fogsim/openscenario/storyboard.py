@@ -1,5 +1,6 @@
 """The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -123,7 +124,7 @@ class Storyboard(States):
         written: list[TimelineEntry] = []
         comes: list[TimelineEntry] = []
         for act in self._acts:
-            until = self._until(act)
+            until, ends = self._until(act)
             self.triggers.since = self._begins[id(act)]
             for entry in (one for one in self.entries.values() if one.group.above is act):
                 own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
@@ -135,9 +136,15 @@ class Storyboard(States):
                     happened = Trigger(f"happened({name})")
                     done = entry.effect.once_there
                     comes.append(timeline_entry(entry.node, f"{name}_once_there", happened, done, until))
+            written += ends
             self.triggers.since = AT_ONCE
         # What other events order of who comes in the same step counts more.
         return comes + written
+
+    def expected(self, stop: Trigger | None) -> list[str]:
+        """Names of the events that begin unless the run's time is up first."""
+        end = math.inf if stop is None or stop.at is None else stop.at
+        return [one.names[0] for one in self.entries.values() if one.trigger.at is None or one.trigger.at < end]
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
         written, node, effect = [], entry.node, entry.effect
@@ -214,7 +221,7 @@ class Storyboard(States):
         known, orders = self.actions.vehicles, entry.effect.do
         slow = [one for one in entry.actors if one in known and not orders.get(one, {}).keys() & MOTION]
         left = [one for one in entry.actors if one in known and "path" not in orders.get(one, {})]
-        held, ends = self._held(slow), {one: {"path": _left(known[one])} for one in left}
+        held, ends = self._held(slow), self._left(left)
         # Whose trajectory has times has no other speed.
         stays = {one: {**held.get(one, {}), **end} for one, end in ends.items()}
         others = self._others(entry)
@@ -224,19 +231,32 @@ class Storyboard(States):
         )
         return [(held, fast), (stays, timed), (ends, untimed)]
 
-    def _until(self, act: Node) -> str:
-        """Condition for events in addition to their triggers: their act has not been stopped."""
+    def _until(self, act: Node) -> tuple[str, list[TimelineEntry]]:
+        """Condition for events in addition to their triggers: their act is not stopped; and how those that run end."""
         stop = self.triggers.trigger(act.one("StopTrigger"))
         if stop is None or not stop.condition:
-            return ""
-        name = self._stops[id(act)]
+            return "", []
+        name, written = self._stops[id(act)], list[TimelineEntry]()
         self.triggers.marks.append(timeline_entry(act, name, stop, {}))
-        return f"not happened({name})" if stop.at is None else f"time < {max(stop.at, 0.0):g} s"
+        for entry in (one for one in self.entries.values() if one.group.above is act):
+            left = [one for one, key in entry.effect.lasting() if key == "path"]
+            slow = {one for one, key in entry.effect.lasting() if key == "speed"}
+            done = self._held(sorted(slow.union(one for one in left if entry.effect.has_path(one, has_times=True))))
+            for one, path in self._left(sorted(left)).items():
+                done[one] = {**done.get(one, {}), **path}
+            for running in joined_by(self._running(entry), " or ") if done else ():
+                when = Trigger(f"{fires(stop)} and not happened({name}) and ({running})")
+                written.append(timeline_entry(act, f"{entry.names[0]}_stopped_{len(written) + 1}", when, done))
+        return f"not happened({name})" if stop.at is None else f"time < {max(stop.at, 0.0):g} s", written
 
     def _held(self, actors: Iterable[str]) -> dict[str, Any]:
         """Blocks of a timeline that keep speeds as they are."""
         known = self.actions.vehicles
         return {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors}
+
+    def _left(self, actors: Iterable[str]) -> dict[str, Any]:
+        """Blocks of a timeline that end trajectories."""
+        return {one: {"path": _left(self.actions.vehicles[one])} for one in actors}
 
 
 def _left(vehicle: Vehicle) -> dict[str, Any]:

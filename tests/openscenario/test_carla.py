@@ -59,3 +59,10 @@ def test_a_step_that_lasts_is_remarked(tmp_path: Path) -> None:
     file = _of_carla(write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(10)}"}, {"Ego": slow}))
     with pytest.warns(LeftOutWarning, match=r"ScenarioRunner's action lasts for 50 \(distance\)"):
         read_openscenario(file)
+
+
+def test_orientations_are_relative(tmp_path: Path) -> None:
+    place = lane(400, 1).replace("/></Position>", '><Orientation h="0"/></LanePosition></Position>')
+    begin = {"Ego": lane(30), "Far": f"{place}\n{speed(10)}"}
+    steps = run(_of_carla(write(tmp_path, {"Ego": CAR, "Far": CAR}, begin, stop=after(2.0))))
+    assert motion_at(steps, 1.9, "Far")[0] == pytest.approx(400.0 - 3.7 - 19.0, abs=0.2)

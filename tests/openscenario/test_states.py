@@ -117,3 +117,21 @@ def test_a_change_of_lane_ends_once_another_one_begins(tmp_path: Path) -> None:
     events += event("back", changes_lane(-1, "time", 2.0), after(3.0))
     times = begun(run(_three(tmp_path, {"Lead": events, **_in_turn("endTransition")}, 6.0)))
     assert times["at_endTransition"] == pytest.approx(3.1, abs=0.21)
+
+
+def test_what_runs_when_its_act_is_stopped_ends_there(tmp_path: Path) -> None:
+    story = {"Lead": event("up", speed(20, linear(10)), after(1.0)), **_in_turn("endTransition", "completeState")}
+    file = _three(tmp_path, story, 12.0)
+    text = file.read_text(encoding="utf-8")
+    stopped = f"</ManeuverGroup><StartTrigger>{after(0)}</StartTrigger><StopTrigger>{after(3)}</StopTrigger></Act>"
+    text = text.replace("</ManeuverGroup>", f'{stopped}<Act name="b">', 1)
+    file.write_text(text, encoding="utf-8")
+    steps = run(file)
+    assert motion_at(steps, 6.0, "Lead")[2] == pytest.approx(12.0, abs=0.15)
+    assert begun(steps)["at_completeState"] == pytest.approx(3.1, abs=0.21)
+    assert "at_endTransition" not in begun(steps)
+
+
+def test_what_begins_after_the_end_of_the_run_is_not_expected(tmp_path: Path) -> None:
+    events = event("soon", speed(5), after(1.0)) + event("never", speed(5), after(10000.0))
+    assert [*read_openscenario(_three(tmp_path, {"Ego": events}, 6.0)).data["expect"]] == ["soon"]

@@ -1,7 +1,7 @@
 """What an event does, and actions across lanes: changes of lane, and places within lanes."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic
 STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 MOTION = {"speed", "follow", "arrive"}  # Keys of blocks that order a speed
+_WAYS = {**dict.fromkeys(MOTION, "along"), "change_lane": "across", "path": "across"}
 _TINY = 1e-9  # Lateral acceleration that is none [m/s²]
 _LONGEST = 60.0  # Most time that a move across takes [s]
 
@@ -78,13 +79,20 @@ class Effect:
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
+    def paths(self) -> set[str]:
+        """Subjects that follow trajectories by its own blocks."""
+        return {subject for subject, key in self.added if key == "path" and self.has_path(subject)}
+
     def ordered(self) -> set[tuple[str, str]]:
-        """Subjects, and what of each it orders: ``speed``, ``path``, ``change_lane`` or others."""
-        return {(subject, "speed" if key in MOTION else key) for subject, key in self.added}
+        """Subjects, and in which ways it orders each one's motion: ``along`` or ``across``, one order each."""
+        found = {(subject, _WAYS[key]) for subject, key in self.added if key in _WAYS}
+        return found | {(one, "along") for one in self.paths() if self.has_path(one, has_times=True)}
 
     def lasting(self) -> set[tuple[str, str]]:
         """Those that are ``ordered`` and take some time."""
-        return {(one, key) for one, key in self.ordered() if key in _TIMED and _TIMED[key](self, one)}
+        moving = {(one, "along") for one in self.do if self.changes_speed(one)}
+        moving |= {(one, "across") for one in self.do if self.moves_across(one)}
+        return {(one, way) for one, way in self.ordered() if one in self.paths() or (one, way) in moving}
 
     def moves_across(self, subject: str) -> bool:
         """Whether a subject changes lane, or moves in its lane, for some time."""
@@ -95,13 +103,6 @@ class Effect:
         """Whether a subject follows a trajectory: any, one with times, or one without."""
         path = None if subject in self.once_there else self.do.get(subject, {}).get("path")
         return path is not None and has_times in (None, "at_s" in path)
-
-
-_TIMED: Mapping[str, Callable[[Effect, str], bool]] = {
-    "speed": Effect.changes_speed,
-    "path": Effect.has_path,
-    "change_lane": Effect.moves_across,
-}
 
 
 @dataclass

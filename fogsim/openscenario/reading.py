@@ -121,7 +121,7 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
     groups = [one for one in storyboard.walk() if one.tag == "Actors"]
     actors = {name for group in groups for name in vehicles.selected(group.all("EntityRef"))}
     positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.moves(name))}
-    story.initial = begin.effect.sets
+    story.beginning = begin.effect
     story.find_events(storyboard)
     return begin
 

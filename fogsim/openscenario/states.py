@@ -39,7 +39,7 @@ class States:
     root: Node
     triggers: Triggers = field(init=False)
     entries: dict[int, Entry] = field(default_factory=dict)
-    initial: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables that Init sets
+    beginning: Effect = field(default_factory=Effect)  # Of Init
     _begins: dict[int, Trigger] = field(default_factory=dict)
     _stops: dict[int, str] = field(default_factory=dict)  # Names of entries that stop acts
     _known_ends: dict[tuple[str, int, bool], tuple[list[str], list[str]]] = field(default_factory=dict)
@@ -95,7 +95,7 @@ class States:
         setters = [entry for entry in self.entries.values() if name in entry.effect.sets]
         if not (values := self._declared(node)):
             raise NodeError(node, f"there is no {node.tag.removesuffix('Condition').lower()} {name!r}")
-        holds = fits(self.initial.get(name, values[0]), node)
+        holds = fits(self.beginning.sets.get(name, values[0]), node)
         if {fits(entry.effect.sets[name], node) for entry in setters} <= {holds}:
             return AT_ONCE if holds else Trigger("time < 0 s")
         if len(setters) > 1:
@@ -200,7 +200,7 @@ class States:
         """When what an execution of an event does would go on but is overridden, and when it is replaced."""
         above, lasting = entry.node.above, effect.lasting()
         # Changes of lane are completed.
-        is_cut = effect.is_endless or any(key != "change_lane" for _, key in lasting)
+        is_cut = effect.is_endless or effect.paths() or any(way == "along" for _, way in lasting)
         begun = f"(happened({name}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
         overridden, replaced = list[str](), list[str]()
         for one in (one for one in self.entries.values() if one is not entry):

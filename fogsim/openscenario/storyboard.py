@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fogsim.openscenario.environment import Vehicle
-from fogsim.openscenario.lateral import MOTION
+from fogsim.openscenario.lateral import MOTION, Effect
 from fogsim.openscenario.parameters import fits
 from fogsim.openscenario.states import GENTLE, Entry, States, either, free_name, joined_by
 from fogsim.openscenario.triggers import AT_ONCE, TimelineEntry, Trigger, both, fires, timeline_entry
@@ -15,6 +15,7 @@ from fogsim.openscenario.xml_tree import Node
 _MOST_TIMES = 100
 _STRAIGHT, _SHORT = 1000.0, 0.01  # Lengths of paths [m]
 _REFERENCE = "CatalogReference"
+_Ended = tuple[dict[str, Any], list[Entry | str]]  # Blocks of a timeline, and the events that they end, or conditions
 
 
 @dataclass
@@ -198,25 +199,48 @@ class Storyboard(States):
         return Trigger(f"{fired} and not ({runs}) and not happened({entry.skipped})")
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
-        """What an event does to others that run: those that it replaces for an actor end for all; see `_override`."""
+        """What an event does to others that run: it overrides those of its maneuver, or replaces actions of others."""
         if not trigger.condition:
             return []
-        ended = [] if entry.node.get("priority") in GENTLE else self._override(entry)
+        overrides = entry.node.get("priority") not in GENTLE
+        ended = [*self._from_init(entry.effect), *(self._override(entry) if overrides else ())]
+        beside = self._others(entry) if overrides else []
         for one in self.entries.values():
-            for effect in [*one.parts.values()] or [one.effect]:
-                speeds = {actor for actor, key in effect.lasting() if key == "speed"}
-                if one is not entry and speeds & entry.effect.moved():
-                    slow = sorted(speeds - entry.effect.moved())
-                    ended.append((self._held(slow), [one] * bool(slow)))
+            if not any(one is other for other in (entry, *beside)):
+                effects = [*one.parts.values()] or [one.effect]
+                ended += [(self._replaced(effect, entry.effect), [one]) for effect in effects]
         written: list[TimelineEntry] = []
         for done, others in ended:
-            for running in joined_by((part for one in others for part in self._running(one)), " or "):
-                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({running})")
+            running = (part for one in others for part in ([one] if isinstance(one, str) else self._running(one)))
+            for condition in joined_by(running, " or ") if done else ():
+                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({condition})")
                 called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
                 written.append(timeline_entry(entry.node, called, when, done, until))
         return written
 
-    def _override(self, entry: Entry) -> list[tuple[dict[str, Any], list[Entry]]]:
+    def _from_init(self, by: Effect) -> list[_Ended]:
+        """How trajectories of Init end that an event replaces."""
+        ended: list[_Ended] = []
+        for one in sorted(self.beginning.paths() - by.paths()):
+            ways = {way for _, way in by.ordered() if (one, way) in by.ordered() & self.beginning.ordered()}
+            if ways:
+                slow = {one} if self.beginning.has_path(one, has_times=True) and "along" not in ways else set[str]()
+                times = self.beginning.do[one]["path"].get("at_s", [math.inf])
+                done = {one: {**self._held(slow).get(one, {}), **self._left({one})[one]}}
+                ended.append((done, [f"time < {times[-1]:g} s" if math.isfinite(times[-1]) else "time >= 0 s"]))
+        return ended
+
+    def _replaced(self, effect: Effect, by: Effect) -> dict[str, Any]:
+        """How an action that another one replaces for an actor ends for all, unless that orders their motion."""
+        lasting, ordered = effect.lasting(), by.ordered()
+        if not lasting & ordered:
+            return {}
+        done = self._held({one for one, way in lasting if way == "along" and (one, way) not in ordered})
+        for one, path in self._left(effect.paths() - by.paths()).items():
+            done[one] = {**done.get(one, {}), **path}
+        return done
+
+    def _override(self, entry: Entry) -> list[_Ended]:
         """What an overriding event does to others of its maneuver: speeds stay as they are, and paths end."""
         known, orders = self.actions.vehicles, entry.effect.do
         slow = [one for one in entry.actors if one in known and not orders.get(one, {}).keys() & MOTION]
@@ -229,7 +253,7 @@ class Storyboard(States):
         timed, untimed = (
             [one for one in others if any(one.effect.has_path(name, has) for name in left)] for has in (True, False)
         )
-        return [(held, fast), (stays, timed), (ends, untimed)]
+        return [(held, [*fast]), (stays, [*timed]), (ends, [*untimed])]
 
     def _until(self, act: Node) -> tuple[str, list[TimelineEntry]]:
         """Condition for events in addition to their triggers: their act is not stopped; and how those that run end."""
@@ -239,10 +263,8 @@ class Storyboard(States):
         name, written = self._stops[id(act)], list[TimelineEntry]()
         self.triggers.marks.append(timeline_entry(act, name, stop, {}))
         for entry in (one for one in self.entries.values() if one.group.above is act):
-            left = [one for one, key in entry.effect.lasting() if key == "path"]
-            slow = {one for one, key in entry.effect.lasting() if key == "speed"}
-            done = self._held(sorted(slow.union(one for one in left if entry.effect.has_path(one, has_times=True))))
-            for one, path in self._left(sorted(left)).items():
+            done = self._held({one for one, way in entry.effect.lasting() if way == "along"})
+            for one, path in self._left(entry.effect.paths()).items():
                 done[one] = {**done.get(one, {}), **path}
             for running in joined_by(self._running(entry), " or ") if done else ():
                 when = Trigger(f"{fires(stop)} and not happened({name}) and ({running})")
@@ -252,11 +274,11 @@ class Storyboard(States):
     def _held(self, actors: Iterable[str]) -> dict[str, Any]:
         """Blocks of a timeline that keep speeds as they are."""
         known = self.actions.vehicles
-        return {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors}
+        return {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in sorted(actors)}
 
     def _left(self, actors: Iterable[str]) -> dict[str, Any]:
         """Blocks of a timeline that end trajectories."""
-        return {one: {"path": _left(self.actions.vehicles[one])} for one in actors}
+        return {one: {"path": _left(self.actions.vehicles[one])} for one in sorted(actors)}
 
 
 def _left(vehicle: Vehicle) -> dict[str, Any]:

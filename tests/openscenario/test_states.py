@@ -8,7 +8,8 @@ from fogsim.errors import LeftOutWarning
 from fogsim.openscenario import read_openscenario
 
 from tests.openscenario.writing import (  # isort: skip
-    CAR, after, begun, changes_lane, event, group, lane, linear, motion_at, on, run, speed, state, write,
+    CAR, TIMED, after, begun, changes_lane, event, follows, group, lane, linear, motion_at, on, polyline, run, speed,
+    state, world, write,
 )  # fmt: skip
 
 
@@ -135,3 +136,33 @@ def test_what_runs_when_its_act_is_stopped_ends_there(tmp_path: Path) -> None:
 def test_what_begins_after_the_end_of_the_run_is_not_expected(tmp_path: Path) -> None:
     events = event("soon", speed(5), after(1.0)) + event("never", speed(5), after(10000.0))
     assert [*read_openscenario(_three(tmp_path, {"Ego": events}, 6.0)).data["expect"]] == ["soon"]
+
+
+@pytest.mark.parametrize("reference", ["<None/>", TIMED])
+@pytest.mark.parametrize("is_in_init", [True, False])
+def test_a_change_of_lane_ends_a_trajectory(tmp_path: Path, reference: str, is_in_init: bool) -> None:
+    path = follows(polyline((0, world(90, -1.75)), (20, world(290, -1.75))), reference)
+    story = {"Lead": event("across", changes_lane(1, "time", 2.0), after(3.0)).replace("override", "parallel")}
+    if not is_in_init:
+        story["Far"] = event("path", path, after(0.0))
+        story |= _in_turn("endTransition", name="path")
+    file = _three(tmp_path, story, 6.0)
+    text = file.read_text(encoding="utf-8")
+    # The second group moves the same vehicle.
+    text = text.replace('<EntityRef entityRef="Far"/></Actors>', '<EntityRef entityRef="Lead"/></Actors>')
+    text = text.replace(
+        '<Private entityRef="Far">', f'<Private entityRef="Lead">{path * is_in_init}</Private>' + "{0}", 1
+    )
+    file.write_text(text.replace("{0}", '<Private entityRef="Far">'), encoding="utf-8")
+    steps = run(file)
+    assert motion_at(steps, 2.9, "Lead")[1:] == pytest.approx((-1.75, 10.0), abs=0.05)
+    assert motion_at(steps, 5.8, "Lead")[1:] == pytest.approx((1.75, 10.0), abs=0.05)
+    assert is_in_init or begun(steps)["at_endTransition"] == pytest.approx(3.1, abs=0.21)
+
+
+def test_a_speed_ends_a_trajectory_with_times(tmp_path: Path) -> None:
+    path = follows(polyline((0, world(90, -1.75)), (20, world(290, -1.75))), TIMED)
+    events = f"{event('path', path, after(0.0))}</Maneuver><Maneuver name='n'>{event('slow', speed(4), after(3.0))}"
+    steps = run(_three(tmp_path, {"Lead": events, **_in_turn("endTransition", name="path")}, 6.0))
+    assert motion_at(steps, 5.8, "Lead")[2] == pytest.approx(4.0, abs=0.05)
+    assert begun(steps)["at_endTransition"] == pytest.approx(3.1, abs=0.21)

@@ -89,10 +89,11 @@ class Effect:
         return found | {(one, "along") for one in self.paths() if self.has_path(one, has_times=True)}
 
     def lasting(self) -> set[tuple[str, str]]:
-        """Those that are ``ordered`` and take some time."""
+        """Those that are ``ordered`` and take some time, or never end."""
         moving = {(one, "along") for one in self.do if self.changes_speed(one)}
         moving |= {(one, "across") for one in self.do if self.moves_across(one)}
-        return {(one, way) for one, way in self.ordered() if one in self.paths() or (one, way) in moving}
+        own = self.paths() if not self.is_endless else self.do.keys()
+        return {(one, way) for one, way in self.ordered() if one in own or (one, way) in moving}
 
     def moves_across(self, subject: str) -> bool:
         """Whether a subject changes lane, or moves in its lane, for some time."""

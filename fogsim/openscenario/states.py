@@ -160,7 +160,7 @@ class States:
         self, entry: Entry, name: str, effect: Effect | None = None, *, is_action: bool = False
     ) -> tuple[list[str], list[str]]:
         """Conditions that an execution of an event, or one of its actions, has ended by itself, or is overridden."""
-        if effect is None and entry.parts and not entry.effect.is_endless:
+        if effect is None and entry.parts:
             each = [self._ends(entry, name, part) for part in entry.parts.values()]
             return [" and ".join(dict.fromkeys(either(one) for one, _ in each))], list(
                 dict.fromkeys(one for _, cut in each for one in cut)

@@ -166,3 +166,14 @@ def test_a_speed_ends_a_trajectory_with_times(tmp_path: Path) -> None:
     steps = run(_three(tmp_path, {"Lead": events, **_in_turn("endTransition", name="path")}, 6.0))
     assert motion_at(steps, 5.8, "Lead")[2] == pytest.approx(4.0, abs=0.05)
     assert begun(steps)["at_endTransition"] == pytest.approx(3.1, abs=0.21)
+
+
+def test_an_offset_that_is_kept_ends_with_a_change_of_lane(tmp_path: Path) -> None:
+    target = '<LaneOffsetTarget><AbsoluteTargetLaneOffset value="0.5"/></LaneOffsetTarget>'
+    aside = f'<LaneOffsetAction continuous="true"><LaneOffsetActionDynamics dynamicsShape="step"/>{target}'
+    aside = f"<PrivateAction><LateralAction>{aside}</LaneOffsetAction></LateralAction></PrivateAction>"
+    lit = f"</Action><Action name='fast'>{speed(11)}</Action>"
+    events = event("up", aside, after(1.0)).replace("</Action>", lit, 1) + "</Maneuver><Maneuver name='n'>"
+    events += event("slow", speed(9), after(2.0)) + event("across", changes_lane(1, "time", 2.0), after(3.0))
+    times = begun(run(_three(tmp_path, {"Lead": events, **_in_turn("endTransition")}, 6.0)))
+    assert times["at_endTransition"] == pytest.approx(3.1, abs=0.21)

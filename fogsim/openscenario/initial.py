@@ -229,6 +229,8 @@ class Beginning:
         final = speed["profile"][-1][1] if "profile" in speed else speed.get("to_kmh")
         if final is not None:
             self.aims[name] = final / KMH_PER_MPS
+        if "over_s" in speed and final is not None:
+            self.actions.check_able(action, name, self.aims[name] - self.speed(name), lasts, speed["shape"])
         if final and name == self.vehicles.ego:
             if self.speed(name) > self.aims[name]:
                 action.refuse("its driver aims for the speed that it comes to, and begins no faster; take a story")

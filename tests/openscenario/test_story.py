@@ -435,20 +435,3 @@ def test_what_a_vehicle_cannot_do_and_what_is_written_twice_is_refused(tmp_path:
         r"Event\[twice\].*/SpeedActionTarget: expected one SpeedActionTarget in SpeedAction, got 2",
     ):
         assert re.search(f"small.xosc:1: .*{end}$", str(refused.value), re.MULTILINE), end
-
-
-def test_changes_of_speed_that_a_vehicle_cannot_do_are_refused_or_remarked(tmp_path: Path) -> None:
-    begin, needs = (
-        {"Ego": f"{lane(30)}\n{speed(10)}"},
-        r"Ego speeds up by 4 m/s² at most \(Performance\), but would have",
-    )
-    fast = event("fast", profile((0, 10), (2, 20)), after(1.0))
-    with pytest.raises(InputError, match=rf"SpeedProfileEntry: {needs} to by 5 m/s²"):
-        read_openscenario(write(tmp_path, {"Ego": CAR}, begin, {"Ego": fast}))
-    at_once = {"Ego": f"{lane(30)}\n{speed(10, linear(2))}"}
-    with pytest.raises(InputError, match=rf"PrivateAction: {needs} to by 5 m/s²"):
-        read_openscenario(write(tmp_path, {"Ego": CAR}, at_once))
-    with pytest.warns(LeftOutWarning, match="brakes by 9 .* got 6: one way takes longer"):
-        read_openscenario(
-            write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("six", speed(5, linear(6, "rate")), after(1))})
-        )

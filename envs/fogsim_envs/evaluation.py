@@ -159,13 +159,15 @@ def evaluate(
     Raises
     ------
     InputError
-        If there are no seeds, the discount is none, the environment is of version 0, arguments are given for one that
-        is made already, or a baseline that advises speeds is given for FogDrive.
+        If there are no seeds or one is given twice, the discount is none, the environment is of version 0, arguments
+        are given for one that is made already, or a baseline that advises speeds is given for FogDrive.
     """
     given: Iterable[Any] = seeds
     numbers = tuple(int(seed) if isinstance(seed, np.integer) else seed for seed in given)
     if not numbers:
         raise InputError("seeds: expected at least one")
+    if len(set(numbers)) < len(numbers):
+        raise InputError("seeds: a seed is given twice")
     if discount == 0.0:
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):

@@ -140,9 +140,19 @@ class Actions(LateralActions):
                     entry.refuse("time: how long DynamicConstraints let the first one take depends on the speed then")
                 time = abs(speed - before) / (up if speed > before else down)
             # SUMO counts milliseconds.
-            profile.append((last + max(time, 0.001 * bool(profile)), speed))
+            time = max(time, 0.001 * bool(profile))
+            self.check_able(entry, actor, speed - before, time)
+            profile.append((last + time, speed))
         effect.lasts = max(effect.lasts, profile[-1][0])
         effect.add(actor, speed={"profile": [[time, speed * KMH_PER_MPS] for time, speed in profile]})
+
+    def check_able(self, node: Node, actor: str, change: float, time: float, shape: str = "linear") -> None:
+        """Refuse a change of speed [m/s] that is faster than a vehicle can [s]."""
+        vehicle, needed = self.vehicles[actor], STEEPEST[shape] * abs(change) / (time or math.inf)
+        most = vehicle.acceleration if change > 0.0 else vehicle.deceleration
+        if needed > 1.001 * most and not vehicle.body:
+            does = f"{actor} {'speeds up' if change > 0.0 else 'brakes'} by {most:g} m/s² at most (Performance)"
+            node.refuse(f"{does}, but would have to by {needed:.3g} m/s²")
 
     def _possible(self, node: Node, key: str, actor: str) -> float:
         """A speed to which a vehicle can come [m/s]; any other is refused."""
@@ -169,9 +179,11 @@ class Actions(LateralActions):
         if by == "time":
             effect.lasts = max(effect.lasts, value)
         vehicle = self.vehicles[actor]
+        able = f"{actor} speeds up by {vehicle.acceleration:g} m/s² at most and brakes by {vehicle.deceleration:g}"
         if by == "rate" and value > max(vehicle.acceleration, vehicle.deceleration):
-            able = f"{actor} speeds up by {vehicle.acceleration:g} m/s² at most and brakes by {vehicle.deceleration:g}"
             dynamics.refuse(f"value: {able} (Performance), got {value:g}")
+        elif by == "rate" and value > min(vehicle.acceleration, vehicle.deceleration):
+            dynamics.remark(f"value: {able} (Performance), got {value:g}: one way takes longer")
         # A rate is the greatest, and FogSim's the mean one.
         pace = {"time": {"over_s": value}, "rate": {"rate_mps2": value / STEEPEST.get(shape, 1.0)}}.get(by, {})
         return {"shape": SHAPES[shape], **pace}

@@ -155,8 +155,8 @@ class Beginning:
             places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
             wanted.update((one.get("entityRef"), position) for place in places for position in place.all("Position"))
             # Who only follows a trajectory begins where it does.
-            follows = [] if places else [action for action in one.walk() if action.tag == "FollowTrajectoryAction"]
-            for action in follows[:1]:
+            follows = [action for action in one.walk() if action.tag == "FollowTrajectoryAction"]
+            for action in () if one.get("entityRef") in wanted else follows[:1]:
                 with action.refusing():
                     wanted[one.get("entityRef")] = self._first_of(action)
         refers_to = self.positions.refers_to
@@ -229,6 +229,8 @@ class Beginning:
         final = speed["profile"][-1][1] if "profile" in speed else speed.get("to_kmh")
         if final is not None:
             self.aims[name] = final / KMH_PER_MPS
+        if "over_s" in speed and final is not None:
+            self.actions.check_able(action, name, self.aims[name] - self.speed(name), lasts, speed["shape"])
         if final and name == self.vehicles.ego:
             if self.speed(name) > self.aims[name]:
                 action.refuse("its driver aims for the speed that it comes to, and begins no faster; take a story")

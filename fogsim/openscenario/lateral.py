@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from fogsim.openscenario.parameters import is_of_carla
 from fogsim.openscenario.positions import Positions, road_of, sense
 from fogsim.openscenario.xml_tree import Node, NodeError
 from fogsim.traffic.road.opendrive_lanes import Spot
@@ -14,6 +15,7 @@ SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic
 STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 MOTION = {"speed", "follow", "arrive"}  # Keys of blocks that order a speed
+_WAYS = {**dict.fromkeys(MOTION, "along"), "change_lane": "across", "path": "across"}
 _TINY = 1e-9  # Lateral acceleration that is none [m/s²]
 _LONGEST = 60.0  # Most time that a move across takes [s]
 
@@ -33,20 +35,24 @@ class Effect:
     once_there: dict[str, dict[str, Any]] = field(default_factory=dict)  # For vehicles that it brings onto the road
     is_at_start: bool = False
     reached: dict[str, str] = field(default_factory=dict)  # When an actor keeps its speed again
+    added: set[tuple[str, str]] = field(default_factory=set)  # Subjects and keys of its own blocks
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
+        self.added.update((subject, key) for key in blocks)
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
 
     def part(self) -> "Effect":
         """Effect of one of several actions: it does all of it, and its end is its own; `join` adds the end."""
-        return replace(self, lasts=0.0, ends=[], ends_itself=False, is_endless=False, has_unknown_end=False)
+        new = replace(self, lasts=0.0, ends=[], ends_itself=False, is_endless=False, has_unknown_end=False)
+        return replace(new, added=set())
 
     def join(self, part: "Effect") -> None:
         """Last as long as a part, too."""
         self.lasts, self.ends = max(self.lasts, part.lasts), [*self.ends, *part.ends]
+        self.added |= part.added
         self.ends_itself |= part.ends_itself
         self.is_endless |= part.is_endless
         self.has_unknown_end |= part.has_unknown_end
@@ -73,6 +79,27 @@ class Effect:
         lasts = (bool({"continuous", "profile"} & {*one}) or one.get("shape", "step") != "step" for one in speeds)
         return any({"follow", "arrive"} & one.keys() for one in done) or any(lasts)
 
+    def paths(self) -> set[str]:
+        """Subjects that follow trajectories by its own blocks."""
+        return {subject for subject, key in self.added if key == "path" and self.has_path(subject)}
+
+    def ordered(self) -> set[tuple[str, str]]:
+        """Subjects, and in which ways it orders each one's motion: ``along`` or ``across``, one order each."""
+        found = {(subject, _WAYS[key]) for subject, key in self.added if key in _WAYS}
+        return found | {(one, "along") for one in self.paths() if self.has_path(one, has_times=True)}
+
+    def lasting(self) -> set[tuple[str, str]]:
+        """Those that are ``ordered`` and take some time, or never end."""
+        moving = {(one, "along") for one in self.do if self.changes_speed(one)}
+        moving |= {(one, "across") for one in self.do if self.moves_across(one)}
+        own = self.paths() if not self.is_endless else self.do.keys()
+        return {(one, way) for one, way in self.ordered() if one in own or (one, way) in moving}
+
+    def moves_across(self, subject: str) -> bool:
+        """Whether a subject changes lane, or moves in its lane, for some time."""
+        move = self.do.get(subject, {}).get("change_lane", {})
+        return "distance_m" in move or move.get("duration_s", 0.0) > 0.0
+
     def has_path(self, subject: str, has_times: bool | None = None) -> bool:
         """Whether a subject follows a trajectory: any, one with times, or one without."""
         path = None if subject in self.once_there else self.do.get(subject, {}).get("path")
@@ -95,6 +122,10 @@ class LateralActions:
         value = node.number("value", 0.0 if shape == "step" else None, is_finite=by != "rate")
         if shape != "step":
             by = node.word("dynamicsDimension", ("time", "rate", "distance"))
+        if shape == "step" and value and is_of_carla(self.positions.catalogs.root):
+            node.remark(f"value: ScenarioRunner's action lasts for {value:g} ({by}); here a step is over at once")
+        if value < 0.0 and by != "rate":
+            node.refuse(f"value: expected 0 or more, got {value:g}")
         is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
         return None if is_at_once else (shape, by, abs(value))
 
@@ -102,6 +133,7 @@ class LateralActions:
         """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
         dynamics, to = self._parts(action)
         shape, by, value = self.dynamics(dynamics) or ("step", "time", 0.0)
+        _name_curve(dynamics, shape)
         if by == "rate" and value == 0.0:
             dynamics.refuse("value: expected a rate above 0")
         begins = self._begin(actor)
@@ -111,7 +143,7 @@ class LateralActions:
         pace = {"distance_m": value} if by == "distance" else {"duration_s": _allowed(value)}
         effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
         effect.ends_itself = by == "distance"
-        offset = sense(begins) * action.number("targetLaneOffset", 0.0)
+        offset = self.positions.leftward(sense(begins)) * action.number("targetLaneOffset", 0.0)
         if offset or self._offset(actor):
             pace["offset_m"] = self.offsets[actor] = begins.shifted(offset).offset
         effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
@@ -119,7 +151,7 @@ class LateralActions:
     def lane_offset_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`change_lane` with `offset_m`, along half a wave of a cosine, at `maxLateralAcc` at most."""
         (dynamics, to), begins = self._parts(action), self._begin(actor)
-        offset, across, lanes = sense(begins) * to.number("value"), 0.0, {}
+        offset, across, lanes = self.positions.leftward(sense(begins)) * to.number("value"), 0.0, {}
         if to.tag.startswith("Relative"):
             name, other = self.vehicles.of(to).named, self.spots.get(to.get("entityRef"))
             offset += self._offset(to.get("entityRef"))
@@ -139,7 +171,8 @@ class LateralActions:
         if spot is None:
             message = "give a lane, or one by a vehicle that drives along its own"
             raise ValueError(f"{actor} drives against its lane: {message}")
-        offset = sense(spot) * (action.number("targetLaneOffset", 0.0) if is_change else value)
+        offset = action.number("targetLaneOffset", 0.0) if is_change else value
+        offset *= self.positions.leftward(sense(spot))
         if to.tag == "RelativeTargetLane":
             spot = self.positions.lanes.beside(spot, int(value))
         elif is_change:
@@ -149,6 +182,7 @@ class LateralActions:
         across = (to_y - y) * math.cos(heading) - (to_x - x) * math.sin(heading)
         if is_change:
             shape, by, value = self.dynamics(dynamics) or ("step", "time", 0.0)
+            _name_curve(dynamics, shape)
             if by == "distance":
                 raise ValueError(f"dynamicsDimension: {actor} drives against its lane; give a time or rate")
             lasts = value if by == "time" else STEEPEST[shape] * abs(across) / (value or 1.0)
@@ -183,6 +217,7 @@ class LateralActions:
         """Time that so wide a move [m] takes along half a wave of a cosine at `maxLateralAcc` at most [s]."""
         shape = dynamics.word("dynamicsShape", tuple(SHAPES))
         most = dynamics.number("maxLateralAcc", math.inf, is_finite=False)
+        _name_curve(dynamics, shape)
         return 0.0 if shape == "step" or not across else math.pi * math.sqrt(0.5 * across / max(most, _TINY))
 
     def _across(self, to: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
@@ -223,6 +258,11 @@ class LateralActions:
         road = road_of(spot)
         there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
         return there == {f"{road}_1", f"{road}_-1"}
+
+
+def _name_curve(dynamics: Node, shape: str) -> None:
+    if shape == "linear":
+        dynamics.remark("dynamicsShape: vehicles move across along a smooth curve; linear is read as sinusoidal")
 
 
 def _allowed(time: float) -> float:

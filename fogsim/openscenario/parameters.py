@@ -38,6 +38,7 @@ _HOLDS = dict(zip(_RULES, _ORDERS, strict=True))
 
 _LOCATED = ("Vehicle", "Pedestrian", "MiscObject", "Environment", "Controller", "Maneuver", "Route", "Trajectory")
 _MIRRORED = {"y", "dy", "h"}  # Of positions and orientations
+_COUNTED = {"RelativeTargetLane": {"value"}}  # ScenarioRunner counts lanes to the right.
 _CRITERION = "criteria_"
 
 Parameters = Mapping[str, str]  # Values by name
@@ -176,6 +177,7 @@ class Catalogs:
                     reference.refuse(f"{shown(name)} has no parameter {shown(key)}; {suggest(key, own)}")
                 whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                 put_parameters(whole, {**own, **given})
+                to_standard(self.root, whole)
                 whole.is_read = True
                 return whole
             names.append(found.name)
@@ -193,9 +195,7 @@ class Catalogs:
             if file not in self._read:
                 self._read[file] = []
                 try:
-                    root = read_xml(file, self.root.findings)
-                    to_standard(root)
-                    self._read[file] = root.children
+                    self._read[file] = read_xml(file, self.root.findings).children
                 except InputError as error:
                     self.root.findings.refused.setdefault(str(error))
             for one in self._read[file]:
@@ -204,16 +204,21 @@ class Catalogs:
                     yield from one.children
 
 
-def to_standard(root: Node) -> None:
-    """Give a file that begins its description with ``CARLA:`` the format's axes, and leave out criteria."""
-    headers = (node.attributes.get("description", "") for node in root.children if node.tag == "FileHeader")
-    nodes = list(root.walk()) if any(text.startswith("CARLA:") for text in headers) else []
-    for node in (one for one in nodes if one.tag.endswith(("Position", "Orientation"))):
-        # ScenarioRunner counts the offset to the right of the lane, the format to the left of the road.
-        turned = {"offset"} if node.attributes.get("laneId", "").startswith("-") else set()
-        # What is no number is found where it is read.
-        with contextlib.suppress(ValueError):
-            for key in node.attributes.keys() & (_MIRRORED | turned):
+def is_of_carla(root: Node) -> bool:
+    """Whether a file begins its description with ``CARLA:``, as those for ScenarioRunner do."""
+    return any(one.attributes.get("description", "").startswith("CARLA:") for one in root.all("FileHeader"))
+
+
+def to_standard(root: Node, entry: Node | None = None) -> None:
+    """Give a file for ScenarioRunner, or a catalog's entry in it, the format's axes, and leave out criteria."""
+    nodes = list((entry or root).walk()) if is_of_carla(root) else []
+    for node in nodes:
+        if node.tag == "Orientation":
+            node.attributes.setdefault("type", "relative")
+        mirrored = _MIRRORED if node.tag.endswith(("Position", "Orientation")) else _COUNTED.get(node.tag, set())
+        for key in node.attributes.keys() & mirrored:
+            # What is no number is found where it is read.
+            with contextlib.suppress(ValueError):
                 node.attributes[key] = repr(-float(node.attributes[key]))
     for node in (one for one in nodes if one.tag == "StopTrigger"):
         for group in node.children:

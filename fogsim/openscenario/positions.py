@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.environment import Vehicle, Vehicles
-from fogsim.openscenario.parameters import Catalogs
+from fogsim.openscenario.parameters import Catalogs, is_of_carla
 from fogsim.openscenario.shapes import positions_of, sampled, shape_of
 from fogsim.openscenario.xml_tree import REFUSED, Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any
 _ON_PATH = 0.5  # Distance up to which a position is on a path [m]
+_ASIDE = 0.3  # Distance across up to which a lane is where its file has it [m]
 ALONG = math.cos(0.3)  # Of the angle to a lane at which a vehicle still stands along it
 
 
@@ -154,8 +155,16 @@ class Positions:
         """That lane at s, and `offset` from its middle."""
         road, lane, s = node.get("roadId"), node.get("laneId"), node.number("s")
         if any(f"{road}_{lane}" in one.origins for one in self.lanes.lanes) or road not in self.lanes.roads:
-            return self._shifted(self.lanes.on_lane(road, lane, s), node)
-        t = self.lanes.middle(road, lane, s) + node.number("offset", 0.0)
+            spot = self.lanes.on_lane(road, lane, s)
+            x, y, heading = spot.world
+            there_x, there_y, _ = self.lanes.across(road, s, self.lanes.middle(road, lane, s))
+            aside = (there_y - y) * math.cos(heading) - (there_x - x) * math.sin(heading)
+            if abs(aside) > _ASIDE:
+                where = f"{abs(aside):.1f} m to the {'left' if aside > 0.0 else 'right'} of where FogSim has it"
+                node.remark(f"lane {lane} is {where}: netconvert gives lanes that widen, or shift, one width and place")
+            return self._shifted(spot, node)
+        along = 1.0 if lane.startswith("-") else -1.0
+        t = self.lanes.middle(road, lane, s) + along * self.leftward(along) * node.number("offset", 0.0)
         return self.lanes.across(road, s, t)
 
     def road_position(self, node: Node) -> Point:
@@ -255,9 +264,13 @@ class Positions:
         points[-1].get("routeStrategy")
         return known[0], edges
 
+    def leftward(self, along: float) -> float:
+        """1 if offsets grow to the left of a lane, by its `sense`; for ScenarioRunner they grow to the right."""
+        return -1.0 if is_of_carla(self.catalogs.root) else along
+
     def _shifted(self, spot: Spot, node: Node, key: str = "offset") -> Spot | Point:
         """The place so far from its lane's middle, in the direction of t; beyond the lane a point."""
-        offset = sense(spot) * node.number(key, 0.0)
+        offset = self.leftward(sense(spot)) * node.number(key, 0.0)
         try:
             return spot.shifted(offset)
         except ValueError:

@@ -19,7 +19,8 @@ from fogsim.openscenario.initial import Beginning
 from fogsim.openscenario.lateral import MOTION
 from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
-from fogsim.openscenario.storyboard import Storyboard, free_name
+from fogsim.openscenario.states import free_name
+from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import NEAR_THE_END, Trigger, Triggers, timeline_entry
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.appearance import BODY_PARAMETER
@@ -120,7 +121,7 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
     groups = [one for one in storyboard.walk() if one.tag == "Actors"]
     actors = {name for group in groups for name in vehicles.selected(group.all("EntityRef"))}
     positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.moves(name))}
-    story.initial = begin.effect.sets
+    story.beginning = begin.effect
     story.find_events(storyboard)
     return begin
 
@@ -169,7 +170,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
         **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
         "timeline": timeline,
         **_ending(stop, timeline, storyboard),
-        "expect": {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()},
+        "expect": {name: {"happened": name} for name in story.expected(stop)},
     }
     return ScenarioData(data, {("timeline", i): node.line for i, (node, _) in enumerate(entries, start=len(first))})
 

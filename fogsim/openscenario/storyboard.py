@@ -1,67 +1,26 @@
 """The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
 
-import re
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.environment import Vehicle
 from fogsim.openscenario.lateral import MOTION, Effect
 from fogsim.openscenario.parameters import fits
-from fogsim.openscenario.triggers import (
-    AT_ONCE,
-    NEVER,
-    STEP,
-    TimelineEntry,
-    Trigger,
-    Triggers,
-    both,
-    fires,
-    is_single,
-    timeline_entry,
-)
-from fogsim.openscenario.xml_tree import Node, NodeError
+from fogsim.openscenario.states import GENTLE, Entry, States, either, free_name, joined_by
+from fogsim.openscenario.triggers import AT_ONCE, TimelineEntry, Trigger, both, fires, timeline_entry
+from fogsim.openscenario.xml_tree import Node
 
-_BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
 _STRAIGHT, _SHORT = 1000.0, 0.01  # Lengths of paths [m]
-_ROOM = 600  # Most characters of conditions that are joined into one
 _REFERENCE = "CatalogReference"
-_GENTLE = ("parallel", "skip")  # Priorities that end nothing
-_REPEATED = ("Event", "Action")
-_PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
+_Ended = tuple[dict[str, Any], list[Entry | str]]  # Blocks of a timeline, and the events that they end, or conditions
 
 
 @dataclass
-class Entry:
-    """An event as entries of the timeline, one for each execution; its trigger is `NEVER` until it is known."""
-
-    group: Node
-    node: Node
-    actors: list[str]
-    names: list[str] = field(default_factory=list)
-    effect: Effect = field(default_factory=Effect)
-    parts: dict[int, Effect] = field(default_factory=dict)  # Of several actions, by the identity of their elements
-    trigger: Trigger = NEVER
-
-
-@dataclass
-class Storyboard:
-    """Reads stories; `entries` has the events by the identity of their elements."""
-
-    actions: Actions
-    root: Node
-    triggers: Triggers = field(init=False)
-    entries: dict[int, Entry] = field(default_factory=dict)
-    initial: dict[str, str] = field(default_factory=dict)  # Values of parameters and variables that Init sets
-    _begins: dict[int, Trigger] = field(default_factory=dict)
-    _stops: dict[int, str] = field(default_factory=dict)  # Names of entries that stop acts
-    _over_marks: dict[tuple[str, int], list[str]] = field(default_factory=dict)  # Conditions that these have been over
-    _stories: list[Node] = field(default_factory=list)
-    _acts: list[Node] = field(default_factory=list)
-    _never: list[Node] = field(default_factory=list)  # Acts and events that never begin
-    _open: list[Node] = field(default_factory=list)
+class Storyboard(States):
+    """Reads stories."""
 
     def find_events(self, storyboard: Node) -> None:
         """Find all events and their effects; triggers follow later, since events refer to one another."""
@@ -140,7 +99,7 @@ class Storyboard:
         return not any(sets) and all(fits(value, node) for value in self._declared(node)) == holds
 
     def _find(self, entry: Entry, times: int) -> None:
-        entry.node.word("priority", ("override", "overwrite", *_GENTLE))
+        entry.node.word("priority", ("override", "overwrite", *GENTLE))
         for _ in range(min(times * _executions(entry.node), _MOST_TIMES)):
             taken = {name for one in self.entries.values() for name in one.names}
             entry.names.append(free_name(entry.node.get("name"), {*taken, *entry.names}))
@@ -158,11 +117,16 @@ class Storyboard:
         taken = {name for one in self.entries.values() for name in one.names}
         stopped = [act for act in self._acts if any(one.children for one in act.all("StopTrigger"))]
         self._stops = {id(act): free_name(f"stop_{number}", taken) for number, act in enumerate(stopped, start=1)}
+        for entry in self.entries.values():
+            if entry.node.get("priority") == "skip" and len(entry.names) == 1 and self._others(entry):
+                entry.skipped = free_name(f"{entry.names[0]}_skipped", taken)
+                taken.add(entry.skipped)
         self._begins = {id(act): self._act_begins(act) for act in self._acts}
         written: list[TimelineEntry] = []
         comes: list[TimelineEntry] = []
         for act in self._acts:
-            until = self._until(act)
+            until, ends = self._until(act)
+            self.triggers.since = self._begins[id(act)]
             for entry in (one for one in self.entries.values() if one.group.above is act):
                 own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
                 entry.trigger = both(self._begins[id(act)], own)
@@ -173,8 +137,15 @@ class Storyboard:
                     happened = Trigger(f"happened({name})")
                     done = entry.effect.once_there
                     comes.append(timeline_entry(entry.node, f"{name}_once_there", happened, done, until))
+            written += ends
+            self.triggers.since = AT_ONCE
         # What other events order of who comes in the same step counts more.
         return comes + written
+
+    def expected(self, stop: Trigger | None) -> list[str]:
+        """Names of the events that begin unless the run's time is up first."""
+        end = math.inf if stop is None or stop.at is None else stop.at
+        return [one.names[0] for one in self.entries.values() if one.trigger.at is None or one.trigger.at < end]
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
         written, node, effect = [], entry.node, entry.effect
@@ -183,8 +154,9 @@ class Storyboard:
             if number:
                 if effect.is_endless:
                     node.refuse("maximumExecutionCount: an action that never ends is played once")
-                # It is played again once it is over and its own trigger holds.
-                trigger = both(Trigger(self._played(entry, entry.names[number - 1])), trigger)
+                # It is played again once it has ended by itself and its own trigger holds.
+                ended, _ = self._ends(entry, entry.names[number - 1])
+                trigger = both(Trigger(either(ended)), trigger)
             written.append(timeline_entry(node, name, trigger, effect.do, until))
             for order, (actor, reached) in enumerate(effect.reached.items()):
                 held = {actor: {"speed": {"like": self.actions.vehicles[actor].named, "shape": "step"}}}
@@ -215,20 +187,65 @@ class Storyboard:
         for one in self.entries.values():
             earlier &= one is not entry
             if any(one is other for other in others):
-                running += [f"(happened({name}) and not ({self._played(one, name)}))" for name in one.names]
+                running += [f"(happened({name}) and not ({self._played(one, None, name)}))" for name in one.names]
                 if earlier and one.trigger.condition:
                     running.append(f"({fires(one.trigger)} and not happened({one.names[0]}))")
-        return Trigger(f"{fires(entry.trigger)} and not ({' or '.join(running)})")
+        fired, runs = fires(entry.trigger), " or ".join(running)
+        if len(entry.names) > 1:
+            entry.node.remark("maximumExecutionCount: it counts executions, and not how often the event is skipped")
+            return Trigger(f"{fired} and not ({runs})")
+        skipped = Trigger(f"{fired} and not happened({entry.names[0]}) and ({runs})")
+        self.triggers.marks.append(timeline_entry(entry.node, entry.skipped, skipped, {}))
+        return Trigger(f"{fired} and not ({runs}) and not happened({entry.skipped})")
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger, until: str) -> list[TimelineEntry]:
-        """What an overriding event does to others of its maneuver that run: speeds stay as they are, and paths end."""
-        if entry.node.get("priority") in _GENTLE or not trigger.condition:
+        """What an event does to others that run: it overrides those of its maneuver, or replaces actions of others."""
+        if not trigger.condition:
             return []
+        overrides = entry.node.get("priority") not in GENTLE
+        ended = [*self._from_init(entry.effect), *(self._override(entry) if overrides else ())]
+        beside = self._others(entry) if overrides else []
+        for one in self.entries.values():
+            if not any(one is other for other in (entry, *beside)):
+                effects = [*one.parts.values()] or [one.effect]
+                ended += [(self._replaced(effect, entry.effect), [one]) for effect in effects]
+        written: list[TimelineEntry] = []
+        for done, others in ended:
+            running = (part for one in others for part in ([one] if isinstance(one, str) else self._running(one)))
+            for condition in joined_by(running, " or ") if done else ():
+                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({condition})")
+                called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
+                written.append(timeline_entry(entry.node, called, when, done, until))
+        return written
+
+    def _from_init(self, by: Effect) -> list[_Ended]:
+        """How trajectories of Init end that an event replaces."""
+        ended: list[_Ended] = []
+        for one in sorted(self.beginning.paths() - by.paths()):
+            ways = {way for _, way in by.ordered() if (one, way) in by.ordered() & self.beginning.ordered()}
+            if ways:
+                slow = {one} if self.beginning.has_path(one, has_times=True) and "along" not in ways else set[str]()
+                times = self.beginning.do[one]["path"].get("at_s", [math.inf])
+                done = {one: {**self._held(slow).get(one, {}), **self._left({one})[one]}}
+                ended.append((done, [f"time < {times[-1]:g} s" if math.isfinite(times[-1]) else "time >= 0 s"]))
+        return ended
+
+    def _replaced(self, effect: Effect, by: Effect) -> dict[str, Any]:
+        """How an action that another one replaces for an actor ends for all, unless that orders their motion."""
+        lasting, ordered = effect.lasting(), by.ordered()
+        if not lasting & ordered:
+            return {}
+        done = self._held({one for one, way in lasting if way == "along" and (one, way) not in ordered})
+        for one, path in self._left(effect.paths() - by.paths()).items():
+            done[one] = {**done.get(one, {}), **path}
+        return done
+
+    def _override(self, entry: Entry) -> list[_Ended]:
+        """What an overriding event does to others of its maneuver: speeds stay as they are, and paths end."""
         known, orders = self.actions.vehicles, entry.effect.do
         slow = [one for one in entry.actors if one in known and not orders.get(one, {}).keys() & MOTION]
-        held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in slow}
         left = [one for one in entry.actors if one in known and "path" not in orders.get(one, {})]
-        ends = {one: {"path": _left(known[one])} for one in left}
+        held, ends = self._held(slow), self._left(left)
         # Whose trajectory has times has no other speed.
         stays = {one: {**held.get(one, {}), **end} for one, end in ends.items()}
         others = self._others(entry)
@@ -236,162 +253,32 @@ class Storyboard:
         timed, untimed = (
             [one for one in others if any(one.effect.has_path(name, has) for name in left)] for has in (True, False)
         )
-        written: list[TimelineEntry] = []
-        for done, ended in ((held, fast), (stays, timed), (ends, untimed)):
-            for running in _joined((part for one in ended for part in self._running(one)), " or "):
-                when = Trigger(f"{fires(trigger)} and not happened({name}) and ({running})")
-                called = f"{name}_ends_others" + (f"_{len(written) + 1}" if written else "")
-                written.append(timeline_entry(entry.node, called, when, done, until))
-        return written
+        return [(held, [*fast]), (stays, [*timed]), (ends, [*untimed])]
 
-    def _others(self, entry: Entry) -> list[Entry]:
-        """Other events of its maneuver."""
-        above = entry.node.above
-        return [one for one in self.entries.values() if one is not entry and one.node.above is above]
-
-    def _running(self, entry: Entry) -> list[str]:
-        """Conditions that an execution of an event is running; where its end is not known, that the first has begun."""
-        if entry.effect.has_unknown_end or (entry.effect.ends_itself and entry.effect.moved()):
-            return [f"happened({entry.names[0]})"]
-        return [f"(happened({name}) and not ({self._played(entry, name)}))" for name in entry.names]
-
-    def _overridden(self, entry: Entry, name: str) -> list[str]:
-        """When an execution of an event whose changes of speed would go on is overridden or replaced, by its name."""
-        effect = entry.effect
-        goes_on = effect.is_endless or effect.changes_speed() or any(map(effect.has_path, effect.do))
-        if not goes_on:
-            return []
-        others = [one for one in self._others(entry) if one.node.get("priority") not in _GENTLE]
-        if effect.ends and (moved := effect.moved()):
-            # A speed that another event orders instead is never reached.
-            others += [one for one in self.entries.values() if one is not entry and moved <= one.effect.moved()]
-        begun = f"(happened({name}) delayed {STEP} and happened({{0}}) and not (happened({{0}}) delayed {STEP}))"
-        return list(dict.fromkeys(begun.format(other) for one in others for other in one.names))
-
-    def _mark(self, node: Node, wanted: str, trigger: Trigger) -> str:
-        """Condition that a trigger has fired: an entry of the timeline without action."""
-        taken = {mark["name"] for _, mark in self.triggers.marks}
-        name = free_name(wanted, taken.union(*(one.names for one in self.entries.values())))
-        self.triggers.marks.append(timeline_entry(node, name, trigger, {}))
-        return f"happened({name})"
-
-    def _until(self, act: Node) -> str:
-        """Condition for events in addition to their triggers: their act has not been stopped."""
+    def _until(self, act: Node) -> tuple[str, list[TimelineEntry]]:
+        """Condition for events in addition to their triggers: their act is not stopped; and how those that run end."""
         stop = self.triggers.trigger(act.one("StopTrigger"))
         if stop is None or not stop.condition:
-            return ""
-        name = self._stops[id(act)]
+            return "", []
+        name, written = self._stops[id(act)], list[TimelineEntry]()
         self.triggers.marks.append(timeline_entry(act, name, stop, {}))
-        return f"not happened({name})" if stop.at is None else f"time < {max(stop.at, 0.0):g} s"
+        for entry in (one for one in self.entries.values() if one.group.above is act):
+            done = self._held({one for one, way in entry.effect.lasting() if way == "along"})
+            for one, path in self._left(entry.effect.paths()).items():
+                done[one] = {**done.get(one, {}), **path}
+            for running in joined_by(self._running(entry), " or ") if done else ():
+                when = Trigger(f"{fires(stop)} and not happened({name}) and ({running})")
+                written.append(timeline_entry(act, f"{entry.names[0]}_stopped_{len(written) + 1}", when, done))
+        return f"not happened({name})" if stop.at is None else f"time < {max(stop.at, 0.0):g} s", written
 
-    def _act_begins(self, act: Node) -> Trigger:
-        """When an act begins; a trigger that is more than a time becomes a mark."""
-        begins = self.triggers.trigger(act.one("StartTrigger")) or AT_ONCE
-        if begins.at is not None or not begins.condition:
-            return begins
-        return Trigger(self._mark(act, f"act_{act.get('name')}", begins))
+    def _held(self, actors: Iterable[str]) -> dict[str, Any]:
+        """Blocks of a timeline that keep speeds as they are."""
+        known = self.actions.vehicles
+        return {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in sorted(actors)}
 
-    def state(self, node: Node) -> Trigger:
-        """Trigger for a ``StoryboardElementStateCondition``."""
-        kind = node.get("storyboardElementType")
-        kind = kind[:1].upper() + kind[1:]
-        name, state = node.get("storyboardElementRef"), node.get("state")
-        if kind not in _PARTS or state not in _BEGUN + _OVER:
-            raise NodeError(node, f"states are {', '.join(_BEGUN + _OVER)} of {', '.join(_PARTS)}")
-        found = [one for story in self._stories for one in story.walk() if _is_called(one, kind, name)]
-        if len(found) != 1:
-            raise NodeError(node, f"there {'are several' if found else 'is no'} {kind} {name!r}")
-        if any(one is found[0] for one in self._open):
-            raise NodeError(node, f"{name} waits for itself")
-        idle = [one for one in self._never if any(found[0] is inner for inner in one.walk())]
-        if idle or (state in _OVER and any(one is inner for one in self._never for inner in found[0].walk())):
-            return Trigger("time < 0 s")
-        self._open.append(found[0])
-        try:
-            if state in _OVER:
-                # What may be repeated ends each time, and an action is complete then.
-                return self._over(found[0], 0 if state == _OVER[0] or kind == "Action" else -1)
-            begun = self._begun(found[0])
-            if state != "runningState" or (is_single(node) and kind != "Event"):
-                return begun
-            # What is over at once is running for a step.
-            return Trigger(f"({begun.condition}) and not (({self._over(found[0]).condition}) delayed {STEP})")
-        finally:
-            self._open.pop()
-
-    def value(self, node: Node) -> Trigger:
-        """Trigger for a condition on a parameter or variable, which events may set."""
-        name = node.get("parameterRef") or node.get("variableRef")
-        setters = [entry for entry in self.entries.values() if name in entry.effect.sets]
-        if not (values := self._declared(node)):
-            raise NodeError(node, f"there is no {node.tag.removesuffix('Condition').lower()} {name!r}")
-        holds = fits(self.initial.get(name, values[0]), node)
-        if {fits(entry.effect.sets[name], node) for entry in setters} <= {holds}:
-            return AT_ONCE if holds else Trigger("time < 0 s")
-        if len(setters) > 1:
-            node.refuse(f"{len(setters)} events set {name!r}; a condition may wait for one")
-        happened = f"happened({setters[0].names[0]})"
-        return Trigger(f"not {happened}" if holds else happened)
-
-    def _declared(self, node: Node) -> list[str]:
-        """Declared values of the parameter or variable of a condition."""
-        kind = node.tag.removesuffix("Condition")
-        name = node.attributes.get(f"{kind.lower()}Ref", "").strip()
-        declarations = (one for block in self.root.all(f"{kind}Declarations") for one in block.all())
-        return [one.get("value") for one in declarations if one.get("name") == name]
-
-    def _begun(self, part: Node) -> Trigger:
-        if part.tag in ("Event", "Action"):
-            return Trigger(f"happened({self._entry(part).names[0]})")
-        act = next((one for one in self._acts if any(inner is part for inner in one.walk())), None)
-        if act is None:
-            # A story begins with the run.
-            return AT_ONCE
-        if id(act) not in self._begins:
-            self._begins[id(act)] = self._act_begins(act)
-        return self._begins[id(act)]
-
-    def _over(self, part: Node, execution: int = -1) -> Trigger:
-        """When a part is over; an event or action, after one of its executions."""
-        inside = {id(one) for one in part.walk()}
-        inside |= {id(self._entry(part).node)} if part.tag == "Action" else set()
-        phrases = []
-        for act in self._acts:
-            entries = [one for key, one in self.entries.items() if key in inside and one.group.above is act]
-            which = execution if part.tag in _REPEATED else -1
-            ends = ((one, one.names[which], one.parts.get(id(part), one.effect)) for one in entries)
-            joined = _joined((self._played(*end) for end in ends), " and ")
-            if len(joined) > 1:
-                joined = [self._mark(part, f"{part.name}_over", Trigger(one)) for one in joined]
-            phrase = " and ".join(joined)
-            stop = self._stops.get(id(act))
-            phrases += [f"(({phrase}) or happened({stop}))" if stop else phrase] * bool(entries)
-        return Trigger(" and ".join(phrases)) if phrases else AT_ONCE
-
-    def _played(self, entry: Entry, name: str, effect: Effect | None = None) -> str:
-        effect, phrase = effect or entry.effect, f"happened({name})"
-        if effect.has_unknown_end:
-            message = "when a trajectory without times or places is over is not known"
-            entry.node.refuse(f"{message}; nor is the end of a relative speed by rate")
-        if effect.ends_itself:
-            if effect.moved():
-                entry.node.refuse("together with a speed, the end of a change of lane by distance is not known")
-            phrase = f"over({name})"
-        elif effect.lasts > 0.0:
-            phrase = f"{phrase} for {effect.lasts:g} s"
-        own = [] if effect.is_endless else [" and ".join([phrase, *(f"({end})" for end in effect.ends)])]
-        key = name, id(effect)
-        if key not in self._over_marks:
-            overridden = self._overridden(entry, name)
-            # What is over stays over.
-            parts = [*own, *overridden] if effect.ends or overridden else []
-            marks = [self._mark(entry.node, f"{name}_over", Trigger(one)) for one in _joined(parts, " or ")]
-            self._over_marks[key] = marks
-        parts = [*own, *self._over_marks[key]] or ["time < 0 s"]
-        return parts[0] if len(parts) == 1 else f"({' or '.join(parts)})"
-
-    def _entry(self, part: Node) -> Entry:
-        return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
+    def _left(self, actors: Iterable[str]) -> dict[str, Any]:
+        """Blocks of a timeline that end trajectories."""
+        return {one: {"path": _left(self.actions.vehicles[one])} for one in sorted(actors)}
 
 
 def _left(vehicle: Vehicle) -> dict[str, Any]:
@@ -406,27 +293,3 @@ def _executions(node: Node) -> int:
     if not (times.is_integer() and 1.0 <= times <= _MOST_TIMES):
         node.refuse(f"maximumExecutionCount: expected 1 … {_MOST_TIMES}, got {times:g}")
     return min(max(int(times), 1), _MOST_TIMES)
-
-
-def _is_called(node: Node, kind: str, name: str) -> bool:
-    parts = re.split(r"::|/", name)
-    return node.tag == kind and node.attributes.get("name") == parts[-1] and all(f"[{p}]" in node.path for p in parts)
-
-
-def free_name(wanted: str, taken: set[str]) -> str:
-    """A name for an entry of the timeline: letters, digits and _, and unique."""
-    name = re.sub(r"\W", "_", wanted, flags=re.ASCII)[:80] or "event"
-    name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
-    numbered = (f"{name}_{number}" for number in range(2, len(taken) + 3))
-    return next(one for one in (name, *numbered) if one not in taken)
-
-
-def _joined(parts: Iterable[str], by: str) -> list[str]:
-    """Conditions joined by ``and`` or ``or``, into as few as their length allows."""
-    joined: list[str] = []
-    for part in parts:
-        if joined and len(joined[-1]) + len(part) < _ROOM:
-            joined[-1] += f"{by}{part}"
-        else:
-            joined.append(part)
-    return joined

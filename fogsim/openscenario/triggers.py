@@ -46,6 +46,7 @@ class Triggers:
     states: Callable[[Node], Trigger]
     values: Callable[[Node], Trigger]
     marks: list[TimelineEntry] = field(default_factory=list)  # Without action
+    since: Trigger = AT_ONCE  # From when on conditions are checked, and delays count
 
     def trigger(self, node: Node | None) -> Trigger | None:
         """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
@@ -53,14 +54,14 @@ class Triggers:
         times = [group.at for group in groups if group.at is not None]
         if len(times) == len(groups):
             return _at_time(min(times)) if times else None
-        groups = _of_one_delay(groups)
+        groups = self._of_one_delay(groups)
         phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
         return Trigger(phrase, groups[0].delay)
 
     def _group(self, group: Node) -> Trigger:
         read = [self._read(one) for one in group.all("Condition")]
         latest = max((trigger.at for trigger in read if trigger.at is not None), default=-1.0)
-        others = _of_one_delay([trigger for trigger in read if trigger.at is None])
+        others = self._of_one_delay([trigger for trigger in read if trigger.at is None])
         if not others:
             return _at_time(latest)
         delay = others[0].delay
@@ -97,15 +98,33 @@ class Triggers:
             found = self.values(node)
         else:
             raise NodeError(node, "FogSim has no such condition")
-        now, before = f"({found.condition})", f"(({found.condition}) delayed {STEP})"
-        rises, falls = f"{now} and not {before}", f"not {now} and {before}"
+        up, down = rises(found.condition), f"not ({found.condition}) and (({found.condition}) delayed {STEP})"
         if edge == "falling":
-            return Trigger(falls, delay)
+            return Trigger(down, delay)
         if edge != "none" and not is_single(node):
-            return Trigger(rises if edge == "rising" else f"({rises}) or ({falls})", delay)
+            return Trigger(up if edge == "rising" else f"({up}) or ({down})", delay)
         if found.at is not None:
-            return _at_time(max(found.at, 0.0) + delay)
+            return self._at_time(node, found.at, delay, edge)
         return replace(found, delay=found.delay + delay)
+
+    def _at_time(self, node: Node, time: float, delay: float, edge: str) -> Trigger:
+        """Trigger at a time, or when conditions are first checked if that is later, and a delay after it [s]."""
+        begins = self.since.at
+        if begins is None and delay:
+            return Trigger(f"{self.since.condition} and time >= {max(time, 0.0):g} s", delay)
+        if edge != "none" and begins is not None and max(time, 0.0) < begins:
+            message = f"it holds before its act begins at {begins:g} s, and has no edge then; read as none"
+            node.remark(f"conditionEdge: {message}")
+        return _at_time(max(time, begins or 0.0, 0.0) + delay)
+
+    def _of_one_delay(self, triggers: list[Trigger]) -> list[Trigger]:
+        """Triggers with their delays in their conditions if these differ."""
+        if len({one.delay for one in triggers}) <= 1:
+            return triggers
+        return [
+            Trigger(fires(both(self.since, one))) if one.delay and one.condition and one.at is None else one
+            for one in triggers
+        ]
 
     def _by_entities(self, node: Node, edge: str) -> str:
         triggering, test = node.need("TriggeringEntities"), node.need("EntityCondition").one()
@@ -274,6 +293,11 @@ class Triggers:
 CONDITIONS = handlers(Triggers, "condition")
 
 
+def rises(condition: str) -> str:
+    """Condition that another one holds, and did not one step before."""
+    return f"({condition}) and not (({condition}) delayed {STEP})"
+
+
 def _at_time(time: float) -> Trigger:
     """Trigger at a time [s]."""
     return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
@@ -324,13 +348,6 @@ def timeline_entry(node: Node, name: str, trigger: Trigger, do: Mapping[str, Any
 def fires(trigger: Trigger) -> str:
     """Condition of a trigger with its delay."""
     return f"({trigger.condition})" + (f" delayed {trigger.delay:g} s" if trigger.delay else "")
-
-
-def _of_one_delay(triggers: list[Trigger]) -> list[Trigger]:
-    """Triggers with their delays in their conditions if these differ."""
-    if len({one.delay for one in triggers}) <= 1:
-        return triggers
-    return [Trigger(fires(one)) if one.delay and one.condition else one for one in triggers]
 
 
 def _bracketed(condition: str, count: int) -> str:

@@ -120,6 +120,8 @@ def test_baselines_are_evaluated() -> None:
         fogsim_envs.evaluate("oracles", FAST, seeds=[0])
     with pytest.raises(InputError, match="at least one"):
         fogsim_envs.evaluate("none", FAST, seeds=[])
+    with pytest.raises(InputError, match="given twice"):
+        fogsim_envs.evaluate("none", FAST, seeds=[0, 0])
 
 
 def test_baselines_that_advise_are_refused_where_the_agent_drives() -> None:

@@ -248,6 +248,8 @@ def test_values_that_mean_something_else_are_refused(tmp_path: Path) -> None:
         ('value="3" rule="greaterThan"', 'value="3" rule="notEqualTo"', "rule: FogSim has no 'notEqualTo' here"),
         ('frictionScaleFactor="1"', 'frictionScaleFactor="0.5"', "RoadCondition: roads are dry"),
         ('<Fog visualRange="200"/>', '<Precipitation precipitationType="rain" intensity="1"/>', "rain and snow are no"),
+        (f'delay="0" {at_3}', f'delay="-1" {at_3}', "delay: expected 0 or more, got -1"),
+        ('length="4.6"', 'length="-4.6"', "Dimensions: length: expected 0 or more, got -4.6"),
         ('<Center x="1.4" y="0"', '<Center x="1.4" y="0.5"', "Center: y: a body lies about its reference point"),
     ]:
         with pytest.raises(InputError, match=told):

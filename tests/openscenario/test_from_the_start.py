@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 
 from tests.openscenario.writing import (  # isort: skip
@@ -196,3 +196,20 @@ def test_files_written_on_windows_name_folders_with_backslashes(tmp_path: Path) 
     text = text.replace(road, ".\\maps\\road.xodr").replace("<RouteCatalog>", folder)
     file.write_text(text.replace(CAR, '<CatalogReference catalogName="cars" entryName="entry"/>'))
     assert read_openscenario(file).data["fog"]["visibility_m"] == pytest.approx(200.0)
+
+
+def test_changes_of_speed_that_a_vehicle_cannot_do_are_refused_or_remarked(tmp_path: Path) -> None:
+    begin, needs = (
+        {"Ego": f"{lane(30)}\n{speed(10)}"},
+        r"Ego speeds up by 4 m/s² at most \(Performance\), but would have",
+    )
+    fast = event("fast", profile((0, 10), (2, 20)), after(1.0))
+    with pytest.raises(InputError, match=rf"SpeedProfileEntry: {needs} to by 5 m/s²"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, begin, {"Ego": fast}))
+    at_once = {"Ego": f"{lane(30)}\n{speed(10, linear(2))}"}
+    with pytest.raises(InputError, match=rf"PrivateAction: {needs} to by 5 m/s²"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, at_once))
+    with pytest.warns(LeftOutWarning, match="brakes by 9 .* got 6: one way takes longer"):
+        read_openscenario(
+            write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("six", speed(5, linear(6, "rate")), after(1))})
+        )

@@ -1,5 +1,6 @@
 """Maps by name in a folder of the user's: OpenDRIVE files and SUMO networks."""
 
+import contextlib
 import re
 import shutil
 from pathlib import Path
@@ -9,7 +10,7 @@ from typer.testing import CliRunner
 
 from fogsim.cli.app import app
 from fogsim.core.files.readers import MAPS
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net
 
@@ -63,6 +64,15 @@ def test_of_roads_on_top_of_one_another_z_decides(tmp_path: Path, maps: Path) ->
         assert ('edges="bridge"' in Path(routes).read_text(encoding="utf-8")) is is_bridge
     with pytest.raises(InputError, match=r"at \(30, -1\.75\) are roads 0\.0 m and 6\.0 m high; give z"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": world(30, -1.75)}, road=Path("Levels")))
+
+
+def test_a_lane_that_widens_is_remarked_where_it_is_elsewhere(tmp_path: Path) -> None:
+    wide = ROAD.read_text(encoding="utf-8").replace('b="0" c="0" d="0"/>', 'b="0.005" c="0" d="0"/>')
+    (tmp_path / "wide.xodr").write_text(wide, encoding="utf-8")
+    for s, right in ((50, ""), (400, "1.0 m to the right")):
+        file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(s)}, road=tmp_path / "wide.xodr")
+        with pytest.warns(LeftOutWarning, match=right) if right else contextlib.nullcontext():
+            read_openscenario(file)
 
 
 def test_maps_may_have_coordinates_of_utm(tmp_path: Path) -> None:

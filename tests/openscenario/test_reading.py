@@ -120,7 +120,7 @@ def test_a_yaml_file_lays_expectations_upon_it(tmp_path: Path) -> None:
     )
     scenario = load_scenario(file)
     assert scenario.fog.visibility_m == 80.0
-    names = "Init thicker_fog faster cut_in cut_in_ends_others brake brake_over stop late"
+    names = "Init thicker_fog faster cut_in cut_in_ends_others brake brake_overridden brake_over stop late"
     assert [entry.name for entry in scenario.timeline] == names.split()
-    assert read_scenario_document(file).where(("timeline", 8)).endswith("test.fog.yaml:6")
+    assert read_scenario_document(file).where(("timeline", 9)).endswith("test.fog.yaml:6")
     assert read_scenario_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")

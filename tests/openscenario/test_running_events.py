@@ -122,9 +122,8 @@ def test_an_event_is_skipped_while_another_of_its_maneuver_runs(tmp_path: Path) 
     file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(20)}\n{speed(10)}"}, {"Ego": events}, stop=after(6.0))
     times = begun(run(file))
     assert (times["free"], times["slow"]) == pytest.approx((0.5, 1.0), abs=0.11)
-    assert times["waits"] == pytest.approx(4.0, abs=0.21)
-    # Its edge has passed.
-    assert "same" not in times
+    # What is skipped counts as an execution.
+    assert not {"waits", "same"} & times.keys()
 
 
 def test_the_entities_of_a_selection_all_act(tmp_path: Path) -> None:

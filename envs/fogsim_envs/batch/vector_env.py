@@ -1,5 +1,6 @@
 """The vector environment."""
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -232,18 +233,17 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
     def _checked(self, actions: Any) -> NDArray[Any]:
         """Actions as an array, or a refusal that names the first environment whose action does not fit."""
         name = type(self).__name__
-        try:
+        with contextlib.suppress(InputError):
             return checked_action(actions, self.action_space, name)
-        except InputError:
-            given = list(actions) if np.iterable(actions) else []
-            if len(given) != self.num_envs:
-                raise InputError(
-                    f"action of {name}: expected {self.num_envs} members of {self.single_action_space}, one for each "
-                    f"environment; got {shown(actions)}"
-                ) from None
-            for number, action in enumerate(given):
-                checked_action(action, self.single_action_space, f"{name}, environment {number}")
-            raise
+        given = list(actions) if np.iterable(actions) else []
+        if len(given) != self.num_envs:
+            raise InputError(
+                f"action of {name}: expected {self.num_envs} members of {self.single_action_space}, one for each "
+                f"environment; got {shown(actions)}"
+            )
+        for number, action in enumerate(given):
+            checked_action(action, self.single_action_space, f"{name}, environment {number}")
+        return checked_action(actions, self.action_space, name)
 
     def _commanded(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Advised speed [m/s] and number of the lamp mode of each."""

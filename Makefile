@@ -65,6 +65,7 @@ affected: $(VENV)/.installed-test $(VENV)/.compiled ## Run the tests that change
 
 nightly: $(VENV)/.installed-test $(VENV)/.compiled ## Run the tests that take minutes: before a release
 	@$(PYTEST) -m nightly
+	@$(BIN)/fogsim test scenarios
 	@$(MAKE) portability pythons
 
 hooks: $(VENV)/.installed-test ## Check style, types and contracts before each commit

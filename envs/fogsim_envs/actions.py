@@ -31,7 +31,7 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
     if given.dtype.kind == "f":
         if not np.isfinite(given).all():
             raise _refusal(action, space, name, "expected finite numbers")
-        if not isinstance(space, spaces.Box) and (given != np.rint(given)).any():
+        if np.dtype(space.dtype).kind != "f" and (given != np.rint(given)).any():
             raise _refusal(action, space, name, "expected whole numbers")
     if not _is_within(given, space):
         lowest, highest = _limits(space)

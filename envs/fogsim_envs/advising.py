@@ -15,7 +15,7 @@ from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import spread_advice, warned
 from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
-from fogsim_envs.hosting import Simulation, refuse_copies
+from fogsim_envs.hosting import Simulation, needs_completion, refuse_copies
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.rewards import RewardWeights, WeightsOf, advice_standard, reward_terms
 from fogsim_envs.spaces import ImageSize, action_space, command_of, observation_space, observe
@@ -77,6 +77,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         rate = 1 / scenario.clocks.decision_period_s
         self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": rate}
 
+    @needs_completion
     @checked_parameters
     def reset(
         self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
@@ -91,6 +92,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             self._end_simulation()
         super().reset(seed=None if seed is None else int(seed))
         run_seed = int(self.np_random.integers(2**31))
+        self._step = None
         if self._simulation is None:
             self._simulation, self._step = self._begin(scenario, run_seed)
         else:
@@ -102,6 +104,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
     def _show(self, step: Step) -> None:
         self._renderer.show(step, self.metadata["render_fps"])
 
+    @needs_completion
     def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let an action be in force for one decision period."""
         if self._simulation is None or self._step is None or self._step.ending is not None:

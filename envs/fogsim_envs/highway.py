@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -132,6 +133,9 @@ def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
         raise InputError(f"environment must be an id of highway-env, such as 'highway-v0': {error}") from error
     if not is_highway_environment(made):
         raise InputError(f"environment must be an id of highway-env, such as 'highway-v0'; got {environment!r}")
+    for name, value in config.items():
+        if isinstance(value, Real) and not math.isfinite(value):
+            raise InputError(f"config[{name!r}] must be a finite number, got {value!r}")
     # Leaders across the joints of roads are seen too, unless the user says otherwise.
     made.configure({"neighbour_vehicles_connected_lanes": True, **config})
     for name in ("simulation_frequency", "policy_frequency"):

@@ -5,16 +5,19 @@ say. The first environment runs its simulation here; a further one runs it in a 
 """
 
 import contextlib
+import functools
 import math
 import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Annotated, Any, Protocol, cast
+from typing import Annotated, Any, Protocol, TypeVar, cast
+
+import gymnasium
 
 from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.core.parameters import Range
@@ -25,6 +28,8 @@ from fogsim.scenario.variation import first_of_several
 from fogsim.simulation.loop import ClosedLoop
 from fogsim.simulation.traffic_run import TrafficRun
 from fogsim.values import Command, Step, TrafficStep
+
+M = TypeVar("M", bound=Callable[..., Any])
 
 TIMEOUT = 60.0
 """How long a child process may give no sign of life unless something else is asked for [s]."""
@@ -104,6 +109,23 @@ def refuse_copies(was_reset: bool) -> None:
     """Refuse to pickle or copy an environment that has begun an episode."""
     if was_reset:
         raise InputError("an environment can be pickled or copied only before its first reset()")
+
+
+def needs_completion(method: M) -> M:
+    """Decorator of `reset` and `step`: what is interrupted, by Ctrl-C for example, must be followed by a reset."""
+
+    @functools.wraps(method)
+    def complete(self: Any, *arguments: Any, **options: Any) -> Any:
+        try:
+            return method(self, *arguments, **options)
+        except (InputError, gymnasium.error.ResetNeeded):
+            # Refused before anything was done.
+            raise
+        except BaseException:
+            self._step = None
+            raise
+
+    return cast("M", complete)
 
 
 class TrafficSimulation(Protocol):

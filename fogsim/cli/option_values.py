@@ -96,7 +96,8 @@ def _number_parser(kind: type[int] | type[float], name: str, info: OptionInfo | 
             value = kind(given)
         except (ValueError, OverflowError):
             _refuse(name, expected, given)
-        if not least <= value <= most:
+        # 1e999 is a mistake, inf is meant.
+        if not least <= value <= most or (math.isinf(value) and "inf" not in str(given).lower()):
             _refuse(name, expected, given)
         return value
 

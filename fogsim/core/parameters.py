@@ -23,7 +23,8 @@ FileName = Annotated[str, "a file"]
 Check = Callable[[Any], str | None]
 """From a value to what was expected; None if the value fits."""
 
-_Checks = tuple[list[tuple[str, tuple[type, ...], Check]], dict[str, tuple[tuple[type, ...], Check]]]
+_Checks = list[tuple[str, tuple[type, ...], Check | None]]
+"""Names of arguments, classes whose instances need no check, and checks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def checked_parameters(target: C) -> C:
     who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"
 
     @functools.cache
-    def checks() -> _Checks:
+    def checks() -> tuple[_Checks, _Checks]:
         # Not before the first call: annotations may name later definitions.
         return _argument_checks(inspect.signature(call, eval_str=True))
 
@@ -101,12 +102,11 @@ def checked_parameters(target: C) -> C:
         by_place, by_name = checks()
         for (name, kinds, check), value in zip(by_place, arguments, strict=False):
             # Classes are looked at here: a call for each argument would cost more than the rest.
-            if not isinstance(value, kinds) and (expected := check(value)) is not None:
+            if check and value.__class__ not in kinds and (expected := check(value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
-        for name, value in options.items():
-            kinds, check = by_name.get(name, _UNCHECKED)
-            if not isinstance(value, kinds) and (expected := check(value)) is not None:
-                raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
+        for name, kinds, check in by_name if options else ():
+            if check and name in options and (value := options[name]).__class__ not in kinds and (why := check(value)):
+                raise InputError(f"{who}: {name} must be {why}, got {_given(value)}")
         try:
             return call(*arguments, **options)
         except TypeError:
@@ -126,30 +126,16 @@ def _given(value: object) -> str:
     return f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else shown(value)
 
 
-def _argument_checks(signature: inspect.Signature) -> _Checks:
+def _argument_checks(signature: inspect.Signature) -> tuple[_Checks, _Checks]:
     """Checks of a signature's positional arguments in order, and of all its named ones."""
+    kinds = {name: one.kind for name, one in signature.parameters.items()}
     checks = {
         name: check_of(one.annotation, classes=True)
         for name, one in signature.parameters.items()
         if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
     }
-    positional = [name for name in checks if signature.parameters[name].kind is not inspect.Parameter.KEYWORD_ONLY]
-    by_name = {name: (_sure_kinds(one), one or _accept) for name, one in checks.items()}
-    return [(name, *by_name[name]) for name in positional], by_name
-
-
-def _accept(_: object) -> None:
-    """Take any value."""
-
-
-def _sure_kinds(check: Check | None) -> tuple[type, ...]:
-    """Classes whose instances pass a check."""
-    if check is None:
-        return (object,)
-    return check.kinds if isinstance(check, _InstanceCheck) else ()
-
-
-_UNCHECKED = (object,), _accept
+    named = [(name, one.kinds if isinstance(one, _InstanceCheck) else (), one) for name, one in checks.items()]
+    return [one for one in named if kinds[one[0]] is not inspect.Parameter.KEYWORD_ONLY], named
 
 
 def _call_mistake(

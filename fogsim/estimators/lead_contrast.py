@@ -301,14 +301,15 @@ class LeadContrast:
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
-        reason = _rejection_reason(fit)
-        if reason:
-            return Estimate.invalid(self.method, reason, **found)
         likely, spread = self._by_own_contrast()
         weight = spread**2 / (spread**2 + fit.deviation**2)
         extinction, deviation = likely + weight * (fit.extinction - likely), math.sqrt(weight) * fit.deviation
-        if abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
+        if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
+            reason = "the contrast does not fall with the range as Duntley's law has it"
+        elif abs(fit.extinction - likely) > _DISAGREEMENT * math.hypot(fit.deviation, spread):
             reason = "the vehicle's contrast and its decrease with range disagree: the fog may be uneven"
+        elif deviation > _WORST * extinction and extinction + 2.0 * deviation > _CLEAR:
+            reason = "the range has not changed enough yet"
         elif road is not None and road.is_lit(extinction, deviation):
             reason = "lamps light the road: this is a daytime method"
         if reason:
@@ -370,14 +371,6 @@ def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     """Change of range over which the contrast is known: that of an even density of the same spread [m]."""
     mean = float((weight * distance).sum() / weight.sum())
     return math.sqrt(12.0 * float((weight * (distance - mean) ** 2).sum() / weight.sum()))
-
-
-def _rejection_reason(fit: DecayFit) -> str:
-    if fit.misfit > _MAX_MISFIT or fit.extinction < -_SURELY * fit.deviation:
-        return "the contrast does not fall with the range as Duntley's law has it"
-    if fit.deviation > _WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > _CLEAR:
-        return "the range has not changed enough yet"
-    return ""
 
 
 def _box(detection: RearDetection) -> tuple[int, int, int, int]:

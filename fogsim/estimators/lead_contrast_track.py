@@ -1,6 +1,7 @@
 """The vehicle ahead as `lead_contrast` follows it: found once, then known by its likeness to the nearest picture."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 from fogsim.estimators.tracked_vehicle import SmoothedRanges, TrackedVehicle
@@ -32,6 +33,9 @@ _ALIKE = 0.6
 _SCALED, _RESCALED, _BETTER = 0.06, 0.2, 0.03
 """Changes of the range's logarithm from which a vehicle is distinguished by its correlation from a thing that keeps its
 size in the image: if that of such a thing is better by so much, and if it is better at all [-]."""
+
+_FEW = 5
+"""Last images over which that is averaged: in one, coarse pixels may show a vehicle otherwise."""
 
 _VISIBLE = 3.0
 """Contrast of the reference, faded, in deviations of a cell from which the vehicle must look alike [-]."""
@@ -92,6 +96,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         self.detections, self.reference = [], None
         self._aside = self._lift = 0.0
         self._swayed = 0
+        self._scaled: deque[float] = deque(maxlen=_FEW)
 
     def is_lost(self, time: float) -> bool:
         """Count a frame without the vehicle; whether it may be another one from now on (`time` [s])."""
@@ -190,11 +195,19 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
             picture, ratio = expected, contrast_ratio(reference.picture, expected) or ratio
             ratio = replace(ratio, deviation=math.hypot(ratio.deviation, _UNPLACED * ratio.ratio))
         least, most = self._bounds(distance, densest)
-        if ratio.visible * least > _VISIBLE and likeness < max(_ALIKE, _likeness_if_fixed(crop, reference)):
+        if ratio.visible * least > _VISIBLE and (likeness < _ALIKE or self._keeps_its_size(crop, reference, likeness)):
             raise CannotTellError("what is seen there does not look like the vehicle that was tracked")
         if ratio.ratio > most + 4.0 * ratio.deviation:
             raise CannotTellError("what is seen there has more contrast than fog leaves")
         return picture, ratio, likeness >= _ALIKE
+
+    def _keeps_its_size(self, crop: VehicleCrop, reference: RearDetection, likeness: float) -> bool:
+        """Whether the last images show a thing of the reference's place and size in the image, and not the vehicle."""
+        change = abs(math.log(crop.depth / reference.depth))
+        if change < _SCALED:
+            return False
+        self._scaled.append(likeness - _likeness_if_fixed(crop, reference) + (_BETTER if change < _RESCALED else 0.0))
+        return sum(self._scaled) < 0.0
 
     def _bounds(self, distance: float, densest: float) -> tuple[float, float]:
         """Least and greatest contrast that the vehicle can have at a range, over that of the reference."""
@@ -231,10 +244,7 @@ def _relevelled(detection: RearDetection, extinction: float) -> RearDetection:
 
 
 def _likeness_if_fixed(crop: VehicleCrop, reference: RearDetection) -> float:
-    """Correlation that a vehicle must have: that of what is at the reference's place and of its size in the image."""
-    change = abs(math.log(crop.depth / reference.depth))
-    if change < _SCALED:
-        return 0.0
+    """Correlation of what is at the reference's place and of its size in the image; 0 if nothing is."""
     behind = RoadBehind(crop.camera.mount_height, 1.0)
     found = register_rear(reference.picture, crop.picture(reference.box, reference.picture.scale), 0.1, 0.1, behind)
-    return 0.0 if found is None else found[1] - (_BETTER if change < _RESCALED else 0.0)
+    return 0.0 if found is None else found[1]

@@ -1,9 +1,10 @@
 """Estimates of any method over images from disk."""
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
 from fogsim.offline.rectification import straightened
-from fogsim.offline.source import Picture, Source
+from fogsim.offline.source import ImageFiles, Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 from fogsim.values.result_checks import checked_estimate
 from fogsim.vision.restoration.picture import refuse_short_range
@@ -27,6 +28,11 @@ _ALL = "all"
 
 _WHOLE_RANGE_BITS = 12
 """Bit depth for estimating images that use all 16 bits; four more bits are noise in any camera."""
+
+_MOST_UNFIT = 10
+"""Images at a source's beginning after which, if none fits the calibration, it counts as that of another camera."""
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +101,7 @@ def estimate_images(
     sequence : bool or None
         Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
     rate : float or None
-        Images of a sequence in a second [1/s]; None for 10.
+        Images of a sequence in a second [1/s]; None for that of their EXIF times, or 10 without.
     signs, track : path or None
         A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
         see `fogsim.offline.watch_signs`.
@@ -117,7 +123,10 @@ def estimate_images(
         raise InputError("signs and track go together: a map says nothing without places, nor places without a map")
     names = [methods] if isinstance(methods, str) else [*methods]
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
-    source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
+    found = find_source(inputs, sequence=sequence, rate=rate)
+    for remark in found.remarks if isinstance(found, ImageFiles) else ():
+        warnings.warn(remark, stacklevel=2)
+    source, pinhole = straightened(found, calibration)
     watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]
     return estimates_of(source, pinhole, chosen_methods(names), watch, night, calibration.deviations)
 
@@ -132,8 +141,8 @@ def estimates_of(
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
-    An image that does not fit the camera is skipped like an unreadable one, unless none has fitted before:
-    then the calibration is of another camera.
+    An image that does not fit the camera is skipped like an unreadable one, unless none fits of all or of the first
+    ten: then the calibration is of another camera.
 
     Parameters
     ----------
@@ -151,13 +160,18 @@ def estimates_of(
         How uncertain the calibration is, which widens the intervals.
     """
     bench = _Bench(camera, methods, night, deviations)
-    fitted = False
-    count = 0
+    return unless_none_fits(_judged(bench, source, watch))
+
+
+def _judged(bench: "_Bench", source: Source, watch: SignWatch | None) -> Iterator[tuple[FrameEstimates, str | None]]:
+    """Estimates, and why an image does not fit; see `unless_none_fits`."""
+    count, is_readable = 0, False
     for picture in source.pictures():
         count += 1
         if picture.image is None:
-            yield FrameEstimates(picture, ())
+            yield FrameEstimates(picture, ()), None
             continue
+        is_readable = True
         if not source.temporal:
             bench.reset()
         try:
@@ -165,15 +179,31 @@ def estimates_of(
             results = bench.results(picture.image, picture.time, sightings or ())
         except InputError as error:
             message = f"{place_of(source, picture)}: {error}"
-            if not fitted:
-                raise InputError(message) from error
-            yield FrameEstimates(replace(picture, image=None, error=message), ())
+            yield FrameEstimates(replace(picture, image=None, error=message), ()), message
             continue
-        fitted = True
         looks = () if watch is None or sightings is None else watch.look(picture.image, picture.time, sightings)
-        yield FrameEstimates(picture, bench.estimates(results), looks)
-    if not fitted:
+        yield FrameEstimates(picture, bench.estimates(results), looks), ""
+    if not is_readable:
         raise InputError(f"none of the {count} images can be read" if count > 1 else "the only image cannot be read")
+
+
+def unless_none_fits(judged: Iterable[tuple[_Result, str | None]]) -> Iterator[_Result]:
+    """Results of images in turn; InputError if none of all or of the first ten fits the calibration.
+
+    Each comes with the reason why its image does not fit: "" if it does, None if it could not be read.
+    """
+    waiting, reasons, is_fitted = list[_Result](), list[str](), False
+    for result, reason in judged:
+        waiting.append(result)
+        is_fitted = is_fitted or reason == ""
+        reasons += [reason] if reason else []
+        if is_fitted or not reasons:
+            yield from waiting
+            waiting.clear()
+        elif len(reasons) == _MOST_UNFIT:
+            break
+    if waiting:
+        raise InputError(reasons[0])
 
 
 def place_of(source: Source, picture: Picture) -> str:

@@ -1,6 +1,7 @@
 """A calibration of an unknown camera from its images, and how uncertain it is."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -135,14 +136,14 @@ def guess_camera(
         horizon is given.
     """
     _check_values(mount_height, field_of_view)
-    pictures = _spread(source, progress)
+    pictures, path, odd = _spread(source, progress)
     first = pictures[0]
     rows, cols = first.shape[:2]
     if horizon_row is not None and not 0.0 <= horizon_row <= rows - 1:
         raise InputError(f"--horizon-row must be a row of the images, 0 … {rows - 1}, got {horizon_row!r}")
     eight = first.dtype == np.uint8
     response = Response.SRGB if eight else Response.LINEAR
-    focal = _focal_length(source, cols, rows, field_of_view)
+    focal = _focal_length(path, cols, rows, field_of_view)
     lines = [found for image in pictures if (found := _road_lines(image, response)) is not None]
     horizon = _horizon(lines, len(pictures), focal.value, cols, horizon_row)
     height = _mount_height(lines, mount_height)
@@ -165,7 +166,7 @@ def guess_camera(
             focal.deviation, height.deviation, math.hypot(_LINES_DEVIATION, horizon.deviation / focal.value)
         ),
         reasons,
-        (*focal.warnings, *horizon.warnings, *height.warnings),
+        (*odd, *focal.warnings, *horizon.warnings, *height.warnings),
     )
 
 
@@ -200,40 +201,44 @@ def _check_values(mount_height: float | None, field_of_view: float | None) -> No
         )
 
 
-def _spread(source: Source, progress: Callable[[int, int], None]) -> list[Pixels]:
-    """Images of one size, spread over the source; every other one is dropped whenever there are too many."""
+def _spread(source: Source, progress: Callable[[int, int], None]) -> tuple[list[Pixels], Path, list[str]]:
+    """Images of the usual size, spread over the source, the path of the first, and which are of another size.
+
+    Every other one is dropped whenever there are too many.
+    """
     kept, every = list[Pixels](), max(1, math.ceil(source.count / _MOST_IMAGES))
-    size, name, reason = None, None, ""
+    sizes, first, reason = Counter[tuple[int, ...]](), dict[tuple[int, ...], Picture](), ""
     for index, picture in enumerate(source.pictures()):
         reason = reason or picture.error
         progress(index + 1, source.count)
         if index % every or picture.image is None:
             continue
-        if size is None:
-            size, name = picture.image.shape[:2], picture.name
-        _refuse_other_size(picture, picture.image, size, name)
+        size = picture.image.shape[:2]
+        sizes[size] += 1
+        first.setdefault(size, replace(picture, image=None))
         kept.append(picture.image)
         if len(kept) > 2 * _MOST_IMAGES:  # a video may not state its length
             kept, every = kept[::2], 2 * every
-    if size is None:
+    if not sizes:
         raise InputError(f"none of the images can be read: {reason}")
-    return kept
+    usual, number = sizes.most_common(1)[0]
+    if 2 * number <= sizes.total():
+        one, other = (f"{first[size].name} has {size[1]} × {size[0]}" for size in list(sizes)[1::-1])
+        raise InputError(f"{one} pixels and {other}: images of one camera have one size")
+    others = sizes.total() - number
+    odd = next((f" ({one.name})" for size, one in first.items() if size != usual), "")
+    warning = f"{others} of {sizes.total()} images have another size than the others{odd} and are left out"
+    name = first[usual].name
+    path = Path(name) if isinstance(name, str) else source.paths[0]
+    return [image for image in kept if image.shape[:2] == usual], path, [warning] * (others > 0)
 
 
-def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], name: str | int | None) -> None:
-    if image.shape[:2] != size:
-        raise InputError(
-            f"{picture.name} has {image.shape[1]} × {image.shape[0]} pixels and {name} has {size[1]} × {size[0]}: "
-            "images of one camera have one size"
-        )
-
-
-def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | None) -> _Guessed:
+def _focal_length(path: Path, cols: int, rows: int, field_of_view: float | None) -> _Guessed:
     """Focal length [px]."""
     if field_of_view is not None:
         reason = f"a field of view of {math.degrees(field_of_view):g}° as stated"
         return _Guessed(0.5 * cols / math.tan(0.5 * field_of_view), _STATED_DEVIATION, reason)
-    stated = _stated_focal_length(source.paths[0])
+    stated = _stated_focal_length(path)
     if stated is not None:
         focal = stated * math.hypot(cols, rows) / _FULL_FRAME_DIAGONAL_MM
         return _Guessed(focal, _METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
@@ -336,7 +341,7 @@ def _scaled(
     motion = RoadMotion(Camera(cols, rows, focal.value, middle, height.value, pitch, response=response))
     for picture in source.pictures():
         at = way(picture.time)
-        if picture.image is not None and at is not None:
+        if picture.image is not None and picture.image.shape[:2] == (rows, cols) and at is not None:
             motion.add(picture.image, at)
         if motion.pairs >= _MOST_IMAGES:
             break

@@ -53,6 +53,7 @@ _PARTS = dict.fromkeys(ANIMATED_FORMATS, "frames") | {"TIFF": "pages"}
 """Several images in a file, by Pillow's name of the format; in others (MPO) the first is the photograph."""
 
 _OPACITY, _UNASSOCIATED = (258, 338), (2,)  # TIFF 6.0, BitsPerSample and ExtraSamples
+_BITS, _PHOTOMETRIC, _WHITE_IS_ZERO = 258, 262, 0  # the same, BitsPerSample and PhotometricInterpretation
 _ORIENTATION = 0x0112  # EXIF, as below
 _SIDEWAYS = (5, 6, 7, 8)
 _TOP_TO_BOTTOM, _LEFT_TO_RIGHT = (3, 4, 7, 8), (2, 3, 6, 7)
@@ -72,10 +73,20 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 def read_image(path: Path) -> Pixels:
     """Read an image of 8 or 16 bits, turned upright by its orientation tag, with colours in OpenCV's order."""
     image = _decoded(path)
+    if image.dtype == np.uint16 and (bits := _inverted_bits(path)):
+        image = 2**16 - 2 ** (16 - bits) - image
     if image.dtype not in (np.uint8, np.uint16) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
         channels = 1 if image.ndim == 2 else image.shape[2]
         raise InputError(f"{path}: expected a grey or colour image of 8 or 16 bits, got {channels} × {image.dtype}")
     return image.astype(np.uint8, copy=False) if image.dtype == np.uint8 else image.astype(np.uint16, copy=False)
+
+
+def _inverted_bits(path: Path) -> int:
+    """Bits per pixel of a TIFF file in which 0 is white, which OpenCV disregards above 8 bits; 0 for others."""
+    with contextlib.suppress(*IMAGE_FAULTS), warnings.catch_warnings(action="ignore"), Image.open(path) as image:
+        if isinstance(image, TiffImagePlugin.TiffImageFile) and image.tag_v2.get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
+            return int(image.tag_v2[_BITS][0])
+    return 0
 
 
 def _decoded(path: Path) -> NDArray[np.generic]:

@@ -5,7 +5,8 @@ import itertools
 import math
 import re
 import warnings
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ from fogsim.core.files.readers import nearest_file
 from fogsim.core.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.errors import InputError
 from fogsim.offline.image_files import IMAGE_ENDINGS
+from fogsim.offline.image_times import capture_times
 from fogsim.offline.source import Animation, ImageFiles, Source
 from fogsim.offline.video_source import VideoFile
 
@@ -24,6 +26,12 @@ _VIDEO_ENDINGS = (
 
 _SEQUENCE_RATE = 10.0
 """Default number of images of a numbered sequence per second [1/s]."""
+
+_LONGEST_STEP = 2.0
+"""Longest time between two images of a drive that is found by the names and times of its files [s]."""
+
+_NO_PICTURES = (".yaml", ".yml", ".json", ".geojson", ".csv", ".gpx", ".txt", ".md")
+"""Suffixes of text, which lies next to images and is no image that a folder's reader could miss."""
 
 
 @checked_parameters
@@ -42,14 +50,14 @@ def find_source(
         patterns like ``"drive/*.png"``.
     sequence : bool or None
         Whether images follow one another in time. None: a video does, and so do images whose names differ in one
-        number that grows in equal steps.
+        number that grows in equal steps, unless by their EXIF times any two are more than 2 s apart.
     rate : float or None
-        Images of a sequence in a second [1/s]; None for 10.
+        Images of a sequence in a second [1/s]; None for that of their EXIF times, or 10 without.
 
     Returns
     -------
     Source
-        The source; its images are read later.
+        The source; its images are read later. The `remarks` of image files say what was assumed or left out.
 
     Raises
     ------
@@ -65,7 +73,7 @@ def find_source(
         raise InputError("no image and no video is given")
     animation = Animation.open(paths[0], sequence is not False) if len(paths) == 1 else None
     if animation is None and not any(is_video(path) for path in paths):
-        temporal = is_sequence(paths) if sequence is None else sequence
+        temporal, period, remarks = _timing(paths, sequence, rate)
         if temporal and paths == sorted(paths, key=str) != _ordered(paths):
             raise InputError(
                 f"--sequence: {paths[0]}, {paths[1]}, … are in the order of their names as text, as a shell puts them, "
@@ -74,10 +82,10 @@ def find_source(
         if sequence and (gap := _first_gap(paths)):
             warnings.warn(
                 f"--sequence: the numbers of {gap[0]} and {gap[1]} are farther apart than others: images may be "
-                f"missing there; each is taken as {1.0 / (rate or _SEQUENCE_RATE):g} s after the one before",
+                f"missing there; each is taken as {period:g} s after the one before",
                 stacklevel=2,
             )
-        return ImageFiles(tuple(paths), temporal, 1.0 / (rate or _SEQUENCE_RATE))
+        return ImageFiles(tuple(paths), temporal, period, (*remarks, *_left_out(given)))
     if len(paths) > 1:
         raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
     if rate is not None:
@@ -94,11 +102,12 @@ def is_video(path: Path) -> bool:
 def _paths(given: str) -> list[Path]:
     path = Path(given)
     if path.is_dir():
-        # Hidden ones, as "._1.png" of macOS, are no images; patterns leave them out, too.
-        seen = (one for one in path.iterdir() if not one.name.startswith("."))
-        found = _ordered(one for one in seen if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
+        found = _ordered(one for one in _seen(path) if one.suffix.lower() in IMAGE_ENDINGS)
         if not found:
-            raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
+            others = f"; it has {kinds}" if (kinds := _others(path)) else ""
+            raise InputError(
+                f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}{others}"
+            )
         return found
     if path.exists():
         return [path]
@@ -108,6 +117,43 @@ def _paths(given: str) -> list[Path]:
             raise InputError(f"{given}: no file fits this pattern")
         return found
     raise InputError(f"{given}: there is no such file or folder{nearest_file(path)}")
+
+
+def _seen(folder: Path) -> list[Path]:
+    # Hidden files, as "._1.png" of macOS, are no images; patterns leave them out, too.
+    return [one for one in folder.iterdir() if not one.name.startswith(".") and one.is_file()]
+
+
+def _others(folder: Path) -> str:
+    """Numbers and suffixes of files in a folder that are not read and could be images."""
+    suffixes = (one.suffix.lower() for one in _seen(folder))
+    counts = Counter(one for one in suffixes if one not in (*IMAGE_ENDINGS, *_NO_PICTURES))
+    return ", ".join(f"{number} × {suffix or 'no ending'}" for suffix, number in counts.most_common())
+
+
+def _left_out(given: Iterable[str | Path]) -> Iterator[str]:
+    for folder in (Path(one) for one in given if Path(one).is_dir()):
+        if kinds := _others(folder):
+            yield f"{folder}: left out, since only {', '.join(IMAGE_ENDINGS)} are read from a folder: {kinds}"
+
+
+def _timing(paths: Sequence[Path], sequence: bool | None, rate: float | None) -> tuple[bool, float, list[str]]:
+    """Whether files are a sequence, the time between two images [s], and what was assumed."""
+    period = 1.0 / (rate or _SEQUENCE_RATE)
+    if len(paths) < 2 or not (is_sequence(paths) if sequence is None else sequence):
+        return bool(sequence), period, []
+    times = capture_times(paths)
+    steps = [after - before for before, after in itertools.pairwise(times)]
+    if steps and sequence is None and not 0.0 <= min(steps) <= max(steps) <= _LONGEST_STEP:
+        apart = f"up to {max(steps):.0f} s apart" if min(steps) >= 0.0 else "in another order"
+        text = f"the names of {len(paths)} images count on, but by their EXIF times they were taken {apart}: "
+        return False, period, [text + "each is read by itself; --sequence reads them as one drive"]
+    if rate is not None:
+        return True, period, []
+    if steps and min(steps) >= 0.0 and times[-1] > times[0]:
+        return True, (times[-1] - times[0]) / len(steps), []
+    text = f"{len(paths)} images are taken as one drive, {_SEQUENCE_RATE:g} a second, since no EXIF times say "
+    return True, period, [text + "otherwise: --rate changes it, and --stills reads each by itself"]
 
 
 def _ordered(paths: Iterable[Path]) -> list[Path]:

@@ -156,6 +156,8 @@ class Straightener:
 
     Attributes
     ----------
+    calibration : Calibration
+        The real camera.
     camera : Camera
         The pinhole of the rectified images.
 
@@ -166,7 +168,7 @@ class Straightener:
     """
 
     def __init__(self, calibration: Calibration) -> None:
-        given = calibration.camera
+        self.calibration, given = calibration, calibration.camera
         u0, v0 = given.principal_point
         self.camera: Camera = replace(given, principal_point=(u0 + given.focal_length * math.tan(calibration.yaw), v0))
         self._size = (given.height, given.width)

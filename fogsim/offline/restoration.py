@@ -1,18 +1,22 @@
 """Contrast restoration of images and videos from disk."""
 
+import hashlib
 from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.atomic import write_text
 from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.errors import InputError
-from fogsim.offline.estimation import estimates_of, place_of
+from fogsim.offline.estimation import estimates_of, place_of, unless_none_fits
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
-from fogsim.offline.source import Picture, Source
+from fogsim.offline.rectification import StraightenedSource
+from fogsim.offline.source import ImageFiles, Picture, Source
 from fogsim.offline.video_source import VideoWriter, refuse_unfit_video
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, Estimate
@@ -22,6 +26,9 @@ from fogsim.vision.restoration.picture import largest_value
 
 _ESTIMATOR = "joint_road"
 """Method that estimates the extinction if no visibility is given."""
+
+_UNFINISHED = ".unfinished"
+"""File in a folder of restored images until all are written; it has a digest of what they are made from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,29 +81,30 @@ def _restored_images(source: Source, camera: Camera, wish: RestorationWish) -> I
     """Restore the images of a source in turn.
 
     `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept. An image that
-    does not fit the camera is not restored; if it is the first, the calibration is of another camera.
+    does not fit the camera is not restored.
     """
+    return unless_none_fits(_judged(source, camera, wish))
+
+
+def _judged(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Restored, str | None]]:
+    """Restored images, and why an image does not fit; see `unless_none_fits`."""
     last: Estimate | None = None
-    fitted = False
     for picture, estimate in _estimated(source, camera, wish):
         if picture.image is None:
-            yield Restored(picture, None, reason=picture.error)
+            yield Restored(picture, None, reason=picture.error), None
             continue
         held = False
         if estimate is not None:
             held = not estimate.valid and source.temporal and last is not None
             last = estimate if estimate.valid or not source.temporal else last
             if last is None or not last.valid:
-                yield Restored(picture, None, reason=f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}")
+                reason = f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}"
+                yield Restored(picture, None, reason=reason), ""
                 continue
         try:
-            done = _restored(picture, picture.image, camera, wish, last, held)
+            yield _restored(picture, picture.image, camera, wish, last, held), ""
         except InputError as error:
-            if not fitted:
-                raise InputError(f"{place_of(source, picture)}: {error}") from error
-            done = Restored(picture, None, reason=str(error))
-        fitted = True
-        yield done
+            yield Restored(picture, None, reason=str(error)), f"{place_of(source, picture)}: {error}"
 
 
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
@@ -148,20 +156,58 @@ def _airlight(
 def restore_files(
     source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
 ) -> Generator[Restored]:
-    """Restore image files and yield each after it was written: one into a file, several into a folder by name."""
+    """Restore image files and yield each after it was written: one into a file, several into a folder by name.
+
+    After an interruption, those that are in the folder are left out.
+    """
     targets = _targets(source.paths, out)
-    is_folder = len(targets) > 1
+    is_folder, finished = len(targets) > 1, frozenset[Path]()
+    mark, digest = out / _UNFINISHED, _digest(source, camera, wish)
     if is_folder:
         refuse_unwritable_folder(out)
+        finished = _finished(targets, mark, digest)
     # Comparing each target with all sources would take minutes for thousands of images.
     sources = {_identity(path): (path,) for path in source.paths}
-    for target in targets:
+    for target in (one for one in targets if one not in finished):
         read = sources.get(_identity(target), ())
         refuse_unwritable_image(target, "--out", overwrite=overwrite, read=read, makes_folder=is_folder)
     if is_folder:
         out.mkdir(parents=True, exist_ok=True)
-    for target, one in zip(targets, _restored_images(source, camera, wish), strict=True):
-        yield _written(target, one, is_one_of_several=is_folder)
+        if not finished:
+            write_text(mark, digest)
+    if not (source.temporal and wish.estimates):  # otherwise, earlier images count
+        source = _rest(source, {path for path, target in zip(source.paths, targets, strict=True) if target in finished})
+        targets = tuple(one for one in targets if one not in finished)
+    results = _restored_images(source, camera, wish) if targets else ()
+    for target, one in zip(targets, results, strict=True):
+        if target not in finished:
+            yield _written(target, one, is_one_of_several=is_folder)
+    if is_folder:
+        mark.unlink(missing_ok=True)
+
+
+def _digest(source: Source, camera: Camera, wish: RestorationWish) -> str:
+    """Digest of what determines restored images."""
+    calibration = source.straightener.calibration if isinstance(source, StraightenedSource) else camera
+    stats = [(path, path.stat()) for path in source.paths if path.exists()]
+    files = [(path, found.st_size, found.st_mtime_ns) for path, found in stats]
+    return hashlib.sha256(repr((version("fogsim"), source.temporal, calibration, wish, files)).encode()).hexdigest()
+
+
+def _finished(targets: tuple[Path, ...], mark: Path, digest: str) -> frozenset[Path]:
+    """Targets that an interrupted restoration with the same digest has written."""
+    if not mark.is_file() or mark.read_text(encoding="utf-8", errors="replace") != digest:
+        return frozenset()
+    begun = mark.stat().st_mtime_ns
+    return frozenset(one for one in targets if one.is_file() and one.stat().st_mtime_ns >= begun)
+
+
+def _rest(source: Source, finished: set[Path]) -> Source:
+    """A source without some of its files."""
+    if isinstance(source, StraightenedSource):
+        return replace(source, source=_rest(source.source, finished))
+    assert isinstance(source, ImageFiles)  # noqa: S101 - no other has several files
+    return replace(source, paths=tuple(path for path in source.paths if path not in finished))
 
 
 def _written(target: Path, one: Restored, *, is_one_of_several: bool) -> Restored:

@@ -76,11 +76,14 @@ class ImageFiles:
         Whether they are a sequence.
     period : float
         Time between two of a sequence [s].
+    remarks : tuple of str
+        What was assumed of them, and files of their folders that are left out.
     """
 
     paths: tuple[Path, ...]
     temporal: bool
     period: float
+    remarks: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:

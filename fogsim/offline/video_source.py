@@ -125,7 +125,7 @@ _HIGH_RANGE = re.compile(r"Video:.*\b(arib-std-b67|smpte2084)\b")  # ITU-R BT.21
 _JOINED = "Found duplicated MOOV Atom"  # of an MP4 file that was appended to another
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 _FRAME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+).*? s:(\d+)x(\d+)")
-_ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
+_ERROR, _TRANSPORT_STREAM, _AVI = "[error] ", "Input #0, mpegts", "Input #0, avi"
 _PACKET_SIZES = (188, 192, 204)  # of MPEG transport streams: ISO/IEC 13818-1, with a time code, with error correction
 _MOST_MISSING = 0.5
 """Time by which a complete video's frames or sound may end before its header's duration [s]."""
@@ -270,7 +270,8 @@ class VideoFile:
             *log.errors,
             *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else []),
         ]
-        is_short = self.duration - end > max(_MOST_MISSING, 2.0 * self.period) and not self._has_whole_sound()
+        missing = self.duration - log.lead - end
+        is_short = missing > max(_MOST_MISSING, 2.0 * self.period) and not self._has_whole_sound()
         if failed or errors or is_short:
             frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
             reason = f" ({errors[0]})" if errors else ""
@@ -307,7 +308,8 @@ class _Log:
         self._times: list[float] = []
         self._sizes: list[tuple[int, int]] = []
         self.errors: list[str] = []
-        self.is_stream = False
+        self.is_stream, self._is_avi = False, False
+        self.lead = 0.0  # before the first frame in an AVI file, whose duration includes it [s]
 
     def frame(self, index: int) -> tuple[float, tuple[int, int]]:
         """Time of a frame that was written, from the first [s], by the rate if the file has none; columns and rows."""
@@ -330,12 +332,19 @@ class _Log:
             if self._times and time < self._times[-1]:
                 # Time has begun again, as where one file was appended to another.
                 self._shift, time = self._shift + after - time, after
+            if self._is_avi and not self._times:
+                self.lead = time
+            elif self._is_avi and len(self._times) == 1 and time - after > _MOST_MISSING:
+                # Later segments have their first frame at 0, and nothing more up to their beginning.
+                self.lead, self._shift, time = time - after, after - time, after
             self._times.append(time)
             self._sizes.append((int(frame[2]), int(frame[3])))
         elif _ERROR in line and len(self.errors) < _MOST_ERRORS:
             self.errors.append(_ADDRESS.sub("", line).replace(_ERROR, "").strip())
         elif _TRANSPORT_STREAM in line:
             self.is_stream = True
+        elif _AVI in line:
+            self._is_avi = True
 
 
 def _number(text: str) -> float:

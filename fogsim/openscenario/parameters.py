@@ -116,7 +116,8 @@ def _result(expression: str, known: Parameters) -> str:
         value = _value(ast.parse(plain, mode="eval").body)
         if isinstance(value, bool):
             return str(value).lower()
-        return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
+        # int() refuses what is infinite.
+        return repr(int(value)) if int(value) == value and abs(value) < 1e15 else repr(float(value))
     except (SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
         raise ValueError(f"cannot evaluate ${{{expression}}}: {error}") from None
 

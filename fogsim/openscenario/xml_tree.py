@@ -170,9 +170,11 @@ class Node:
             return default
         with contextlib.suppress(ValueError):
             value = float(text)
-            if not (math.isnan(value) or (is_finite and math.isinf(value))):
+            is_endless = not is_finite and "inf" in text.lower()
+            if math.isfinite(value) or (is_endless and not math.isnan(value)):
                 if value < 0.0 and key in _FROM_ZERO:
                     self.refuse(f"{key}: expected 0 or more, got {value:g}", is_whole=False)
+                return value
                 return value
         self.refuse(f"expected a number for {key}, got {shown(text or 'nothing')}", is_whole=False)
         return 0.0

@@ -355,7 +355,7 @@ class SceneRenderer:
     ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float64]]:
         """Shapes, records and places of all that stands still."""
         counts = [len(batch.transforms) for batch in scenery]
-        shape = np.repeat(np.array([self._number(batch) for batch in scenery], np.int64), counts)
+        shape = np.repeat(self._numbers(scenery), counts)
         record = np.concatenate([np.zeros((0, 17), np.float32), *map(_records, scenery)])
         place = record[:, 3:12:4].astype(np.float64)
         pieces = np.zeros((len(ground.pieces), 17), np.float32)
@@ -381,16 +381,17 @@ class SceneRenderer:
             np.concatenate([batch.paint for batch in vehicles], out=record[:, 12:15])
             np.concatenate([batch.lamps for batch in vehicles], out=integers[:, 15])
             np.concatenate([batch.instance for batch in vehicles], out=integers[:, 16])
-            self._copies.shape[self._still : end] = np.repeat([*map(self._number, vehicles)], counts)
+            self._copies.shape[self._still : end] = self._numbers(vehicles).repeat(counts)
             self._copies.place[self._still : end] = record[:, 3:12:4]
         return end
 
-    def _number(self, batch: Batch) -> int:
+    def _numbers(self, batches: Sequence[Batch]) -> NDArray[np.int64]:
         numbers = self._table.numbers
-        if batch.shape not in numbers:
+        try:
+            return np.array([numbers[batch.shape] for batch in batches], np.int64)
+        except KeyError as error:
             known = sorted(numbers)
-            raise InputError(f"a batch names the shape {batch.shape!r}, which the scene does not have: {known}")
-        return numbers[batch.shape]
+            raise InputError(f"a batch names the shape {error}, which the scene does not have: {known}") from None
 
 
 def _records(batch: Batch) -> NDArray[np.float32]:

@@ -1,5 +1,6 @@
 """YAML to plain data, with numbers as they are written, within limits of size, depth and count."""
 
+import math
 import re
 from typing import Any
 
@@ -24,6 +25,7 @@ _MOST_DIGITS = 300
 
 _MERGE = "tag:yaml.org,2002:merge"
 _TEXT = "tag:yaml.org,2002:str"
+_FLOAT = "tag:yaml.org,2002:float"
 
 
 class PlainYamlError(Exception):
@@ -68,7 +70,7 @@ _Loader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"(?:~|null|N
 _Loader.add_implicit_resolver(_MERGE, re.compile(r"<<\Z"), ["<"])
 _Loader.add_implicit_resolver("tag:yaml.org,2002:int", re.compile(r"[-+]?[0-9]+(?:_[0-9]+)*\Z"), list("-+0123456789"))
 _Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
+    _FLOAT,
     re.compile(
         r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
     ),
@@ -131,6 +133,9 @@ class _Walk:
             for index, value in enumerate(node.value):
                 self._lines[(*at, index)] = _line(value)
                 self.visit(value, (*at, index), depth + 1)
+        elif node.tag == _FLOAT and not node.value.lower().endswith(("inf", "nan")) and math.isinf(float(node.value)):
+            where = f"{dotted(at)}: " if at else ""
+            raise PlainYamlError(f"{where}expected a finite number, or .inf, got {shown(node.value)}", _line(node))
 
     def _note(self, key: yaml.Node, at: KeyPath) -> None:
         if not isinstance(key, yaml.ScalarNode):

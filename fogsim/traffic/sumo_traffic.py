@@ -40,16 +40,7 @@ from fogsim.traffic.sumo_lanes.leaders import Courses, Leaders
 from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, rail_collisions
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo_lanes.street import LightsAhead, PersonReader, SignalReader
-from fogsim.values import (
-    Command,
-    Lamp,
-    NetworkSnapshot,
-    RoadNetwork,
-    SignMap,
-    TrafficSnapshot,
-    TrafficState,
-    Unplayed,
-)
+from fogsim.values import Command, Lamp, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 from fogsim.values.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
 from fogsim.values.script import Leave, TrafficAction
 
@@ -110,10 +101,9 @@ class SumoTraffic:
         self._ego_of_seed: int | None = None
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
-        self._seed, self._command = 0, _NO_ADVICE
-        self._begun, self._end = 0.0, math.inf
+        self._seed, self._command, self._mark = 0, _NO_ADVICE, 0
+        self._begun, self._end, self._teleported, self._arrived = 0.0, math.inf, False, False
         self._route: RoutePosition | None = None
-        self._mark, self._teleported = 0, False
         self._last: TrafficSnapshot | None = None
         self._roads = LoadedRoads(setup.net, setup.additional)
         self._signals: SignalReader | None = None
@@ -172,7 +162,7 @@ class SumoTraffic:
             # What stands next to the roads hides vehicles in clear air, too.
             self._run = replace(self._run, perception=self._perception(self._run, ClearAir()))
         self._command = _NO_ADVICE
-        self._route, self._mark, self._teleported, self._last = None, 0, False, None
+        self._route, self._last, self._mark, self._teleported, self._arrived = None, None, 0, False, False
         try:
             check_step_length(api, setup.step_length)
             check_microscopic(api)
@@ -324,11 +314,12 @@ class SumoTraffic:
         """Read the last step; return its time [s]."""
         run = self._running
         run.collisions.add(run.reader.collisions())
-        run.roster.update()
+        run.roster.update(has_stepped=True)
         if self._link.shared:
             # SUMO has let the other clients do what they do in this step before it answers.
             run.roster.check_count()
         self._teleported |= self._setup.ego in run.roster.teleported
+        self._arrived |= self._setup.ego in run.roster.arrived
         run.lanes.update()
         run.persons.look()
         return run.roster.time
@@ -341,12 +332,16 @@ class SumoTraffic:
         run.roster.update()
         if teleported or ego is None or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
-            self._route, last, self._last = None, self._last, None
-            if last is None or not run.collisions.includes(ego):
+            route, self._route, last, self._last = self._route, None, self._last, None
+            if last is None or route is None:
                 return None
-            # A collision took it: it is shown once more where it was.
-            self._teleported = teleported
-            return replace(last, state=replace(last.state, time=run.roster.time), collisions=run.collisions.take())
+            may_arrive = self._arrived and not self._link.shared and route.may_end(last.state, run.roster.time)
+            if not may_arrive and not run.collisions.includes(ego):
+                return None
+            # A collision took it, or it arrived: it is shown once more where it was.
+            self._teleported, last = teleported, replace(last, collisions=run.collisions.take())
+            last = replace(last, state=replace(last.state, time=run.roster.time))
+            return replace(last, route_length=last.route_position) if may_arrive else last
         new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route

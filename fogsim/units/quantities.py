@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -49,13 +50,18 @@ def parse_quantity(text: str, unit: str) -> float:
     if match is None:
         raise ValueError(f"expected a number and a unit such as {example_of(unit)!r}, got {text!r}")
     number, written = float(match[1]), match[2] or ""
+    is_endless = match[1].endswith("inf")
     if not written:
-        if unit and number != 0.0 and math.isfinite(number):
+        if unit and number != 0.0 and not is_endless:
             raise ValueError(f"{text!r} has no unit; expected one such as in {example_of(unit)!r}")
-        return number
-    larger, smaller = _factors(written, unit)
+        larger, smaller = 1.0, 1.0
+    else:
+        larger, smaller = _factors(written, unit)
     # Divided by a whole number or a short fraction, 95 % is 0.95 and 90 km/h is 25 m/s, and not a neighbour of it.
-    return number * larger if larger >= 1.0 else number / smaller
+    value = number * larger if larger >= 1.0 else number / smaller
+    if not (is_endless or math.isfinite(value)):
+        raise ValueError(f"expected a number of at most {sys.float_info.max:.3g}, or inf, got {text!r}")
+    return value
 
 
 def example_of(unit: str) -> str:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from numbers import Real
 
 from fogsim.errors import InputError, shown, suggest
@@ -33,7 +34,7 @@ def _whole(value: object) -> bool:
     return isinstance(value, Real) and _finite(value) and float(value).is_integer()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Camera:
     """A pinhole camera on a vehicle, looking along the vehicle's axis.
 
@@ -103,6 +104,10 @@ class Camera:
             object.__setattr__(self, name, kind(getattr(self, name)))
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
         """Of the numbers in which cameras mostly differ: what is remembered by camera is looked up for each frame."""
         return hash((self.width, self.focal_length, self.pitch))
 
@@ -122,12 +127,12 @@ class Camera:
             raise InputError(f"camera principal_point must be two finite numbers, got {shown(self.principal_point)}")
         object.__setattr__(self, "principal_point", (float(u0), float(v0)))
 
-    @property
+    @cached_property
     def horizon_row(self) -> float:
         """Row of the horizon at the principal column, v_h = v0 − α tan θ [px] (negru2013 eq. 6)."""
         return self.principal_point[1] - self.focal_length * math.tan(self.pitch)
 
-    @property
+    @cached_property
     def row_distance(self) -> float:
         """λ = α H / cos θ [px·m], so that a road point on row v lies λ / (v − v_h) ahead (negru2013 eq. 11)."""
         return self.focal_length * self.mount_height / math.cos(self.pitch)

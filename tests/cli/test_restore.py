@@ -126,6 +126,27 @@ def test_targets_are_not_compared_with_every_source(folder: Path, monkeypatch: p
         next(restore_files(source, camera, RestorationWish("tarel2009"), folder / "out", overwrite=True))
 
 
+@pytest.mark.parametrize("method", ["tarel2009", "planar"])
+def test_an_interrupted_folder_is_resumed(folder: Path, method: str) -> None:
+    for number in range(3):
+        (folder / "in").mkdir(exist_ok=True)
+        (folder / "in" / f"{number}.png").write_bytes((folder / "fog.png").read_bytes())
+    source, camera, out = find_source(folder / "in"), load_calibration(folder / "camera.yaml").camera, folder / "out"
+    interrupted = restore_files(source, camera, RestorationWish(method), out)
+    assert next(interrupted).picture.name == str(folder / "in" / "0.png")
+    interrupted.close()
+    (out / "0.png").write_bytes(b"as it was written")
+    with pytest.raises(InputError, match=r"0\.png already exists"):
+        next(restore_files(source, camera, RestorationWish("dark_channel"), out))
+    assert [one.picture.name for one in restore_files(source, camera, RestorationWish(method), out)] == [
+        str(folder / "in" / f"{number}.png") for number in (1, 2)
+    ]
+    assert (out / "0.png").read_bytes() == b"as it was written"
+    assert sorted(path.name for path in out.iterdir()) == ["0.png", "1.png", "2.png"]
+    with pytest.raises(InputError, match=r"0\.png already exists"):
+        next(restore_files(source, camera, RestorationWish(method), out))
+
+
 def test_an_image_that_cannot_be_written_does_not_end_the_rest(folder: Path, command: Command) -> None:
     cv2.imwrite(str(folder / "deep.png"), np.full((240, 320), 40_000, np.uint16))
     (folder / "deep.png").rename(folder / "deep.bmp")

@@ -18,6 +18,7 @@ from fogsim_envs.batch import RuleConstants
 from fogsim_envs.batch.belief_kernels import update_belief
 from fogsim_envs.batch.layout import CELLS, EPISODE
 from fogsim_envs.infos import row_of
+from fogsim_envs.spaces import ADVISED_SPEEDS
 from fogsim_envs.task import ScenarioDistribution, TaskWeights
 
 BATCH, FAST = "fogsim/FogAdvisoryBatch-v2", "fogsim/FogAdvisoryFast-v2"
@@ -221,6 +222,13 @@ def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     envs.reset(seed=1)
     with pytest.raises(InputError, match="shape"):
         envs.step(np.zeros(2, int))
+    for actions in ([[12, 0], [3.5, 0]], [[12, 0], [13, 0]], [[12, 0], [math.nan, 0]]):
+        with pytest.raises(InputError, match=r"action of .*, environment 1: no member of MultiDiscrete\(\[13  3\]\)"):
+            envs.step(actions)
+    for wrong in (None, 3, [[12, 0]]):
+        with pytest.raises(InputError, match=r"expected 2 members of MultiDiscrete\(\[13  3\]\), one for each"):
+            envs.step(wrong)
+    assert np.array_equal(envs.step([[3.0, 0.0], [12, 0]])[0][:, 18], np.float32([ADVISED_SPEEDS[3] / 25 - 1, 1]))
     with pytest.raises(InputError, match="at most"):
         made(2, continuous=True, discrete=True)
     with pytest.raises(InputError, match=r"demand: expected at most 1200 vehicles/h"):
@@ -234,6 +242,22 @@ def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         made(2, scenario_distribution=ScenarioDistribution(demand=(500.0,), drivers={"mine": 1.0}))
 
 
+def test_what_is_interrupted_needs_a_reset(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    envs, advice = made(2), np.tile([12, 0], (2, 1))
+    for method, call in (("_begin", envs.reset), ("_infos", lambda: envs.step(advice))):
+        envs.reset(seed=0)
+        envs.step(advice)
+        with monkeypatch.context() as patch:
+            patch.setattr(envs.unwrapped, method, interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                call()
+        with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+            envs.step(advice)
+
+
 def test_options_reach_the_batch_through_stable_baselines() -> None:
     pytest.importorskip("stable_baselines3", reason="an extra")
     from fogsim_envs.batch.stable_baselines import BatchVecEnv
@@ -242,11 +266,26 @@ def test_options_reach_the_batch_through_stable_baselines() -> None:
     envs = BatchVecEnv(gymnasium.wrappers.vector.RecordEpisodeStatistics(inner))
     envs.set_attr("reward_weights", TaskWeights(progress=1.0))
     assert inner.unwrapped.reward_weights == TaskWeights(progress=1.0)
-    envs.set_options({"visibility": 50.0})
-    with pytest.raises(InputError, match="no options"):
-        envs.reset()
+    for options in ({"visibility": 50.0}, [{}, {"visibility": 50.0}]):
+        envs.set_options(options)
+        with pytest.raises(InputError, match="no options"):
+            envs.reset()
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+        envs.step(np.zeros((2, 2), int))
     envs.set_options()
-    assert envs.reset().shape == (2, 22)
+    envs.seed(5)
+    assert np.array_equal(envs.reset(), made(2).reset(seed=5)[0])
+    for call in (
+        lambda: envs.set_attr("reward_weights", None, indices=1),
+        lambda: envs.env_method("close", indices=[0]),
+    ):
+        with pytest.raises(InputError, match="expected indices of all environments, which are one kernel, got"):
+            call()
+    envs.set_attr("reward_weights", TaskWeights(), indices=[1, 0])
+    assert inner.unwrapped.reward_weights == TaskWeights()
+    assert len(envs.get_attr("reward_weights", indices=-1)) == 1
+    with pytest.raises(IndexError):
+        envs.get_attr("reward_weights", indices=[2])
     for name, wrong in (("repeat", {"repeat": 0}), ("repeat", {"repeat": 1.5}), ("SameStep", {"mode": "NextStep"})):
         mode = wrong.pop("mode", "SameStep")
         with pytest.raises(InputError, match=name):

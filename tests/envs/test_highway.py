@@ -247,6 +247,12 @@ def test_frequencies_may_be_numpys(number: Callable[[int], Any]) -> None:
         pass
 
 
+@pytest.mark.parametrize("number", [math.inf, np.float32(math.nan)])
+def test_a_configuration_has_finite_numbers(number: float) -> None:
+    with pytest.raises(InputError, match=r"config\['vehicles_density'\] must be a finite number, got .*(inf|nan)"):
+        gymnasium.make(ID, config={"vehicles_density": number})
+
+
 def test_the_space_is_that_of_an_observation_that_a_reset_changes() -> None:
     plain = gymnasium.make("highway-v0", config=FEW)
     with contextlib.closing(FogCameraWrapper(plain, image_size=(64, 48), overrides=[QUICK])) as env:

@@ -6,7 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fogsim.errors import InputError
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, EstimatorSurrogate, SurrogateTable
+
+
+def test_a_table_has_finite_numbers() -> None:
+    with pytest.raises(InputError, match="SurrogateTable: error must have finite numbers"):
+        _table(math.nan, 1.0)
 
 
 def _table(error: float, valid: float) -> SurrogateTable:

@@ -89,7 +89,7 @@ def test_episodes_follow_one_another_as_gymnasium_defines(mode: AutoresetMode) -
 
 
 @pytest.mark.parametrize("name", ["fogsim/FogAdvisoryFast-v2", "fogsim/FogAdvisory-v0", "fogsim/FogHighway-v0"])
-def test_an_interrupted_episode_does_not_go_on(name: str) -> None:
+def test_an_interrupted_episode_does_not_go_on(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     env = gymnasium.make(name, **({} if "Fast" in name else {"image_size": (32, 16)}))
 
     def interrupted(*_: Any) -> None:
@@ -107,6 +107,14 @@ def test_an_interrupted_episode_does_not_go_on(name: str) -> None:
         env.step([5, 0])
     with pytest.raises(SimulationError, match="call start"):
         loop.advance(Command())
-    env.reset(seed=1)
-    env.step([5, 0])
+    for call in (env.reset, lambda: env.step([5, 0])):
+        env.reset(seed=1)
+        env.step([5, 0])
+        # Ctrl-C while the step is shown, in which "human" waits.
+        with monkeypatch.context() as patch:
+            patch.setattr(env.unwrapped, "_show", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                call()
+        with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+            env.step([5, 0])
     env.close()

@@ -37,6 +37,7 @@ HOSTILE = {
     ),
     "many values": ("x: [" + "1," * MOST_NODES + "]", f"more than {MOST_NODES} keys and values"),
     "huge integer": ("x: 1\nwidth: " + "9" * 5000, ":2: .*a number has at most 300 digits, got '9{39} … 9{39}'"),
+    "endless number": ("x: 1\nfog: {visibility_m: 1e400}", r":2: .*fog\.visibility_m: expected a finite .*'1e400'"),
     "key twice": ("width: 640\nheight: 3\nwidth: 640\n", ":3: .*width: duplicate key, first on line 1"),
     "key twice, as number and text": ("1: x\n'1': y\n", ":2: .*1: duplicate key, first on line 1"),
     "key twice in a list": ("x:\n- {a: 1, a: 2}\n", r":2: .*x\.0\.a: duplicate key, first on line 2"),

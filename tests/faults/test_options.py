@@ -31,7 +31,7 @@ def options(group: typer.Typer, *before: str) -> Iterator[tuple[tuple[str, ...],
 NUMBERS = [
     (command, name, value)
     for command, name, types, most in options(app.app)
-    for value in ("nan", "-inf", "1e40", "x", "")
+    for value in ("nan", "-inf", "1e40", "1e999", "x", "")
     if types & {int, float} and not (value == "1e40" and most == math.inf)
 ]
 PATHS = [(command, name, "") for command, name, types, _ in options(app.app) if Path in types]
@@ -52,7 +52,7 @@ def refusal(command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     return run
 
 
-@pytest.mark.parametrize("kind", ["nan", "-inf", "1e40", "x", "", "empty path", "empty argument"])
+@pytest.mark.parametrize("kind", ["nan", "-inf", "1e40", "1e999", "x", "", "empty path", "empty argument"])
 def test_a_bad_value_is_refused_with_its_option_and_what_is_allowed(refusal: Callable[..., str], kind: str) -> None:
     others = {"empty path": PATHS, "empty argument": ARGUMENTS}
     tried = others.get(kind) or [one for one in NUMBERS if one[2] == kind]

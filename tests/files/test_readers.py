@@ -1,10 +1,10 @@
-"""What a message about a missing file adds."""
+"""What a message about a missing file adds, and numbers that are none."""
 
 from pathlib import Path
 
 import pytest
 
-from fogsim.core.files.readers import nearest_file, open_regular
+from fogsim.core.files.readers import nearest_file, open_regular, read_json
 from fogsim.errors import InputError
 
 
@@ -20,3 +20,10 @@ def test_nothing_is_said_where_no_name_is_near_and_a_missing_folder_is_named(tmp
     assert nearest_file(tmp_path / "\0" / "a") == ""
     assert nearest_file(tmp_path / "m2024.csv" / "a") == ""
     assert nearest_file(tmp_path / "none" / "a").endswith(f"there is no folder '{tmp_path}/none'")
+
+
+def test_numbers_of_json_are_finite(tmp_path: Path) -> None:
+    for number in ("1e999", "-1e999", "NaN", "Infinity"):
+        (tmp_path / "a.json").write_text(f'{{"k": [1.5, {number}]}}', encoding="utf-8")
+        with pytest.raises(InputError, match=rf"a\.json: not valid JSON: .*{number}"):
+            read_json(tmp_path / "a.json")

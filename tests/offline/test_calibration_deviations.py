@@ -54,7 +54,7 @@ def test_intervals_of_a_wrong_height_contain_the_truth(drive, factor: float) -> 
     images, held = sorted((drive.folder / "images").iterdir())[:4], []
     for deviations in (CalibrationDeviations(), CalibrationDeviations(mount_height=0.1)):
         calibration = Calibration(camera, deviations=deviations)
-        found = [one.estimates[0] for one in estimate_images(images, calibration, "joint_road")]
+        found = [one.estimates[0] for one in estimate_images(images, calibration, "joint_road", rate=10)]
         intervals = [one.visibility_interval for one in found if one.valid]
         assert intervals
         held.append(sum(low < 120.0 < high for low, high in intervals) / len(intervals))

@@ -173,6 +173,14 @@ def test_a_later_segment_of_a_recording_is_no_damage(tmp_path: Path, ending: str
     assert [one.error for one in source.pictures()] == [""] * 3
 
 
+@pytest.mark.parametrize("codec", ["mjpeg", "libx264"])  # without and with frames in another order
+def test_a_later_segment_in_an_avi_file_begins_with_its_first_frame(tmp_path: Path, codec: str) -> None:
+    path = made(tmp_path / "segment.avi", "-output_ts_offset", "60", "-c:v", codec)
+    pictures = list(find_source(path).pictures())
+    assert [one.error for one in pictures] == [""] * 3
+    assert [one.time for one in pictures] == pytest.approx([0.0, 0.1, 0.2])
+
+
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
 def test_a_stream_that_was_cut_off_says_so(tmp_path: Path, codec: str) -> None:
     whole, stream, cut = (tmp_path / name for name in ("whole.mp4", "stream.ts", "cut.ts"))

@@ -12,6 +12,7 @@ from PIL import Image
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.offline import chosen_methods, estimate_images, find_source, guess_camera, straightened
+from fogsim.offline.estimation import unless_none_fits
 from fogsim.values import Camera, Estimate, Frame, Observation
 
 
@@ -20,7 +21,7 @@ def visibilities(results) -> list[float]:
 
 
 def test_images_say_the_visibility_in_which_they_were_drawn(drive) -> None:
-    results = list(estimate_images(drive.folder / "images", drive.camera, "joint_road"))
+    results = list(estimate_images(drive.folder / "images", drive.camera, "joint_road", rate=10))
     assert [result.picture.name for result in results] == [str(p) for p in sorted((drive.folder / "images").iterdir())]
     found = visibilities(results)
     # It may abstain where traffic is close; where it tells, it is right.
@@ -43,7 +44,8 @@ def test_images_from_disk_are_estimated_as_those_in_memory(drive) -> None:
     estimator = make("negru2013", drive.camera)
     frames = [Frame(0.1 * i, frame, drive.camera) for i, frame in enumerate(drive.frames)]
     in_memory = [estimator.update(Observation(frame)) for frame in frames]
-    from_disk = [result.estimates[0] for result in estimate_images(drive.folder / "images", drive.camera, "negru2013")]
+    found = estimate_images(drive.folder / "images", drive.camera, "negru2013", rate=10)
+    from_disk = [result.estimates[0] for result in found]
     assert [one.extinction for one in from_disk] == [one.extinction for one in in_memory]
 
 
@@ -85,7 +87,8 @@ def test_images_that_cannot_be_used_are_passed_over_with_their_reason(drive, tmp
     (tmp_path / "a3.png").write_bytes(b"")
     Image.fromarray(drive.frames[0][:-2]).save(tmp_path / "a4.png")
     Image.fromarray(drive.frames[1]).save(tmp_path / "a5.png")
-    results = list(estimate_images(tmp_path, drive.camera, "negru2013"))
+    with pytest.warns(UserWarning, match="5 images are taken as one drive, 10 a second, since no EXIF times"):
+        results = list(estimate_images(tmp_path, drive.camera, "negru2013"))
     assert [len(result.estimates) for result in results] == [1, 0, 0, 0, 1]
     assert "a2.png" in results[1].picture.error
     assert "640 × 478" in results[3].picture.error
@@ -96,14 +99,30 @@ def test_images_that_cannot_be_used_are_passed_over_with_their_reason(drive, tmp
 
 def test_a_camera_of_another_size_ends_it_with_both_sizes(drive) -> None:
     other = replace(drive.camera, width=1280, height=720)
-    for images in ("images", "drive.mp4"):
+    for images, rate in (("images", 10), ("drive.mp4", None)):
         with pytest.raises(InputError, match=r"640 × 480 pixels, the camera 1280 × 720"):
-            list(estimate_images(drive.folder / images, other, "negru2013"))
+            list(estimate_images(drive.folder / images, other, "negru2013", rate=rate))
+
+
+def test_a_camera_of_another_size_ends_it_after_ten_images() -> None:
+    numbers = iter(range(30))
+    with pytest.raises(InputError, match="image 0 is of another size"):
+        list(unless_none_fits((number, f"image {number} is of another size") for number in numbers))
+    assert next(numbers) == 10
+
+
+def test_a_first_image_of_another_size_is_passed_over(drive, tmp_path: Path) -> None:
+    Image.fromarray(drive.frames[0][:-2]).save(tmp_path / "a.png")
+    (tmp_path / "b.png").write_bytes(b"")
+    Image.fromarray(drive.frames[1]).save(tmp_path / "c.png")
+    results = list(estimate_images(tmp_path, drive.camera, "negru2013"))
+    assert [len(result.estimates) for result in results] == [0, 0, 1]
+    assert "640 × 478" in results[0].picture.error
 
 
 def test_images_of_8_bits_are_not_those_of_a_camera_of_12(drive) -> None:
     with pytest.raises(InputError, match="8 bits, the camera 12"):
-        list(estimate_images(drive.folder / "images", replace(drive.camera, bits=12), "negru2013"))
+        list(estimate_images(drive.folder / "images", replace(drive.camera, bits=12), "negru2013", rate=10))
 
 
 def test_images_of_12_bits_need_a_camera_of_12(drive, tmp_path: Path) -> None:
@@ -168,7 +187,7 @@ class Remembering:
 def test_only_sequences_have_a_memory(drive, monkeypatch, sequence, seen) -> None:
     monkeypatch.setitem(ESTIMATORS._entries, "remembering", Remembering)
     paths = sorted((drive.folder / "images").iterdir())[:3]
-    results = list(estimate_images(paths, drive.camera, "remembering", sequence=sequence))
+    results = list(estimate_images(paths, drive.camera, "remembering", sequence=sequence, rate=10))
     times = results[-1].estimates[0].diagnostics["times"]
     assert len(times) == seen
     if sequence is not False:
@@ -188,7 +207,7 @@ def test_a_method_that_returns_no_estimate_of_its_own_is_named(
     monkeypatch.setattr(Remembering, "update", lambda *_: next(returned))
     for number in range(fine + 1):
         Image.new("RGB", (16, 12)).save(tmp_path / f"{number}.png")
-    results = estimate_images(tmp_path, Camera(16, 12, 14.0, (7.5, 5.5), 1.3), Remembering.method)
+    results = estimate_images(tmp_path, Camera(16, 12, 14.0, (7.5, 5.5), 1.3), Remembering.method, rate=10)
     assert len([next(results) for _ in range(fine)]) == fine
     with pytest.raises(InputError, match=r"^estimator 'remembering': update\(\)"):
         next(results)

@@ -126,6 +126,18 @@ def test_a_source_of_unknown_length_is_not_kept_whole(tmp_path: Path) -> None:
         guess_camera(Unstated((tmp_path / "blank.png",) * 200, True, 0.1))
 
 
+def test_one_image_of_another_size_is_left_out_of_a_guess(drive, tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 100
+    Image.fromarray(drive.frames[0][:400]).save(tmp_path / "a.png", exif=exif)
+    for index, frame in enumerate(drive.frames[:3]):
+        Image.fromarray(frame).save(tmp_path / f"b{index}.png")
+    guess = guess_camera(find_source(tmp_path), mount_height=HEIGHT)
+    assert (guess.camera.width, guess.camera.height) == (640, 480)
+    assert "metadata" not in guess.reasons["focal_length_px"]
+    assert guess.warnings[0].startswith("1 of 4 images have another size than the others (")
+
+
 def test_images_of_two_sizes_are_of_two_cameras(drive, tmp_path: Path) -> None:
     Image.fromarray(drive.frames[0]).save(tmp_path / "a.png")
     Image.fromarray(drive.frames[0][:400]).save(tmp_path / "b.png")

@@ -126,3 +126,13 @@ def test_they_are_read(tmp_path: Path) -> None:
     assert np.array_equal(read_image(tmp_path / "image.pbm"), bits)
     cv2.imwrite(str(tmp_path / "image.gif"), COLOURED)
     assert read_image(tmp_path / "image.gif").shape[:2] == GREY.shape
+
+
+@pytest.mark.parametrize("kind", ["grey", "deep grey"])
+def test_white_is_zero_if_a_tiff_says_so(tmp_path: Path, kind: str) -> None:
+    path, image = tmp_path / "image.tif", KINDS[kind]
+    Image.fromarray(image).save(path)
+    black_is_zero = bytes.fromhex("0601 0300 01000000 0100")  # PhotometricInterpretation
+    assert path.read_bytes().count(black_is_zero) == 1
+    path.write_bytes(path.read_bytes().replace(black_is_zero, black_is_zero[:-2] + bytes(2)))
+    np.testing.assert_array_equal(read_image(path), np.iinfo(image.dtype).max - image)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from fogsim.errors import InputError
 from fogsim.offline import find_source
@@ -68,6 +69,62 @@ def test_images_that_are_missing_in_a_sequence_are_named(tmp_path: Path) -> None
     with pytest.warns(UserWarning, match=r"numbers of \S+f8\.png and \S+f11\.png are farther apart .* taken as 0\.1 s"):
         assert find_source(tmp_path, sequence=True).temporal
     find_source(tmp_path)  # as stills, of which its description speaks
+
+
+def photographs(folder: Path, *times: str) -> None:
+    """Numbered photographs, each with its time within an hour, such as "05:30.25", in EXIF data."""
+    for number, time in enumerate(times):
+        exif, (whole, _, part) = Image.Exif(), time.partition(".")
+        exif.get_ifd(0x8769).update({0x9003: f"2026:01:02 08:{whole}"} | ({0x9291: part} if part else {}))
+        Image.new("L", (8, 6)).save(folder / f"IMG_{number}.jpg", exif=exif)
+
+
+@pytest.mark.parametrize(
+    ("times", "period"),
+    [
+        (("00:00", "05:00", "10:00"), None),
+        (("00:02", "00:01", "00:03"), None),
+        (("00:00.0", "00:00.25", "00:00.5"), 0.25),
+        (("00:00", "00:00", "00:01", "00:01", "00:02"), 0.5),
+    ],
+)
+def test_times_in_photographs_decide_whether_they_are_a_drive(tmp_path: Path, times: tuple, period: float) -> None:
+    photographs(tmp_path, *times)
+    source = find_source(tmp_path)
+    assert source.temporal == (period is not None)
+    if period:
+        assert source.period == pytest.approx(period)
+        assert not source.remarks
+    else:
+        assert "by their EXIF times they were taken" in source.remarks[0]
+    assert find_source(tmp_path, sequence=True).temporal
+
+
+def test_photographs_minutes_apart_keep_their_times_if_they_are_called_a_sequence(tmp_path: Path) -> None:
+    photographs(tmp_path, "00:00", "05:00", "10:00")
+    assert "up to 300 s apart" in find_source(tmp_path).remarks[0]
+    assert find_source(tmp_path, sequence=True).period == pytest.approx(300.0)
+    assert find_source(tmp_path, sequence=True, rate=4.0).period == pytest.approx(0.25)
+
+
+def test_an_assumed_rate_is_a_remark(folder: Path) -> None:
+    assumed = "3 images are taken as one drive, 10 a second, since no EXIF times say otherwise: --rate changes it"
+    assert find_source(folder, sequence=True).remarks[0].startswith(assumed)
+    assert not find_source(folder, sequence=True, rate=10).remarks
+    assert not find_source(folder).remarks
+
+
+def test_images_of_other_formats_in_a_folder_are_a_remark(folder: Path) -> None:
+    for name in ("1.HEIC", "2.heic", "3.avif", "camera.yaml", "._4.heic"):
+        (folder / name).write_bytes(b"")
+    (remark,) = find_source(folder).remarks
+    assert remark.startswith(f"{folder}: left out, since only .png")
+    assert remark.endswith("are read from a folder: 2 × .heic, 1 × .avif")
+    assert not find_source(str(folder / "*.png"), sequence=False).remarks
+    for image in (*folder.glob("*.png"), *folder.glob("*.JPG")):
+        image.unlink()
+    with pytest.raises(InputError, match=r"no image with one of .*; it has 2 × \.heic, 1 × \.avif$"):
+        find_source(folder)
 
 
 def test_what_was_found_is_told(folder: Path) -> None:

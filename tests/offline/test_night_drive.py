@@ -28,7 +28,7 @@ def drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_drive_by_night_is_read_by_the_own_lamps_that_are_told(drive: Path) -> None:
     told = NightDrive(Lamp.LOW_BEAM, SETBACK)
-    for result in estimate_images([drive / "0.png", drive / "1.png"], CAMERA, "night_road", night=told):
+    for result in estimate_images([drive / "0.png", drive / "1.png"], CAMERA, "night_road", rate=10, night=told):
         assert result.estimates[0].visibility == pytest.approx(60.0, rel=0.2)
     dark = estimate_images(drive / "0.png", CAMERA, "night_road", night=NightDrive(Lamp.NONE))
     assert "no head lamp" in str(next(dark).estimates[0].diagnostics["reason"])

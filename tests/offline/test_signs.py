@@ -180,6 +180,13 @@ def test_rows_before_a_receiver_has_its_position_are_passed_over(folder: Path) -
     assert track.way_at(4.0) == pytest.approx(2.0 * SPEED, rel=1e-4)
 
 
+def test_a_heading_column_of_another_name_is_refused(folder: Path) -> None:
+    path = csv_track(folder / "course.csv", heading="30")
+    path.write_text(path.read_text("utf-8").replace("heading_deg", "Course"), "utf-8")
+    with pytest.raises(InputError, match=r"expected headings in a column heading_deg, .* got 'Course'; rename it"):
+        load_track(path)
+
+
 def test_summary_and_remarks_of_what_came_of_it(folder: Path) -> None:
     found, missed = watch(), watch()
     for index in range(IMAGES):

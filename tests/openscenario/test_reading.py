@@ -93,6 +93,12 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         ("<WorldPosition", '<RelativeWorldPosition dx="1" dy="0"/><WorldPosition', "there is no entity ''"),
         ('visualRange="200"', 'visualRange="$sight"', "unknown parameter $sight"),
         ('visualRange="200"', 'visualRange="${200 / 0}"', "cannot evaluate"),
+        (
+            'visualRange="200"',
+            'visualRange="${1e308 * 10}"',
+            "cannot evaluate ${1e308 * 10}: cannot convert float infinity",
+        ),
+        ('visualRange="200"', 'visualRange="1e400"', "expected a number for visualRange, got '1e400'"),
         ("</Actors>", "<ByType/></Actors>", "Actors/ByType: FogSim does"),
         ('revMajor="1"', 'revMajor="2"', "expected OpenSCENARIO XML 1.x"),
         ('filepath="two_lanes.xodr"', 'filepath="none.xodr"', "expected an OpenDRIVE file (.xodr) that is there"),

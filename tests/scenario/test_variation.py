@@ -96,6 +96,7 @@ def test_cases_are_chosen_by_their_values() -> None:
         "kind=c": "FILE has no kind=c; known: a, b",
         "run=x": "FILE has no run=x; known: 0, 1",
         "strength=much": "no strength=much",
+        "strength=1e999": "no strength=1e999",
         "strength": "expected name=value",
     }.items():
         with pytest.raises(InputError, match=told):

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fogsim
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import Traffic, libsumo_traffic
-from fogsim.values import Command, TrafficSnapshot
+from fogsim.values import Command, Ending, TrafficSnapshot
 from tests.traffic.common import DATA, configured, seen
 
 GRID = DATA / "grid"
@@ -44,7 +45,22 @@ def test_the_net_is_drawn_and_the_route_is_as_long_as_the_way_across_its_junctio
     assert any(s.state.lane[s.ego].startswith(":") for s in snapshots)
     assert position[-1] - position[0] == pytest.approx(way, rel=0.02)
     # The last step is within one step's way of the end; lanes of a curve differ by some metres.
-    assert position[-1] == pytest.approx(snapshots[-1].route_length, abs=5.0)
+    assert position[-1] == pytest.approx(snapshots[0].route_length, abs=5.0)
+
+
+@pytest.mark.parametrize(("taken_on", "ending"), [("ew1", Ending.ARRIVED), ("we2", Ending.LEFT_NETWORK)])
+def test_an_ego_arrives_at_its_place_and_not_where_it_is_taken_away(
+    tmp_path: Path, taken_on: str, ending: Ending
+) -> None:
+    """It arrives at 100 m of its last edge; SUMO reports one that a vaporizer takes as arrived, too."""
+    demand = """<routes><route id="r" edges="we1 we2 ew2"/><vType id="t" sigma="0" lcOpposite="0"/>
+    <vehicle id="ego" type="t" route="r" depart="0" departPos="50" departSpeed="20" arrivalPos="100"/></routes>"""
+    (tmp_path / "gone.add.xml").write_text(f'<a><vaporizer id="{taken_on}" begin="0" end="200"/></a>')
+    net = DATA / "sumo_cases" / "overtaking_lights.net.xml"
+    path = configured(tmp_path, net, demand, additional="gone.add.xml")
+    settings = ("renderer=none", "estimators=[]", "fog.visibility_m=5000", "duration_s=200")
+    *_, last = fogsim.run(scenario_from_config(path, "ego", settings), seed=1)
+    assert last.ending is ending
 
 
 def configuration(folder: Path, *options: str, routes: str | Path = GRID / "grid.trips.xml") -> Path:

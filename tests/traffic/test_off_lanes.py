@@ -202,5 +202,5 @@ def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
         scenario_from_config(config, "ego", BLIND)
     with pytest.raises(InputError, match=told.removeprefix("mesosim: ")):
         scenario("two", "ego", 60.0, "traffic.sumo_options.mesosim=true")
-    with libsumo_in_town([*ARGUMENTS, "--mesosim"]) as library, pytest.raises(SimulationError, match=told):
+    with libsumo_in_town([*ARGUMENTS, "--mesosim", "1"]) as library, pytest.raises(SimulationError, match=told):
         fogsim.attach(library, ego="ego", visibility=120.0)

@@ -32,6 +32,14 @@ def test_what_is_endless_needs_no_unit():
     assert parse_quantity("inf m", "m") == math.inf
 
 
+def test_only_inf_is_endless():
+    for text in ("1e400 m", "1e308 km", "-1e400 km", "1e400"):
+        with pytest.raises(ValueError, match=r"expected a number of at most 1\.8e\+308, or inf|has no unit"):
+            parse_quantity(text, "m")
+    with pytest.raises(ValueError, match="or inf, got '1e400'"):
+        parse_quantity("1e400", "")
+
+
 def test_what_does_not_fit_is_refused_with_an_example():
     for text, told in [
         ("5", "has no unit"),

@@ -1,7 +1,8 @@
 """A calibration that no camera can have is refused by name, value and what is allowed."""
 
+import copy
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -62,3 +63,12 @@ def test_numbers_of_any_type_make_the_same_camera() -> None:
     assert [type(size) for size in (other.width, other.height, other.bits)] == [int, int, int]
     assert [type(one) for one in (other.focal_length, other.mount_height, other.pitch, other.roll)] == 4 * [float]
     assert other.response is Response.LINEAR
+
+
+def test_what_a_camera_has_computed_changes_neither_its_copies_nor_what_equals_it() -> None:
+    used = Camera(**asdict(CAMERA))
+    assert hash(used) + used.horizon_row + used.row_distance > 0.0
+    assert used == CAMERA == copy.deepcopy(used)
+    assert asdict(used) == asdict(CAMERA)
+    pitched = replace(used, pitch=0.03)
+    assert (pitched.horizon_row, hash(pitched)) != (used.horizon_row, hash(used))

@@ -1,8 +1,8 @@
 """The vector environment for Stable-Baselines3, an extra: ``BatchVecEnv(gymnasium.make_vec(…))``."""
 
-from collections.abc import Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
@@ -28,15 +28,18 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
             raise InputError('autoreset_mode: BatchVecEnv expects "SameStep"')
         self.envs, self._repeat, self.multiplier = envs, repeat, 0.0
         self._earned, self._cost = np.zeros(envs.num_envs), np.zeros(envs.num_envs)
+        self._has_begun = False
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each, with the seed that `seed` has set."""
-        first, options = self._seeds[0], self._options[0]
+        seeds, options = self._seeds, next(filter(None, self._options), None)
+        self._has_begun = False
         self._earned[:] = self._cost[:] = 0.0
         self._reset_seeds()
         self._reset_options()
-        observations: NDArray[np.float32] = self.envs.reset(seed=first, options=options)[0]
+        observations: NDArray[np.float32] = self.envs.reset(seed=seeds, options=options)[0]
+        self._has_begun = True
         return observations
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -45,10 +48,14 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step all; an info has what Stable-Baselines3 reads at an episode's end."""
+        if not self._has_begun:
+            raise gymnasium.error.ResetNeeded("no episode has begun, or a step was interrupted: call reset()")
         shown: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         total, over = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
         for _ in range(self._repeat):
             observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+            # Refused actions change nothing.
+            self._has_begun = False
             costs = infos.get("final_info", infos)["cost"]
             # What the action earns in the next episode is nothing that the agent chose there.
             self._earned += np.where(over, 0.0, rewards)
@@ -63,6 +70,7 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
                 }
             over |= terminated | truncated
         self._earned[over] = self._cost[over] = 0.0
+        self._has_begun = True
         return observations, total, over, shown
 
     def close(self) -> None:
@@ -71,19 +79,30 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc] # an extra, untyped where it is
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Attribute, the same for each."""
-        return [getattr(self.envs, attr_name)] * len(self._named(indices))
+        return [self._found(attr_name)] * len(self._chosen(indices))
 
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ARG002 - there is one for all
-        """Set an attribute of all."""
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of all; they have it in common."""
+        self._expect_all(f"set_attr({attr_name!r})", indices)
         setattr(self.envs.unwrapped, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method once for all."""
-        return [getattr(self.envs, method_name)(*args, **kwargs)] * len(self._named(indices))
+        self._expect_all(f"env_method({method_name!r})", indices)
+        return [self._found(method_name)(*args, **kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002 - none is
         """Whether each is wrapped: it is not."""
-        return [False] * len(self._named(indices))
+        return [False] * len(self._chosen(indices))
 
-    def _named(self, indices: Any) -> Sequence[int]:
-        return list(self._get_indices(indices))
+    def _found(self, name: str) -> Any:
+        """Attribute of the wrappers, or of the environment in them."""
+        return getattr(self.envs if hasattr(self.envs, name) else self.envs.unwrapped, name)
+
+    def _chosen(self, indices: Any) -> list[int]:
+        return [range(self.num_envs)[number] for number in self._get_indices(indices)]
+
+    def _expect_all(self, call: str, indices: Any) -> None:
+        """Refuse what would be done to all environments where some are meant."""
+        if len(set(self._chosen(indices))) < self.num_envs:
+            raise InputError(f"{call}: expected indices of all environments, which are one kernel, got {indices!r}")

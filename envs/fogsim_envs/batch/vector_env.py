@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME
 from fogsim.core.parameters import Range, checked_parameters, parameter_mistakes
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim_envs.actions import checked_action
 from fogsim_envs.batch.beginning_kernels import begin
 from fogsim_envs.batch.drawing import draw_numbers
@@ -44,6 +44,7 @@ from fogsim_envs.task.sampling import split_number
 from fogsim_envs.task.surrogate import MEASURED, MEASURED_2, SurrogateTable
 
 Infos = dict[str, Any]
+Outcome = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]
 _SPEEDS = np.array([*ADVISED_SPEEDS, np.inf])
 _SHOWN = (
     "time", "position", "speed", "struck", "ending", "rule_speed", "rule_lamps",
@@ -171,18 +172,18 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
             before[i] if one is None and before else seeding.np_random(None if one is None else int(one))[0]
             for i, one in enumerate(seeds)
         ]
-        self._has_begun, self._over = True, np.empty(0, np.int64)
+        # False until all have begun, or have made a step, so that interrupted episodes do not go on.
+        self._has_begun, self._over = False, np.empty(0, np.int64)
         self._begin(np.arange(self.num_envs))
-        return self._episodes.state.copy(), self._infos()
+        infos, self._has_begun = self._infos(), True
+        return self._episodes.state.copy(), infos
 
     def _begin(self, rows: NDArray[np.int64]) -> None:
         drawn = (draw_numbers(self._generators[i], self._split, self._scenes, self._fog) for i in rows.tolist())
         draws = np.array(list(drawn), DRAWN)
         begin(self._episodes, rows, draws, self._table, self._rule)
 
-    def step(
-        self, actions: Any
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
+    def step(self, actions: Any) -> Outcome:
         """Let an action be in force in each environment for one decision period.
 
         Parameters
@@ -193,14 +194,22 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         Raises
         ------
         gymnasium.error.ResetNeeded
-            If no episode has begun.
+            If no episode has begun, or a step or reset was interrupted.
         InputError
             If the actions are no member of the action space.
         """
         if not self._has_begun:
             raise gymnasium.error.ResetNeeded("no episode has begun: call reset() before step()")
+        commanded = self._commanded(self._checked(actions))
+        self._has_begun = False
+        outcome = self._advance(*commanded)
+        self._has_begun = True
+        return outcome
+
+    def _advance(self, advised: NDArray[np.float64], lamps: NDArray[np.int64]) -> Outcome:
+        """Make a step with an advised speed [m/s] and a lamp mode of each."""
         ego = self._episodes.ego
-        ego["advised"], ego["lamps"] = self._commanded(checked_action(actions, self.action_space, type(self).__name__))
+        ego["advised"], ego["lamps"] = advised, lamps
         weights = np.array([getattr(self.reward_weights, name) for name in TERMS])
         advance(self._episodes, weights, self._table, self._rule)
         if len(self._over):
@@ -219,6 +228,22 @@ class FogAdvisoryBatchEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[A
         mask = terminated | truncated
         ends = {**final, "_final_obs": mask, "_final_info": mask.copy()}
         return self._episodes.state.copy(), rewards, terminated, truncated, {**self._infos(), **ends}
+
+    def _checked(self, actions: Any) -> NDArray[Any]:
+        """Actions as an array, or a refusal that names the first environment whose action does not fit."""
+        name = type(self).__name__
+        try:
+            return checked_action(actions, self.action_space, name)
+        except InputError:
+            given = list(actions) if np.iterable(actions) else []
+            if len(given) != self.num_envs:
+                raise InputError(
+                    f"action of {name}: expected {self.num_envs} members of {self.single_action_space}, one for each "
+                    f"environment; got {shown(actions)}"
+                ) from None
+            for number, action in enumerate(given):
+                checked_action(action, self.single_action_space, f"{name}, environment {number}")
+            raise
 
     def _commanded(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Advised speed [m/s] and number of the lamp mode of each."""

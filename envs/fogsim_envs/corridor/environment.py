@@ -234,9 +234,10 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
                 "reset(): the scenario is over within its first decision period, in which the signs are dark "
                 f"({self._step.ending.value}, after {self._step.time:g} s); give it a longer duration_s"
             )
-        self.agents = list(self.possible_agents)
         self.drawn = drawn.episode.as_info()
-        return self._observe(), self._infos(dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0))
+        begun = self._observe(), self._infos(dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0))
+        self.agents = list(self.possible_agents)
+        return begun
 
     def _checked_road(self, scenario: Scenario) -> _SignedRoad:
         road = _signed_road(scenario)

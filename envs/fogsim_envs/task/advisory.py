@@ -22,7 +22,16 @@ from fogsim.traffic import SPEED_CHOICES
 from fogsim.traffic.drivers.speed_choice import checked_choice, speed_share
 from fogsim.values import Collision, Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
-from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
+from fogsim_envs.hosting import (
+    TIMEOUT,
+    Simulation,
+    Timeout,
+    begin,
+    checked_timeout,
+    needs_completion,
+    refuse_copies,
+    restart,
+)
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.plain_arguments import takes_plain_data
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
@@ -192,6 +201,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         modes = [mode for mode in self.metadata["render_modes"] if mode in render_modes()]
         self.metadata = {"render_modes": modes, "render_fps": 1 / first.clocks.decision_period_s}
 
+    @needs_completion
     @checked_parameters
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode.
@@ -215,6 +225,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         run_seed, drawn = self._source.draw(self.np_random, choice)
         scenario = drawn.scenario
         self._check_camera(scenario)
+        self._step = None
         self._step = self._completed(self._begin(scenario, run_seed))
         self._episode, self._driver = drawn.episode, _OwnDriver(drawn.episode.driver)
         self._advice, self._frames = build.advice_config(scenario), build.periods(scenario).decision_frames
@@ -269,6 +280,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._running = scenario
         return step
 
+    @needs_completion
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Let an action be in force for one decision period.
 

@@ -258,7 +258,7 @@ class ScenarioDistribution:
     """
 
     lanes: tuple[Annotated[int, Range(1, 6)], ...] = (2, 3)
-    demand: tuple[Annotated[float, Range(0.0, math.inf, "/h")], ...] = (300.0, 900.0, 1500.0, 2100.0)
+    demand: tuple[Annotated[float, Range(0.0, 20_000.0, "/h")], ...] = (300.0, 900.0, 1500.0, 2100.0)
     truck_shares: tuple[_Share, ...] = (0.1, 0.25)
     light: Mapping[str, float] = field(default_factory=lambda: {"day": 0.5, "dusk": 0.2, "night": 0.3})
     scripts: Mapping[str, float] = field(

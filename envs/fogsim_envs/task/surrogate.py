@@ -78,6 +78,9 @@ class SurrogateTable:
                 raise InputError(
                     f"SurrogateTable: {name} must have the shape {shape} or {shape} and quantiles, got {found.shape}"
                 )
+        for name in self.__slots__[1:]:
+            if not np.isfinite(getattr(self, name)).all():
+                raise InputError(f"SurrogateTable: {name} must have finite numbers")
 
     def as_json(self) -> str:
         """The table as JSON, its numbers with four digits after the point."""

@@ -114,10 +114,10 @@ def read_text(path: Path, most: int = _MOST_BYTES) -> str:
 
 
 def read_json(path: Path, most: int = _MOST_BYTES) -> Any:
-    """Value of a JSON file; NaN, Infinity and deep nesting raise InputError."""
+    """Value of a JSON file; NaN, Infinity, 1e999 and deep nesting raise InputError."""
     text = read_text(path, most)
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
     except RecursionError as error:
@@ -145,6 +145,13 @@ def refuse_other_length(where: str, row: Mapping[Any, Any]) -> None:
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not a number of JSON")
+
+
+def _finite(written: str) -> float:
+    value = float(written)
+    if math.isinf(value):
+        raise ValueError(f"{shown(written)} is larger than any number here")
+    return value
 
 
 def number_within(where: str, name: str, value: object, least: float = -FARTHEST, most: float = FARTHEST) -> float:

@@ -28,6 +28,9 @@ _LONGEST_TIME = 1e12
 MOVING, _MOST_LOOKED_AT = 10.0, 100
 """Distance over which a direction is derived from positions [m], and number of positions before and after."""
 
+_HEADING, _OTHER_HEADINGS = "heading_deg", ("heading", "course", "bearing", "azimuth", "yaw")
+"""Column of the direction of travel, and words in the names of columns that could mean it in other units."""
+
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "time": ("time_s", "time"),
     "latitude": ("latitude", "lat"),
@@ -132,6 +135,7 @@ def _csv_points(path: Path) -> Iterator[Point]:
     try:
         names = column_names(path, rows.fieldnames)
         column = {meant: _column(path, names, known) for meant, known in COLUMNS.items()}
+        _refuse_other_heading(path, names)
         counted, start = column["time"] == "time_s", None
         for row in rows:
             where = f"--track {path}: line {rows.line_num}"
@@ -139,7 +143,7 @@ def _csv_points(path: Path) -> Iterator[Point]:
             text = row[column["time"]]
             time = _float(where, "time_s", text) if counted else _instant(where, text)
             start = (0.0 if counted else time) if start is None else start
-            heading = _float(where, "heading_deg", row["heading_deg"]) if row.get("heading_deg") else math.nan
+            heading = _float(where, _HEADING, row[_HEADING]) if row.get(_HEADING) else math.nan
             yield time - start, *_degrees(where, row[column["latitude"]], row[column["longitude"]]), heading
     except csv.Error as error:
         raise InputError(f"{path}:{rows.line_num + 1}: not valid CSV: {error}") from error
@@ -150,6 +154,15 @@ def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
         if name in names:
             return name
     raise InputError(f"--track {path}: expected a column {' or '.join(known)}, got {', '.join(names) or 'none'}")
+
+
+def _refuse_other_heading(path: Path, names: Sequence[str]) -> None:
+    others = [name for name in names if any(word in name.lower() for word in _OTHER_HEADINGS)]
+    if others and _HEADING not in names:
+        raise InputError(
+            f"--track {path}: expected headings in a column {_HEADING}, clockwise from north, got {shown(others[0])}; "
+            "rename it, or leave it out and they follow from the positions"
+        )
 
 
 def _instant(where: str, text: str) -> float:

@@ -360,7 +360,8 @@ def _beside_grid(values: Values, text: str) -> Value | None:
     if not values.is_numeric:
         return None
     with contextlib.suppress(ValueError):
-        return float(text)
+        if math.isfinite(number := float(text)) or text == "inf":
+            return number
     return text if split_quantity(text) else None
 
 

@@ -17,25 +17,28 @@ import numpy as np
 from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.core.parameters import Range, checked_parameters
 from fogsim.core.registry import Registry
-from fogsim.errors import InputError
-from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
+from fogsim.errors import InputError, shown
+from fogsim.traffic.drivers.following import FOLLOWING_MODELS, OBSERVED_MIXTURE
 from fogsim.values import Display
 from fogsim.values.result_checks import checked_share, checked_speed
 
+_Share = Annotated[float, Range(0.0, 1.0)]
 
+
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class Compliance:
     """Who follows an advised speed, and how far."""
 
     # Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1
-    reached_share: float = 1.0
-    rate: float = 1.0  # Share of those who follow it, 0 … 1
-    strength: float = 1.0  # How far they go from their own speed down to the advised one, 0 … 1
-    delay: float = 2.0  # Time before they do [s]
+    reached_share: _Share = 1.0
+    rate: _Share = 1.0  # Share of those who follow it, 0 … 1
+    strength: _Share = 1.0  # How far they go from their own speed down to the advised one, 0 … 1
+    delay: Annotated[float, Range(0.0, math.inf, "s")] = 2.0  # Time before they do [s]
     # How far those who by themselves drive slower in fog go up to the advised speed, for they take it to be safe, 0 …
     # 1; never beyond what they drive in clear air
-    trust: float = 0.0
-    foreseen: float = 1.0  # Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1
+    trust: _Share = 0.0
+    foreseen: _Share = 1.0  # Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1
 
 
 _FULL = Compliance()
@@ -87,6 +90,9 @@ def complied_speed(own: float, advised: float, strength: float, trust: float = 0
 
 UNAFFECTED_ABOVE = 200.0
 """Visibility above which drivers do not slow down [m] (White & Jeffery 1980)."""
+
+_ROUNDING = 1e-6
+"""Shares together may differ from 1 by so much [-]."""
 
 CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
@@ -259,21 +265,32 @@ SPEED_CHOICES: Registry[Callable[..., SpeedChoice]] = Registry(
 )
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class DriverSetup:
     """What drivers are like."""
 
     speed_choice: SpeedChoice = observed
-    spread: float = 0.1  # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
+    # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
+    spread: _Share = 0.1
     compliance: Compliance = _FULL  # How they follow advice
     # By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
     # outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001)
-    misjudgement: float = 0.0
+    misjudgement: Annotated[float, Range(0.0, 10.0)] = 0.0
     # Shares of the kinds of drivers, by their names in `FOLLOWING_MODELS`, together 1. None stands for
     # `OBSERVED_MIXTURE` if speeds are `observed` ones, and for drivers who follow as in clear air otherwise
-    following: Mapping[str, float] | None = None
+    following: Mapping[str, _Share] | None = None
     # How they follow advice where that depends on where they hear it; the rest as `compliance` has it
     compliance_by_display: Mapping[Display, Compliance] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not callable(self.speed_choice):
+            raise InputError(f"DriverSetup: speed_choice must be callable, got {shown(self.speed_choice)}")
+        shares = self.following_shares
+        for name in shares:
+            FOLLOWING_MODELS[name]
+        if not math.isclose(total := math.fsum(shares.values()), 1.0, abs_tol=_ROUNDING):
+            raise InputError(f"DriverSetup: following: shares must together be 1, and are {total:g}")
 
     def compliance_with(self, display: Display) -> Compliance:
         """How they follow advice that they hear in one way."""

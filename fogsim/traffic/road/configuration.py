@@ -27,6 +27,7 @@ NO_LANES = "vehicles of a mesoscopic simulation have no positions in lanes, so n
 """Why a mesoscopic simulation is refused."""
 
 _TRUE = ("true", "1", "yes", "on", "x", "t")  # SUMO's words
+_FALSE = ("false", "0", "no", "off", "-", "f")
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
 _ROUTES = ("route-files", "routes", "r")
@@ -59,9 +60,7 @@ _UNSUPPORTED = (
     _UnsupportedOption(
         ("remote-port",), "0", ("",), "SUMO would listen on that port of all interfaces, and wait for a client for ever"
     ),
-    _UnsupportedOption(
-        ("random", "abs-rand"), "false", ("", "0", "f", "no", "off", "-"), "a run must depend on its seed alone"
-    ),
+    _UnsupportedOption(("random", "abs-rand"), "false", ("", *_FALSE), "a run must depend on its seed alone"),
     *(
         _UnsupportedOption(names, "never", ("",), "SUMO would fetch schemas from the addresses that files name")
         for names in (("xml-validation", "X"), ("xml-validation.net",), ("xml-validation.routes",))
@@ -70,6 +69,11 @@ _UNSUPPORTED = (
 
 OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
 """SUMO arguments that override unsupported options of a configuration."""
+
+
+def is_true(text: str) -> bool:
+    """Whether a SUMO boolean is true."""
+    return text.lower() in _TRUE
 
 
 def check_sumo_file(kind: str, path: Path) -> None:
@@ -87,7 +91,7 @@ def check_configured_files(config: Path) -> None:
     """
     configured_files(config)
     root = _root(config)
-    if any(value.lower() in _TRUE for value in _values(root, ("mesosim",))):
+    if any(is_true(value) for value in _values(root, ("mesosim",))):
         raise InputError(f"{config}: mesosim: {NO_LANES}")
     for option, value in ((element.tag, value) for element in root.iter() for value in _written(element)):
         reason = unsafe_option(option, value)

@@ -16,6 +16,7 @@ from fogsim.core.files.xml_reader import read_elements, root_tag
 from fogsim.core.garbage import no_garbage_collection
 from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError, shown
+from fogsim.traffic.road.configuration import is_true
 from fogsim.traffic.road.map_cache import RoadMap, cached_map, compacted, edge_ranges, is_worth_caching, keep_map
 from fogsim.traffic.road.signs import limit_sign
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, SignalHead, Structure
@@ -378,7 +379,7 @@ class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has 
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if tag == "net":
-            self.is_lefthand = attributes.get("lefthand", "false") != "false"
+            self.is_lefthand = is_true(attributes.get("lefthand", "false"))
         elif attributes.get("function") == "normal":
             attributes["function"] = ""  # Networks of early versions write it out, which sumolib does not know.
         elif tag == "junction":

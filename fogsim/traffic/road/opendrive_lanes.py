@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError
+from fogsim.traffic.road.configuration import is_true
 from fogsim.traffic.road.opendrive import PlanView, is_opendrive, plan_view, read_opendrive
 
 _FARTHEST_ROUTE, _LONGEST_LAPS = 50_000.0, 10_000.0
@@ -344,7 +345,7 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     """
     # Text that netconvert wrote just now is no data from outside.
     root = fromstring(net) if is_opendrive(opendrive) else read_tree(opendrive, "net")  # noqa: S314
-    if root.get("lefthand", "false") != "false":
+    if is_true(root.get("lefthand", "false")):
         raise InputError(f"{opendrive}: lefthand: expected a network of right-hand traffic")
     lanes = tuple(_lanes(root))
     if not lanes:

@@ -9,6 +9,7 @@ import numpy as np
 from fogsim.core.files.readers import number_in_text
 from fogsim.core.files.xml_reader import XmlFile
 from fogsim.errors import InputError, shown, suggest
+from fogsim.traffic.road.configuration import is_true
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.values import Structure, StructureKind
 
@@ -40,7 +41,7 @@ class MarkedShape:
 
     def corners(self) -> list[list[float]]:
         """Coordinates of its corners [m], two or three each; InputError if it has none, or they are geographic."""
-        if self.attributes.get("geo", "false") not in ("false", "0"):
+        if is_true(self.attributes.get("geo", "false")):
             raise InputError(f"{self.where}: geo: expected corners x,y of the network [m], not longitude and latitude")
         shape = self.attributes.get("shape", "")
         corners = [

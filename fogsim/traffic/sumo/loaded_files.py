@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fogsim.errors import InputError, SimulationError, nearest_of, shown
-from fogsim.traffic.road.configuration import NO_LANES, configured_files
+from fogsim.traffic.road.configuration import NO_LANES, configured_files, is_true
 from fogsim.traffic.road.demand import read_configured_demand, read_demand
 from fogsim.traffic.road.map_cache import RoadMap
 from fogsim.traffic.road.network import read_net, road_network
@@ -60,7 +60,7 @@ def end_time(api: Api) -> float:
 
 def check_microscopic(api: Api) -> None:
     """Raise SimulationError if a simulation is mesoscopic."""
-    if api.simulation.getOption("mesosim") == "true":
+    if is_true(api.simulation.getOption("mesosim")):
         raise SimulationError(f"SUMO runs with mesosim: {NO_LANES}")
 
 

@@ -41,16 +41,20 @@ class Roster:
         self._entries = 0
         self.present: set[str] = set()  # Not to be changed by others
         self.teleported: Sequence[str] = ()
+        self.arrived: Sequence[str] = ()
         self.removals = 0  # Steps in which vehicles have left
         self.time = float("nan")
         self.reload()
 
-    def update(self) -> None:
-        """Read the last step; a second call in the same step costs next to nothing."""
+    def update(self, *, has_stepped: bool = False) -> None:
+        """Read the last step; a second call in the same step costs next to nothing, unless SUMO `has_stepped` since."""
         now = self._now()
-        if now == self.time:
+        if now == self.time and not has_stepped:
             return
-        self.teleported = self._teleporting()
+        self.teleported, self.arrived = self._teleporting(), self._arrived()
+        if now <= self.time:
+            # A state was loaded, in which other vehicles may have the same ids.
+            self._leave([*self.present])
         # Lists of changes are of one step only: after a jump of time they are incomplete.
         if not 0.0 < now - self.time < 1.5 * self._step:
             self.reload()
@@ -65,8 +69,7 @@ class Roster:
             self._leave(self.teleported)
         if returned := self._returned():
             self._enter(returned)
-        if arrived := self._arrived():
-            self._leave(arrived)
+        self._leave(self.arrived)
         if not self._remote or now - self._checked >= _CHECK_PERIOD:
             self._checked = now
             self._check_mark()

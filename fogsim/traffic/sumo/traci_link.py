@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from fogsim.errors import InputError, MissingDependencyError, SimulationError
+from fogsim.traffic.road.configuration import is_true
 from fogsim.traffic.sumo.link import Api, translated_errors
 
 _WAIT = 0.25
@@ -104,7 +105,7 @@ class TraciLink:
                 "others: start SUMO again for another run"
             )
         # Loaded again, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
-        closes = self._connection.simulation.getOption("quit-on-end") == "true"
+        closes = is_true(self._connection.simulation.getOption("quit-on-end"))
         self._connection.load([*arguments, "--start", *(("--quit-on-end",) if closes else ())])
 
     def step(self) -> None:

@@ -263,7 +263,7 @@ class SumoDesiredSpeeds:
         if now.items() <= before.items():
             return []
         # With the first change of what its type says a vehicle gets a type of its own, with its id after the name.
-        changed = [v for v, name in now.items() if before.get(v, name) != name]
+        changed = [v for v, name in now.items() if v in before and before[v] != name]
         return [v for v in changed if before[v].removesuffix(f"@{v}") != now[v].removesuffix(f"@{v}")]
 
     def _drivers(self) -> list[str]:

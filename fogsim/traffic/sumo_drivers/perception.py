@@ -247,7 +247,7 @@ class Perception:
         ignored, speed, seen, hidden = self._ignored, self.speed, self._certainly_seen, self._certainly_hidden
         ahead = list(map(self.leader, due, itertools.repeat(REACH)))
         behind = self._obstructed(due, ahead)
-        near: list[_Pair] = []
+        near: dict[str, tuple[str, float]] = {}
         doubtful: list[_Pair] = []
         for follower, found in zip(due, ahead, strict=True):
             leader, gap = found or _NO_LEADER
@@ -265,9 +265,9 @@ class Perception:
             else:
                 near_edge = seen - gap
             if near_edge < _LONG_WAY:
-                near.append((follower, leader, near_edge))
-        followers, leaders, ways = zip(*near, strict=True) if near else ((), (), ())
-        speeds = zip(followers, map(speed, followers), map(speed, leaders), ways, strict=True)
+                near[follower] = leader, near_edge
+        leaders, ways = zip(*near.values(), strict=True) if near else ((), ())
+        speeds = zip(near, map(speed, near), map(speed, leaders), ways, strict=True)
         # Until the gap could have changed by so much. Most are far from any doubt, and pause for the longest time.
         soon = {
             follower: pause

@@ -33,7 +33,7 @@ class LaneDirections:
     def __init__(self, api: Api) -> None:
         self._get = api.vehicle
         self._angle = vehicle_getter(api, "getAngle")
-        self._lane_angle = getter(api, "lane", "getAngle")
+        self._lane_angle, self._links = getter(api, "lane", "getAngle"), getter(api, "lane", "getLinks")
         self._distance, self._length = vehicle_getter(api, "getDistance"), getter(api, "lane", "getLength")
         self._lane, self._station = vehicle_getter(api, "getLaneID"), vehicle_getter(api, "getLanePosition")
         self._opposite = OppositeEdges(api)
@@ -43,10 +43,9 @@ class LaneDirections:
 
     def is_against(self, vehicle: str, lane: str) -> bool:
         """Whether a vehicle drives against the direction of its lane; read again only where the lane is another."""
-        known = self._known.get(vehicle)
-        if known is None or known[0] != lane:
-            known = self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
-        return known[1]
+        if vehicle not in self._known or self._known[vehicle][0] != lane:
+            self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
+        return self._known[vehicle][1]
 
     def against(self, vehicles: Sequence[str], lanes: Sequence[str]) -> list[int]:
         """Rows of those of some vehicles that drive against the direction of their lanes."""
@@ -65,9 +64,13 @@ class LaneDirections:
         turn = self._angle(vehicle) - self._lane_angle(lane, self._station(vehicle))
         if math.cos(math.radians(turn)) >= 0.0:
             return False
-        # The angle of a long vehicle is that of the chord between its ends, whatever its lane does.
-        route, index = self._get.getRoute(vehicle), self._get.getRouteIndex(vehicle)
-        return bool(index < 0 or lane.rpartition("_")[0] != route[index])
+        # The angle of a long vehicle is that of the chord between its ends, whatever its lane does; any has one such
+        # where it turns round inside a junction.
+        route, index = self._get.getRoute(vehicle), int(self._get.getRouteIndex(vehicle))
+        edge, following = lane.rpartition("_")[0], route[index + 1 : index + 2]
+        if edge.startswith(":"):
+            return not any(link[0].rpartition("_")[0] in following for link in self._links(lane))
+        return index < 0 or edge != route[index]
 
     def driven(self, vehicle: str, lane: str | None = None) -> float:
         """Distance that a vehicle has driven [m]; SUMO's own jumps where it overtakes on the oncoming lane."""

@@ -143,11 +143,10 @@ class LongBodies:
         return None if may_be_rigid and _are_in_line(joints) else joints
 
     def _is_gentle(self, lane: str) -> bool:
-        known = self._gentle.get(lane)
-        if known is None:
+        if lane not in self._gentle:
             shape = np.array([point[:2] for point in self._api.lane.getShape(lane)])
-            known = self._gentle[lane] = _most_turn(shape, _LONGEST_SEMITRAILER) <= _GENTLE
-        return known
+            self._gentle[lane] = _most_turn(shape, _LONGEST_SEMITRAILER) <= _GENTLE
+        return self._gentle[lane]
 
     def _lanes_behind(self, vehicle: str, lane: str, missing: float) -> tuple[str, ...]:
         """A lane, and those before it on the vehicle's route over a distance [m], the nearest first."""

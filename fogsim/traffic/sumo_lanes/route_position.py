@@ -8,9 +8,13 @@ from typing import NamedTuple
 from fogsim.traffic.drivers.events import signed_gap
 from fogsim.traffic.sumo.link import UNKNOWN, Api, edge_length, getter, inner_lanes, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.values import TrafficState
 
 _MOVE_TOLERANCE = 5.0
 """Driven and straight distance between two updates may differ by this much more than a bend explains [m]."""
+
+
+_FASTER = 2.0  # times its speed is what a vehicle reaches at most before it is seen again [-]
 
 
 class _RouteLengths:
@@ -120,6 +124,7 @@ class RoutePosition:
         get, vehicle = self._api.vehicle, self._vehicle
         self._route_id = get.getRouteID(vehicle)
         starts, self._length = self._lengths.starts(get.getRoute(vehicle))
+        self._last_edge_start = starts[-1]
         place = self._places.find(vehicle)
         here = starts[place.number] + place.station + place.past_end
         self._offset = here - self._places.directions.driven(vehicle)
@@ -137,6 +142,11 @@ class RoutePosition:
             self._begin()
         self._place = self._offset + driven, self._length
         return self._place
+
+    def may_end(self, last: TrafficState, now: float) -> bool:
+        """Whether the vehicle, seen last in a state, can have been on its route's last edge since (`now` [s])."""
+        speed = float(last.speed[last.ids.index(self._vehicle)])
+        return self._place[0] + _FASTER * speed * (now - last.time) >= self._last_edge_start
 
     def _has_jumped(self, driven: float, here: Sequence[float]) -> bool:
         """True if the vehicle cannot have driven to where it is since the last update."""

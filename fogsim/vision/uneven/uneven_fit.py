@@ -350,7 +350,8 @@ def airlight_edge(
     columns = max(round(middle - reach), 0), min(round(middle + reach), camera.width)
     alike = max(_ALIKE, _NOISE * sky.noise / sky.luminance)
     least = max(_LEAST_ROWS, horizon_deviation / _UNSURE_ROW)
-    upper, lower = _front(image, geometry, uneven.fit.shift, least, columns, sky.luminance, alike)
+    flat, shift = camera.horizon_row, uneven.fit.shift
+    upper, lower = _front(image, geometry, flat, shift, least, columns, sky.luminance, alike)
     if math.isnan(upper):
         return None
     before, behind = camera.row_distance / lower, camera.row_distance / upper
@@ -377,6 +378,7 @@ def _depth(uneven: UnevenFit, distance: float) -> float:
 def _front(
     image: LinearPixels,
     geometry: StripGeometry,
+    flat: float,
     shift: float,
     least: float,
     columns: tuple[int, int],
@@ -385,13 +387,14 @@ def _front(
 ) -> tuple[float, float]:
     """Nearest row, of those from near to far, from which on airlight is seen, and that of ground before it.
 
-    Both below the horizon [px]; NaN if there is no such step. Takes `shift`, `least` [px].
+    Both below the horizon [px]; NaN if there is no step. Takes `flat` (a flat road's horizon), `shift`, `least` [px].
     """
     below, far, count = geometry.below - shift, np.empty(geometry.below.size, np.int64), 0
     for i in range(below.size):
         # Behind a crest no row is farther than the one below it.
         farther = i == 0 or below[i] < below[i - 1]
-        whole = geometry.first[i] == geometry.last[i] and below[i] > least
+        # Where a course that is a little wrong has the road rise, the horizon's own row would be a front.
+        whole = geometry.first[i] == geometry.last[i] and min(below[i], geometry.first[i] - flat - shift) > least
         if farther and whole and geometry.distance[i] > _NEAR_FOG:
             far[count] = i
             count += 1

@@ -1,12 +1,14 @@
 """How fast drivers drive in fog, and how they follow advice; no simulation runs."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogsim.core.kinematics import safe_speed
+from fogsim.errors import InputError
 from fogsim.traffic.drivers.speed_choice import (
     COMPLIANCES,
     SPEED_CHOICES,
@@ -32,6 +34,23 @@ def test_speed_choices() -> None:
     assert too_fast(200.0) == np.inf
     assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
     assert {"observed", "unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
+
+
+@pytest.mark.parametrize(
+    ("make", "wrong"),
+    [
+        (lambda: DriverSetup(spread=-0.1), "spread must be a number 0 … 1, got -0.1"),
+        (lambda: DriverSetup(misjudgement=math.nan), "misjudgement must be a number 0 … 10, got nan"),
+        (lambda: DriverSetup("too_fast"), "speed_choice must be callable, got 'too_fast'"),
+        (lambda: DriverSetup(following={"carefull": 1.0}), "unknown following model 'carefull'.*careful"),
+        (lambda: DriverSetup(following={"careful": 0.5}), "following: shares must together be 1, and are 0.5"),
+        (lambda: Compliance(rate=1.5), "rate must be a number 0 … 1, got 1.5"),
+        (lambda: Compliance(delay=-1.0), "delay must be a number ≥ 0 s, got -1.0"),
+    ],
+)
+def test_drivers_that_cannot_be_are_refused(make: Callable[[], object], wrong: str) -> None:
+    with pytest.raises(InputError, match=wrong):
+        make()
 
 
 KMH = 3.6

@@ -81,6 +81,10 @@ def test_where_vehicles_keep_to_the_left_lines_lie_the_other_way_round(tmp_path:
     )
     assert set(usual) == set(left)
     assert [compacted(read_net(path)).left_hand for path in (GRID, file)] == [False, True]
+    right = tmp_path / "right.net.xml"
+    for word in ("0", "no", "False"):  # SUMO's words for it
+        right.write_text(text.replace('lefthand="true"', f'lefthand="{word}"'), encoding="utf-8")
+        assert not read_net(right).left_hand
     for name in ("A0B0_0", "A0B0_1"):
         assert (left[name].left, left[name].right) == (usual[name].right, usual[name].left)
         assert left[name].outermost is not usual[name].outermost

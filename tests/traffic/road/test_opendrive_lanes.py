@@ -213,6 +213,8 @@ def test_networks_of_left_hand_traffic_are_refused_and_repeated_points_do_no_har
     lanes = read_opendrive_lanes("", net)
     assert lanes.at(70.0, 1.0, 0.0).world == pytest.approx((70.0, 1.0, 0.0))
     assert lanes.nearest(200.0, 50.0) is None
-    net.write_text(f'<net lefthand="true">{edges[0]}</net>', encoding="utf-8")
+    net.write_text(f'<net lefthand="0">{edges[0]}</net>', encoding="utf-8")
+    assert read_opendrive_lanes("", net).at(70.0, 1.0, 0.0).world == pytest.approx((70.0, 1.0, 0.0))
+    net.write_text(f'<net lefthand="1">{edges[0]}</net>', encoding="utf-8")
     with pytest.raises(InputError, match=r"points\.net\.xml: lefthand: expected a network of right-hand traffic"):
         read_opendrive_lanes("", net)

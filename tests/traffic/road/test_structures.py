@@ -33,7 +33,7 @@ def test_mistakes_in_structures_are_told(tmp_path: Path) -> None:
         ('key="top"', 'key="height"', "poly 'w': <param key=.top. value=.…./> is missing"),
         ('"3"', '"high"', "poly 'w': top must be a number within .*, got 'high'"),
         ('"3"', '"0"', "a top over its bottom"),
-        (".wall", '.wall" geo="true', "poly 'w': geo: expected corners x,y of the network"),
+        (".wall", '.wall" geo="yes', "poly 'w': geo: expected corners x,y of the network"),
     ]:
         file = tmp_path / "a.add.xml"
         file.write_text(WALL.replace(old, new, 1), encoding="utf-8")

@@ -70,3 +70,23 @@ def test_a_gap_closes_no_faster_than_its_bound() -> None:
     """Over 0.5 s an emergency stop of the leader at 20 m/s² adds a mean of 5 m/s."""
     assert closing_speed_bound(30.0, 20.0, 0.5) == closing_speed_bound(20.0, 30.0, 0.5) == 15.0
     assert closing_speed_bound(30.0, 20.0, 0.0) == 10.0
+
+
+def test_a_state_of_the_same_time_or_an_earlier_one_brings_other_vehicles(link: LibsumoLink, tmp_path: Path) -> None:
+    api, state = link.begin(CROWD), str(tmp_path / "state.xml")
+    for _ in range(300):
+        link.step()
+    api.simulation.saveState(state)
+    roster = Roster(api)
+    for later in (1, 5):
+        for _ in range(later):
+            link.step()
+            roster.update(has_stepped=True)
+        _, mark = roster.entered_since(0)
+        api.simulation.loadState(state)
+        link.step()
+        roster.update(has_stepped=True)
+        assert roster.present == set(api.vehicle.getIDList()) == set(roster.entered_since(mark)[0])
+        _, mark = roster.entered_since(0)
+        roster.update()
+        assert roster.entered_since(mark)[0] == []

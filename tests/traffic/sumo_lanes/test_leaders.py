@@ -139,3 +139,22 @@ def test_drivers_look_for_those_ahead_of_their_width(link: LibsumoLink, tmp_path
     perception = Perception(DriversView(api, even(25.0), DriverSight(1000.0), Roster(api)))
     perception.update({})
     assert perception.hidden["me"] == "c"
+
+
+def test_leaders_that_turn_round_are_sumos(link: LibsumoLink, tmp_path: Path) -> None:
+    """Inside a junction even a short vehicle's angle, that of the chord between its ends, may be against its lane."""
+    (tmp_path / "a.rou.xml").write_text(
+        """<routes><route id="r" edges="we2 ew2 ew1 we1 ew1"/>
+        <vType id="c" lcOpposite="0"/>
+        <flow id="f" type="c" route="r" begin="0" end="60" period="5" departPos="400" departSpeed="max"/></routes>"""
+    )
+    names = ("-n", str(CASES / "overtaking_lights.net.xml"), "-r", str(tmp_path / "a.rou.xml"))
+    api = link.begin([*names, *QUIET])
+    leaders, turning = Leaders(api), 0
+    for _ in range(200):
+        link.step()
+        for vehicle in api.vehicle.getIDList():
+            sumos, ours = api.vehicle.getLeader(vehicle, 500.0), leaders.of_ego(vehicle)
+            assert (ours and ours.vehicle_id) == (sumos and sumos[0])
+            turning += sumos is not None and api.vehicle.getLaneID(sumos[0]) in (":e_0_0", ":m_7_0", ":w_0_0")
+    assert turning > 20

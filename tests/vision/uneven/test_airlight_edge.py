@@ -70,3 +70,10 @@ def test_an_unsure_horizon_and_a_crest_hide_fronts():
     below, distance = np.where(hidden, 1.2, GEOMETRY.below), np.where(hidden, 664.0, GEOMETRY.distance)
     crest = GEOMETRY._replace(below=below, distance=distance)
     assert airlight_edge(drawn(0.0015, 130.0), crest, CAMERA, SKY, fitted(0.0015), 0.05) is None
+
+
+def test_a_horizon_lower_than_stated_is_no_front_where_the_road_seems_to_rise():
+    flat = drawn(0.004, trees=0.0)
+    lower = flat._replace(pixels=np.roll(flat.pixels, 1, axis=0))
+    rising = GEOMETRY._replace(below=np.hypot(GEOMETRY.below, 2.0))
+    assert airlight_edge(lower, rising, CAMERA, SKY, fitted(0.004), 0.3) is None

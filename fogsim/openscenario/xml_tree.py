@@ -175,7 +175,6 @@ class Node:
                 if value < 0.0 and key in _FROM_ZERO:
                     self.refuse(f"{key}: expected 0 or more, got {value:g}", is_whole=False)
                 return value
-                return value
         self.refuse(f"expected a number for {key}, got {shown(text or 'nothing')}", is_whole=False)
         return 0.0
 

@@ -34,6 +34,7 @@ MOMENTS: dict[str, float] = {
     "motorcycle_at_dusk": 15.0,
     "patchy_fog": 35.4,
     "pedestrian_crossing_fog": 21.0,
+    "radar_dropout": 8.0,
     "ramp_merge": 33.0,
     "sign_missing_and_moved": 4.0,
     "single_lane_behind_truck": 22.4,

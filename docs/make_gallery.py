@@ -2,7 +2,8 @@
 
 Each shipped scenario runs once (its first case), and its frame at the most telling moment is kept: the one that MOMENTS
 has, otherwise a second after the first thing that its script does, at its first collision, or where the least is seen.
-Of those in LOOPS all frames within `AROUND` of it are kept, as a moving picture.
+Of those in LOOPS all frames within `AROUND` of it are kept, as a moving picture; of those in READOUTS also what the
+methods read, since the frame does not show the fault.
 Without names all are drawn (some minutes); ``--table`` writes the table alone.
 """
 
@@ -14,6 +15,8 @@ from pathlib import Path
 from PIL import Image
 
 import fogsim
+from fogsim.metrics import step_metrics
+from fogsim.recorders import FramePanel
 from fogsim.recorders.panel.camera_picture import scale_image, shown_image
 from fogsim.values import Step
 
@@ -26,10 +29,12 @@ MOMENTS: dict[str, float] = {
     "city_fog": 12.0,
     "cut_in_at_15_m": 6.8,
     "emergency_brake_in_fog": 11.4,
+    "frozen_camera": 11.8,
     "highway_99_corridor": 58.6,
     "motorcycle_at_dusk": 15.0,
     "patchy_fog": 35.4,
     "pedestrian_crossing_fog": 21.0,
+    "radar_dropout": 8.0,
     "ramp_merge": 33.0,
     "sign_missing_and_moved": 4.0,
     "single_lane_behind_truck": 22.4,
@@ -49,6 +54,10 @@ LOOPS = {
 AROUND = 2.5
 """Time before and after its moment that a moving picture shows [s]."""
 
+READOUTS = {"frozen_camera", "radar_dropout"}
+FRAME, READOUT = (0, 0, 640, 480), (640, 113, 1024, 233)
+"""The camera's frame and the visibilities in a frame of a run's video [px]."""
+
 BEGIN, END = "<!-- table: gallery -->", "<!-- end of table -->"
 
 
@@ -59,16 +68,31 @@ def telling_frames(name: str) -> list[Image.Image]:
         scenario = fogsim.load_scenario(name, ["renderer=auto", "estimators=[joint_road]"])
     around, moment = (AROUND if name in LOOPS else 0.0), MOMENTS.get(name)
     steps: list[Step] = []
+    panel, drawn = FramePanel(), None
     for step in fogsim.run(scenario, seed=0):
         steps.append(step)
+        if name in READOUTS:
+            drawn = panel.draw(step, step_metrics(step))
         if moment is None and (step.begun or step.collisions):
             moment = step.time + (0.0 if step.collisions else 1.0)
         if moment is not None and step.time >= moment + around:
             break
+    if drawn is not None:
+        return [_with_readout(Image.fromarray(drawn))]
     if moment is None:
         moment = min(steps[1:], key=lambda one: (one.time < 1.0, one.truth.visibility_ahead)).time
     shown = [one for one in steps if abs(one.time - moment) <= around] or [steps[-1]]
     return [scale_image(shown_image(one.observation), *SIZE).convert("RGB") for one in shown]
+
+
+def _with_readout(panel: Image.Image) -> Image.Image:
+    """Camera frame above the visibilities that the methods read."""
+    parts = [panel.crop(box) for box in (FRAME, READOUT)]
+    parts = [one.resize((SIZE[0], round(one.height * SIZE[0] / one.width)), Image.Resampling.LANCZOS) for one in parts]
+    image = Image.new("RGB", (SIZE[0], sum(one.height for one in parts)))
+    image.paste(parts[0])
+    image.paste(parts[1], (0, parts[0].height))
+    return image
 
 
 def picture_of(name: str) -> Path:

@@ -69,10 +69,11 @@ def fog_command(
     """Add homogeneous fog to an image or video, by Koschmieder's law on light and slant range."""
     from fogsim.core.files.readers import nearest_file
 
-    if not image.is_file():
-        lacking = "expected one image or video" if image.exists() else f"there is no such file{nearest_file(image)}"
-        raise InputError(f"{image}: {lacking}")
     light = None if airlight is None else pixel_values(airlight)
+    if image.is_dir():
+        raise InputError(f"{image}: expected one image or video")
+    if not image.exists():
+        raise InputError(f"{image}: there is no such file{nearest_file(image)}")
     layer = _layer(ground_albedo, layer_height)
     geometry = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
     if (depth is None) != road_plane:

@@ -204,9 +204,9 @@ class Storyboard(States):
             return []
         overrides = entry.node.get("priority") not in GENTLE
         ended = [*self._from_init(entry.effect), *(self._override(entry) if overrides else ())]
-        beside = self._others(entry) if overrides else []
+        overridden = self._others(entry) if overrides else []
         for one in self.entries.values():
-            if not any(one is other for other in (entry, *beside)):
+            if not any(one is other for other in (entry, *overridden)):
                 effects = [*one.parts.values()] or [one.effect]
                 ended += [(self._replaced(effect, entry.effect), [one]) for effect in effects]
         written: list[TimelineEntry] = []
